@@ -1,0 +1,94 @@
+// Mode banks: what precompute writes and the runtime plays. Layout on disk: docs/bank-format.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::bank {
+
+inline constexpr int kVersionMajor = 1;
+inline constexpr int kVersionMinor = 0;
+
+using Vec3 = std::array<double, 3>;
+
+/// Rigid-body data of the undeformed solid, in the frame of the mesh.
+struct RigidBody {
+  double mass_kg = 0.0;
+  Vec3 centre_m{};                           // centre of mass
+  std::array<double, 9> inertia_kg_m2{};     // (3, 3) row-major, about the centre of mass, axes of the mesh
+  double volume_m3 = 0.0;
+};
+
+/// Isotropic elastic material and the damping law c = alpha1 lambda + alpha2 (OSG02 section 3.3, corrected).
+struct Material {
+  double young_modulus_pa = 0.0;
+  double poisson_ratio = 0.0;
+  double density_kg_m3 = 0.0;
+  double alpha1_s = 0.0;      // stiffness-proportional
+  double alpha2_per_s = 0.0;  // mass-proportional
+};
+
+/// Sizes of the solve behind the bank.
+struct Counts {
+  std::int64_t nodes = 0;       // of the volume mesh as solved (mid-side nodes included)
+  std::int64_t tets = 0;
+  std::int64_t components = 0;  // connected
+  std::int64_t rigid_modes = 0; // deflated: six per free component, fewer where nodes are held
+};
+
+/// A mode bank. V vertices, T triangles, m modes; rows of `shape` are (V, m, 3) so that all modes of a vertex are adjacent.
+struct Bank {
+  std::vector<Vec3> vertices_m;                          // (V), surface only, frame of the mesh
+  std::vector<std::array<std::int32_t, 3>> triangles;    // (T), outward, counter-clockwise from outside
+
+  std::vector<double> eigenvalue_rad2_s2;  // (m), ascending, lambda = omega^2
+  std::vector<double> decay_per_s;         // (m), d = (alpha1 lambda + alpha2) / 2
+  std::vector<double> residual;            // (m), ||K phi - lambda M phi|| / (lambda ||M phi||)
+  std::vector<double> radiation_gain;      // (m), Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s)
+  std::vector<double> shape_scale;         // (m), kg^-1/2 per integer step
+  std::vector<std::int16_t> shape;         // (V, m, 3); phi = shape * shape_scale, mass-normalised, error <= shape_scale / 2
+
+  RigidBody rigid;
+  Material material;
+  Counts counts;
+  std::array<double, 2> band_hz{20.0, 20000.0};
+  bool complete = true;    // every mode of the band is here (false only when max_modes cut the list)
+  std::string element;     // "T4" or "T10"
+  std::string mass;        // "consistent" or "lumped"
+  std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per station
+
+  std::size_t mode_count() const { return eigenvalue_rad2_s2.size(); }
+  std::size_t vertex_count() const { return vertices_m.size(); }
+  double freq_hz(std::size_t mode) const;  // undamped, sqrt(lambda) / 2 pi
+  /// phi of `mode` at `vertex` [kg^-1/2].
+  Vec3 shape_at(std::size_t vertex, std::size_t mode) const {
+    const std::int16_t* s = &shape[(vertex * mode_count() + mode) * 3];
+    const double k = shape_scale[mode];
+    return {s[0] * k, s[1] * k, s[2] * k};
+  }
+};
+
+/// Fills shape_scale and shape from shapes given as doubles: `row(v)` returns the (m, 3) values of vertex v.
+/// Rounds to nearest; the scale of a mode is its largest absolute component / 32767.
+void quantise_shapes(Bank& bank, std::span<const double> shapes /* (V, m, 3) */);
+
+/// Everything that can be wrong with a bank's content, in words; empty when it is sane. Whole: array sizes agree, all numbers finite.
+/// Sane: eigenvalues positive and ascending, decays >= 0 and equal to the damping law, residuals below 1e-4, triangles inside range and
+/// closed and outward, inertia positive definite and physically possible, scales >= 0.
+std::vector<std::string> find_faults(const Bank& bank);
+
+/// Reads a bank. Throws InputError for anything that is not a whole bank of a version this reader knows: missing file, not a bank,
+/// newer major version, truncated or changed bytes (checksum), arrays that disagree. Bytes are untrusted.
+Bank read_bank(const std::filesystem::path& file);
+
+/// Writes a bank: temporary file beside `file`, fsync, rename, fsync of the folder. Throws InputError when find_faults() is not empty
+/// (nothing is written), SystemError when the disk refuses (nothing is left behind).
+void write_bank(const Bank& bank, const std::filesystem::path& file);
+
+}  // namespace carillon::bank

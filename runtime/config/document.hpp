@@ -1,0 +1,118 @@
+// Strict JSON documents with // comments: every value knows its file and line, every key must be asked for.
+//
+//   config::Document document = config::read_document("job.json");
+//   config::Object job = document.root();
+//   std::string mesh = job.string("mesh");                          // required
+//   double nu = material.number("poisson_ratio", {-1.0, 0.5});      // required, open interval
+//   double tol = solver.number_or("tolerance", 1e-8, {0.0, 1.0});   // default
+//   job.finish();                                                   // a key nobody asked for is an InputError
+//
+// All errors are InputError: "file:line: what is wrong; what would mend it". Not thread-safe; no MPI.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::config {
+
+/// The open interval (low, high) that a number has to lie in. Finite always; bounds themselves are excluded.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+};
+inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity()};
+
+struct DocumentData;  // the parsed text and the line table, shared by all views of one document
+
+/// A JSON object being read. Asking for a key marks it as known.
+class Object {
+ public:
+  bool has(std::string_view key);
+
+  std::string string(std::string_view key);
+  std::string string_or(std::string_view key, std::string_view fallback);
+  /// One of `choices`, or an InputError that lists them.
+  std::string choice(std::string_view key, const std::vector<std::string>& choices);
+  std::string choice_or(std::string_view key, const std::vector<std::string>& choices, std::string_view fallback);
+
+  double number(std::string_view key, Range range = {});
+  double number_or(std::string_view key, double fallback, Range range = {});
+  std::optional<double> number_if(std::string_view key, Range range = {});
+  long long integer(std::string_view key, long long low, long long high);  // low <= value <= high
+  std::optional<long long> integer_if(std::string_view key, long long low, long long high);
+  bool boolean_or(std::string_view key, bool fallback);
+
+  /// A list of exactly N finite numbers.
+  template <std::size_t N>
+  std::array<double, N> numbers(std::string_view key) {
+    std::array<double, N> values{};
+    copy_numbers(key, values.data(), N);
+    return values;
+  }
+  template <std::size_t N>
+  std::array<double, N> numbers_or(std::string_view key, const std::array<double, N>& fallback) {
+    return has(key) ? numbers<N>(key) : fallback;
+  }
+
+  Object object(std::string_view key);
+  std::optional<Object> object_if(std::string_view key);
+  /// A list of objects; a missing key gives an empty list.
+  std::vector<Object> objects(std::string_view key);
+
+  /// A file named by `key`, made absolute: relative paths start at the document's folder. The file need not exist.
+  std::filesystem::path path(std::string_view key);
+  std::optional<std::filesystem::path> path_if(std::string_view key);
+
+  /// Marks `key` as known and skips whatever it holds (recorded facts that are not input).
+  void ignore(std::string_view key);
+
+  /// The keys of this object in the order of the file.
+  std::vector<std::string> keys() const;
+
+  /// Throws InputError for the first key that was never asked for, naming its line and the nearest known key.
+  void finish();
+
+  /// Throws InputError "file:line: message" at the line of `key` (of the object itself when the key is absent).
+  [[noreturn]] void fail(std::string_view key, const std::string& message) const;
+
+  Object(std::shared_ptr<DocumentData> data, const void* value, std::string name);
+
+ private:
+  void copy_numbers(std::string_view key, double* values, std::size_t count);
+  std::shared_ptr<DocumentData> data_;
+  const void* value_ = nullptr;  // a Json::Value of *data_
+  std::string name_;             // dotted path, for messages
+  std::shared_ptr<std::vector<std::string>> asked_;
+};
+
+/// A parsed document.
+class Document {
+ public:
+  Object root() const;
+  const std::filesystem::path& file() const;
+
+ private:
+  friend Document parse_document(std::string_view, const std::filesystem::path&);
+  explicit Document(std::shared_ptr<DocumentData> data);
+  std::shared_ptr<DocumentData> data_;
+};
+
+/// Reads and parses a document of at most 16 MiB. Throws InputError: no such file, not a regular file, too large,
+/// a syntax error (line and column), a duplicate key, a root that is no object.
+Document read_document(const std::filesystem::path& file);
+
+/// The same from text; `file` names it in messages and anchors relative paths.
+Document parse_document(std::string_view text, const std::filesystem::path& file);
+
+/// The entry of `known` with the smallest Damerau-Levenshtein distance to `word`; empty when none is within half of the word's length.
+std::string find_nearest(std::string_view word, const std::vector<std::string>& known);
+
+}  // namespace carillon::config

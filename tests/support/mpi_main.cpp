@@ -1,0 +1,20 @@
+// The main of every test binary that runs under mpirun: starts and ends MPI, PETSc and SLEPc once; a failure on any rank fails the run.
+#include <gtest/gtest.h>
+#include <mpi.h>
+
+#include "precompute/petsc/session.hpp"
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  carillon::petsc::Session session(argc, argv);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (rank != 0) {
+    auto& listeners = testing::UnitTest::GetInstance()->listeners();
+    delete listeners.Release(listeners.default_result_printer());
+  }
+  int failed = RUN_ALL_TESTS();
+  int any = 0;
+  MPI_Allreduce(&failed, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+  return any;
+}
