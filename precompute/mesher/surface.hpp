@@ -1,0 +1,93 @@
+// Closed surfaces to tetrahedra: the solid, or the hollow shell between a surface and its inward offset.
+//
+// This is the one public header of the library; it is std only. CGAL (GPL-3) and OpenVDB (MPL-2) stay behind it, in
+// this library and in the program carillon-mesh alone.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "precompute/mesh/tet_mesh.hpp"
+
+namespace carillon::mesher {
+
+/// How the volume is filled.
+enum class Method {
+  kAutomatic,  // kDelaunay
+  kDelaunay,   // CGAL Mesh_3: no dihedral angle under about 12 degrees, sharp edges kept; 10 to 20 s for 37,000 nodes
+  kStuffing,   // isosurface stuffing on the distance field: 1 to 2 s for 35,000 nodes, sharp edges are rounded
+};
+
+/// The axis along which `height_m` is measured.
+enum class Axis { kX = 0, kY = 1, kZ = 2 };
+
+/// What to make of which surface. At most one of height_m and scale, and at most one of edge_m and nodes.
+struct SurfaceOptions {
+  std::filesystem::path surface;      // OBJ, STL (ASCII or binary), PLY (ASCII or binary), OFF
+  std::optional<double> wall_m;       // hollow: thickness of the wall, inward from the given surface; without it solid
+  std::optional<double> height_m;     // scales the surface so that its extent along `up` is this
+  Axis up = Axis::kY;                 // OBJ models stand along y by custom; the coordinates themselves are never turned
+  std::optional<double> scale;        // metres per unit of the file; without scale and height_m the file is in metres
+  std::optional<double> edge_m;       // length of the tetrahedra's edges
+  std::optional<std::int64_t> nodes;  // nodes of the final mesh (order 2: with the mid-side ones), met within 10 %
+  int order = 1;                      // 1: four nodes a tetrahedron, 2: ten (mid-side nodes at the middle of the edges)
+  double sharp_angle_deg = 40;        // an edge whose two faces turn by more than this, and not by noise, stays sharp
+  Method method = Method::kAutomatic;
+};
+
+/// What came out, and what had to be done to the surface for it.
+struct SurfaceReport {
+  // The input surface as it was read and mended.
+  std::int64_t input_vertices = 0;
+  std::int64_t input_triangles = 0;
+  std::int64_t removed_triangles = 0;  // duplicate or degenerate ones
+  std::int64_t flipped_triangles = 0;  // turned so that all of them face outward
+  std::int64_t holes_closed = 0;       // boundary loops filled with triangles
+  bool wrapped = false;                // the surface could not be mended: its alpha wrap was meshed
+  std::int64_t components = 0;         // of the input surface after mending
+  double scale = 1;                    // metres per unit of the file, as applied
+  std::array<double, 3> extent_m{};    // of the scaled surface along x, y, z
+  double input_volume_m3 = 0;          // enclosed by the scaled surface (with a wall: by the surface, not by the shell)
+  double input_area_m2 = 0;
+  double sharp_edges_m = 0;  // length of the edges of the input that were kept sharp
+  std::int64_t sharp_curves = 0;
+
+  // The mesh.
+  Method method = Method::kDelaunay;  // the one that was used
+  std::int64_t nodes = 0;
+  std::int64_t corner_nodes = 0;
+  std::int64_t tets = 0;
+  double edge_m = 0;       // the edge length asked of the mesher
+  double mean_edge_m = 0;  // as it came out
+  int attempts = 0;        // meshes made to meet the node count
+  double volume_m3 = 0;
+  double expected_volume_m3 = 0;  // solid: input_volume_m3; with a wall: that of the shell by the distance field
+  double min_dihedral_deg = 0;
+  double max_dihedral_deg = 0;
+  double wall_min_m = 0, wall_mean_m = 0, wall_max_m = 0;  // distance of the inner skin's nodes to the input surface
+  double layers_mean = 0;                                  // wall over mean edge length: about how many elements lie through the wall
+
+  std::vector<std::pair<std::string, double>> seconds;  // per phase, in the order they ran
+  std::vector<std::string> notes;                       // sentences for the user: what was mended, what fell short
+};
+
+/// Called with a short sentence at the start of each phase.
+using Progress = std::function<void(std::string_view)>;
+
+/// Meshes a surface. The tetrahedra are positively oriented, every node is used, the boundary is a closed 2-manifold
+/// (every boundary edge has two boundary faces), and the same input gives the same mesh. Regions are all 0.
+/// Throws InputError, with the file and the mend, if the file cannot be read as a surface, if it encloses nothing, if the
+/// wall is thicker than the body or the target count cannot be met; SystemError if memory runs out.
+mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report, const Progress& progress = {});
+
+/// The report as lines for a person.
+std::string describe(const SurfaceReport& report);
+
+}  // namespace carillon::mesher
