@@ -1,0 +1,108 @@
+// The vibration modes of a distributed elastic body: all eigenpairs of K phi = lambda M phi in a band of frequencies, complete by count.
+#pragma once
+
+#include <petscmat.h>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "precompute/petsc/handle.hpp"
+
+namespace carillon::eigen {
+
+using Vec3 = std::array<double, 3>;
+
+/// Where the free nodes of the system are: what the rigid modes need beyond K and M.
+struct NodeLayout {
+  std::vector<Vec3> position;           // (owned free nodes) [m], in the order of the owned row blocks of K
+  std::vector<std::int32_t> component;  // (owned free nodes), 0 <= component < component_count
+  std::int32_t component_count = 1;     // connected components of the mesh, the same on every rank
+  /// Per component the positions of its held (fixed) nodes [m], the same on every rank. Empty: no node is held anywhere. Components whose
+  /// every node is held have no row in K and may stand in the list.
+  std::vector<std::vector<Vec3>> held;
+  /// Fill-reducing order, used on rank 0 only: elimination position of every free node in the global numbering of K's row blocks
+  /// (partition::order_nested_dissection). Empty: the factorisation orders by itself, with more fill.
+  std::vector<std::int32_t> elimination_position;
+};
+
+/// K phi = lambda M phi. Rows come in blocks of three (x, y, z) per free node; K and M have the same row distribution, whole nodes on a rank.
+struct Problem {
+  Mat stiffness = nullptr;  // K [N/m], (3n, 3n), AIJ, symmetric positive semidefinite, both triangles stored
+  Mat mass = nullptr;       // M [kg], (3n, 3n), AIJ, symmetric positive definite, diagonal or in K's pattern
+  NodeLayout nodes;
+};
+
+enum class Factorisation {
+  kAutomatic,  // CHOLMOD on one rank, MUMPS on several
+  kMumps,
+  kCholmod,  // one rank only
+};
+
+enum class Phase { kRigid, kAnalyse, kCount, kFactor, kIterate, kCheck };
+
+/// How far the solve is; sent on rank 0 only.
+struct Progress {
+  Phase phase = Phase::kRigid;
+  std::int64_t modes_done = 0;
+  std::int64_t modes_wanted = 0;  // 0 until the band has been counted
+};
+
+struct Options {
+  double low_hz = 20;     // both ends belong to the band
+  double high_hz = 20e3;
+  std::optional<std::int64_t> max_modes;  // the lowest so many of the band
+  double tolerance = 1e-8;                // bound on every mode's relative residual
+  Factorisation factorisation = Factorisation::kAutomatic;
+  std::function<void(const Progress&)> progress;  // may be empty
+};
+
+/// Own seconds of the stages (wall clock, the slowest rank).
+struct Seconds {
+  double rigid = 0;
+  double analyse = 0;          // elimination order and symbolic factorisation
+  double factor = 0;           // every numeric factorisation, those of the counts included
+  double iterate = 0;          // Krylov-Schur, solves and orthogonalisation included
+  double solve = 0;            // of iterate: triangular solves
+  double check = 0;            // residuals, orthonormality, signs
+  double total = 0;
+};
+
+struct FactorStatistics {
+  std::string solver;         // "MUMPS 5.5.1 LDL^T", "CHOLMOD LL^T", "LAPACK (dense)"
+  std::string ordering;       // "METIS nested dissection (given)", "PORD", ...
+  std::int64_t entries = 0;   // stored entries of the factor, all ranks; 0 if the solver does not tell
+  double flops = 0;           // of one numeric factorisation; 0 if unknown
+  std::int64_t factorisations = 0;
+  std::int64_t solves = 0;    // right-hand sides
+};
+
+struct Modes {
+  std::vector<double> lambda;    // (modes) eigenvalues omega^2 [(rad/s)^2], ascending
+  std::vector<double> residual;  // (modes) ||K phi - lambda M phi||_2 / (lambda ||M phi||_2), calculated from K and M after the solve
+  /// (3n, modes) dense, the row distribution of K; column j is phi_j [kg^-1/2], phi^T M phi = 1. The entry of largest magnitude is positive
+  /// (of several as large, the one whose node comes first by x, y, z). Null when there are no modes.
+  petsc::MatHandle shapes;
+  double orthonormality_error = 0;  // max |phi_i^T M phi_j - delta_ij|
+
+  std::int64_t rigid_count = 0;      // dimension of the rigid subspace, all components; deflated, not in lambda
+  std::int64_t count_below_low = 0;  // eigenvalues below the band: rigid modes, mechanisms and modes below low_hz
+  std::int64_t band_count = 0;       // modes the band holds, by inertia; more than lambda.size() only if max_modes cut it
+  std::int64_t mechanism_count = 0;  // of count_below_low: neither rigid nor audible to 1e-4 low_hz (parts that hang on a point or an edge)
+  FactorStatistics factor;
+  Seconds seconds;
+};
+
+/// Solves K phi = lambda M phi for all modes with low_hz <= f <= high_hz, f = sqrt(lambda) / (2 pi), ascending. Collective on K's communicator.
+///
+/// A band without a mode is an answer (empty lambda). K and M are rescaled by powers of two while the solve runs and are bit for bit the
+/// same afterwards. Equations: docs/equations.md, eigenproblem.
+/// Throws, on all ranks alike: InputError when the options or the layout are unusable; SolveError when a factorisation breaks down or fewer
+/// modes converge than the band holds by the inertia of K - sigma M; SystemError when memory runs out.
+Modes solve_modes(const Problem& problem, const Options& options);
+
+}  // namespace carillon::eigen
