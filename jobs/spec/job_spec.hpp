@@ -41,9 +41,9 @@ struct JobSpec {
   Element element = Element::T10;
   Mass mass = Mass::consistent;
   std::array<double, 2> band_hz{20.0, 20000.0};
-  std::optional<int> max_modes;     // the lowest that many of the band
+  std::optional<int> max_modes;  // the lowest that many of the band
   std::optional<Fixed> fixed;
-  double tolerance = 1e-8;          // solver.tolerance: relative residual of every mode
+  double tolerance = 1e-8;                                 // solver.tolerance: relative residual of every mode
   Factorisation factorisation = Factorisation::automatic;  // solver.factorisation
 };
 

@@ -36,6 +36,8 @@ struct DocumentData;  // the parsed text and the line table, shared by all views
 class Object {
  public:
   bool has(std::string_view key);
+  /// True when `key` is there and holds a text.
+  bool has_string(std::string_view key);
 
   std::string string(std::string_view key);
   std::string string_or(std::string_view key, std::string_view fallback);

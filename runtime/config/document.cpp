@@ -1,0 +1,313 @@
+// Method: jsoncpp parses and keeps the byte offset of every value; lines are counted from those offsets. Each Object remembers the keys
+// that it was asked for, so the set of known keys is the set that the reading code really uses and cannot drift from it.
+#include "runtime/config/document.hpp"
+
+#include <fmt/core.h>
+#include <json/json.h>
+
+#include <algorithm>
+#include <cmath>
+#include <regex>
+
+#include "runtime/config/file.hpp"
+
+namespace carillon::config {
+
+struct DocumentData {
+  std::filesystem::path file;
+  std::string text;
+  Json::Value root;
+
+  int line_at(std::ptrdiff_t offset) const {
+    const auto end = text.begin() + std::clamp<std::ptrdiff_t>(offset, 0, static_cast<std::ptrdiff_t>(text.size()));
+    return 1 + static_cast<int>(std::count(text.begin(), end, '\n'));
+  }
+  [[noreturn]] void fail(std::ptrdiff_t offset, const std::string& message) const {
+    throw InputError(fmt::format("{}:{}: {}", file.string(), line_at(offset), message));
+  }
+};
+
+namespace {
+
+constexpr std::uint64_t kMaxBytes = 16u << 20;
+constexpr int kMaxDepth = 100;
+
+const Json::Value& json(const void* value) { return *static_cast<const Json::Value*>(value); }
+
+std::string kind_of(const Json::Value& value) {
+  switch (value.type()) {
+    case Json::nullValue:
+      return "null";
+    case Json::booleanValue:
+      return value.asBool() ? "true" : "false";
+    case Json::stringValue:
+      return fmt::format("the text \"{}\"", value.asString().substr(0, 60));
+    case Json::arrayValue:
+      return fmt::format("a list of {}", value.size());
+    case Json::objectValue:
+      return "an object";
+    default:
+      return fmt::format("the number {}", value.asString());
+  }
+}
+
+std::string join(const std::vector<std::string>& words) {
+  std::string text;
+  for (const auto& word : words) text += (text.empty() ? "\"" : ", \"") + word + "\"";
+  return text;
+}
+
+/// jsoncpp keeps no offset for a key: it is the last place before the value where the quoted key stands.
+std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& value, std::string_view key) {
+  const auto at = data.text.rfind(fmt::format("\"{}\"", key), static_cast<std::size_t>(value.getOffsetStart()));
+  return at == std::string::npos ? value.getOffsetStart() : static_cast<std::ptrdiff_t>(at);
+}
+
+/// Turns jsoncpp's report ("* Line 3, Column 5\n  Missing ',' ...") into "file:3: ...".
+[[noreturn]] void fail_syntax(const std::filesystem::path& file, const std::string& report) {
+  static const std::regex place(R"(\* Line (\d+), Column (\d+)\s+([^\n]*))");
+  std::smatch match;
+  if (std::regex_search(report, match, place)) {
+    throw InputError(fmt::format("{}:{}: this is not JSON (column {}): {}; mend the text there", file.string(), match[1].str(),
+                                 match[2].str(), match[3].str()));
+  }
+  throw InputError(fmt::format("{}:1: this is not JSON: {}; mend the text", file.string(), report));
+}
+
+/// Depth of brackets outside strings and comments, so that the parser's recursion is bounded before it starts.
+void check_depth(const DocumentData& data) {
+  int depth = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < data.text.size(); ++i) {
+    const char c = data.text[i];
+    if (in_string) {
+      if (c == '\\')
+        ++i;
+      else if (c == '"')
+        in_string = false;
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '/' && i + 1 < data.text.size() && data.text[i + 1] == '/') {
+      while (i < data.text.size() && data.text[i] != '\n') ++i;
+    } else if (c == '{' || c == '[') {
+      if (++depth > kMaxDepth)
+        data.fail(static_cast<std::ptrdiff_t>(i), fmt::format("more than {} brackets inside one another; flatten this", kMaxDepth));
+    } else if (c == '}' || c == ']') {
+      --depth;
+    }
+  }
+}
+
+}  // namespace
+
+Document::Document(std::shared_ptr<DocumentData> data) : data_(std::move(data)) {}
+Object Document::root() const { return Object(data_, &data_->root, ""); }
+const std::filesystem::path& Document::file() const { return data_->file; }
+
+Document read_document(const std::filesystem::path& file) { return parse_document(read_file(file, "JSON file", kMaxBytes), file); }
+
+Document parse_document(std::string_view text, const std::filesystem::path& file) {
+  auto data = std::make_shared<DocumentData>();
+  data->file = file;
+  if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);  // UTF-8 byte order mark
+  data->text = std::string(text);
+  check_depth(*data);
+  Json::CharReaderBuilder builder;
+  Json::CharReaderBuilder::strictMode(&builder.settings_);
+  builder["allowComments"] = true;
+  builder["collectComments"] = false;
+  builder["rejectDupKeys"] = true;
+  builder["stackLimit"] = kMaxDepth + 2;
+  const std::unique_ptr<Json::CharReader> reader(builder.newCharReader());
+  std::string report;
+  try {
+    if (!reader->parse(data->text.data(), data->text.data() + data->text.size(), &data->root, &report)) fail_syntax(file, report);
+  } catch (const Json::Exception& error) {
+    throw InputError(fmt::format("{}:1: this is not JSON: {}; mend the text", file.string(), error.what()));
+  }
+  if (!data->root.isObject())
+    throw InputError(fmt::format("{}:1: the file must hold one JSON object in braces, and holds {}", file.string(), kind_of(data->root)));
+  return Document(std::move(data));
+}
+
+Object::Object(std::shared_ptr<DocumentData> data, const void* value, std::string name)
+    : data_(std::move(data)), value_(value), name_(std::move(name)), asked_(std::make_shared<std::vector<std::string>>()) {}
+
+bool Object::has(std::string_view key) {
+  if (std::find(asked_->begin(), asked_->end(), key) == asked_->end()) asked_->emplace_back(key);
+  return json(value_).isMember(std::string(key));
+}
+
+bool Object::has_string(std::string_view key) { return has(key) && json(value_)[std::string(key)].isString(); }
+
+namespace {
+
+std::string full_name(const std::string& name, std::string_view key) {
+  return name.empty() ? std::string(key) : fmt::format("{}.{}", name, key);
+}
+
+}  // namespace
+
+void Object::fail(std::string_view key, const std::string& message) const {
+  const Json::Value& object = json(value_);
+  if (!key.empty() && object.isMember(std::string(key))) {
+    data_->fail(find_key_offset(*data_, object[std::string(key)], key), fmt::format("\"{}\": {}", full_name(name_, key), message));
+  }
+  data_->fail(object.getOffsetStart(), key.empty() ? message : fmt::format("\"{}\": {}", full_name(name_, key), message));
+}
+
+namespace {
+
+/// The value of a required key; when it is missing, a key that nobody knows and that is near is the likeliest cause.
+const Json::Value& require(Object& object, const Json::Value& value, std::string_view key) {
+  if (!object.has(key)) {
+    std::vector<std::string> present = value.getMemberNames();
+    const std::string near = find_nearest(key, present);
+    object.fail(near.empty() ? "" : near, near.empty() ? fmt::format("\"{}\" is missing here; add it", key)
+                                                       : fmt::format("unknown key; \"{}\" is required here: did you mean it?", key));
+  }
+  return value[std::string(key)];
+}
+
+double to_number(const Object& object, const Json::Value& value, std::string_view key, Range range) {
+  if (!value.isNumeric()) object.fail(key, fmt::format("must be a number, and is {}", kind_of(value)));
+  const double number = value.asDouble();
+  if (!std::isfinite(number)) object.fail(key, "must be a finite number");
+  if (!(number > range.low && number < range.high)) {
+    if (range.low == 0.0 && std::isinf(range.high)) object.fail(key, fmt::format("must be greater than 0, and is {}", number));
+    object.fail(key, fmt::format("must lie between {} and {} (both excluded), and is {}", range.low, range.high, number));
+  }
+  return number;
+}
+
+}  // namespace
+
+std::string Object::string(std::string_view key) {
+  const Json::Value& value = require(*this, json(value_), key);
+  if (!value.isString()) fail(key, fmt::format("must be a text in quotes, and is {}", kind_of(value)));
+  if (value.asString().empty()) fail(key, "must not be empty");
+  if (value.asString().find('\0') != std::string::npos) fail(key, "must not hold a zero byte");
+  return value.asString();
+}
+
+std::string Object::string_or(std::string_view key, std::string_view fallback) { return has(key) ? string(key) : std::string(fallback); }
+
+std::string Object::choice(std::string_view key, const std::vector<std::string>& choices) {
+  const std::string word = string(key);
+  if (std::find(choices.begin(), choices.end(), word) != choices.end()) return word;
+  const std::string near = find_nearest(word, choices);
+  fail(key, fmt::format("\"{}\" is none of {}{}", word, join(choices), near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
+}
+
+std::string Object::choice_or(std::string_view key, const std::vector<std::string>& choices, std::string_view fallback) {
+  return has(key) ? choice(key, choices) : std::string(fallback);
+}
+
+double Object::number(std::string_view key, Range range) { return to_number(*this, require(*this, json(value_), key), key, range); }
+double Object::number_or(std::string_view key, double fallback, Range range) { return has(key) ? number(key, range) : fallback; }
+std::optional<double> Object::number_if(std::string_view key, Range range) {
+  return has(key) ? std::optional(number(key, range)) : std::nullopt;
+}
+
+long long Object::integer(std::string_view key, long long low, long long high) {
+  const Json::Value& value = require(*this, json(value_), key);
+  if (!value.isInt64()) fail(key, fmt::format("must be a whole number, and is {}", kind_of(value)));
+  const long long number = value.asInt64();
+  if (number < low || number > high) fail(key, fmt::format("must be from {} to {}, and is {}", low, high, number));
+  return number;
+}
+
+std::optional<long long> Object::integer_if(std::string_view key, long long low, long long high) {
+  return has(key) ? std::optional(integer(key, low, high)) : std::nullopt;
+}
+
+bool Object::boolean_or(std::string_view key, bool fallback) {
+  if (!has(key)) return fallback;
+  const Json::Value& value = json(value_)[std::string(key)];
+  if (!value.isBool()) fail(key, fmt::format("must be true or false, and is {}", kind_of(value)));
+  return value.asBool();
+}
+
+void Object::copy_numbers(std::string_view key, double* values, std::size_t count) {
+  const Json::Value& list = require(*this, json(value_), key);
+  if (!list.isArray() || list.size() != count) fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
+  for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list[static_cast<Json::ArrayIndex>(i)], key, {});
+}
+
+Object Object::object(std::string_view key) {
+  const Json::Value& value = require(*this, json(value_), key);
+  if (!value.isObject()) fail(key, fmt::format("must be an object in braces, and is {}", kind_of(value)));
+  return Object(data_, &value, full_name(name_, key));
+}
+
+std::optional<Object> Object::object_if(std::string_view key) { return has(key) ? std::optional(object(key)) : std::nullopt; }
+
+std::vector<Object> Object::objects(std::string_view key) {
+  std::vector<Object> list;
+  if (!has(key)) return list;
+  const Json::Value& value = json(value_)[std::string(key)];
+  if (!value.isArray()) fail(key, fmt::format("must be a list in square brackets, and is {}", kind_of(value)));
+  for (Json::ArrayIndex i = 0; i < value.size(); ++i) {
+    if (!value[i].isObject()) fail(key, fmt::format("entry {} must be an object in braces, and is {}", i, kind_of(value[i])));
+    list.emplace_back(data_, &value[i], fmt::format("{}[{}]", full_name(name_, key), i));
+  }
+  return list;
+}
+
+std::filesystem::path Object::path(std::string_view key) {
+  const std::filesystem::path named = string(key);
+  return std::filesystem::absolute(named.is_absolute() ? named : data_->file.parent_path() / named).lexically_normal();
+}
+
+std::optional<std::filesystem::path> Object::path_if(std::string_view key) { return has(key) ? std::optional(path(key)) : std::nullopt; }
+
+void Object::ignore(std::string_view key) { has(key); }
+
+std::vector<std::string> Object::keys() const {
+  const Json::Value& object = json(value_);
+  std::vector<std::string> names = object.getMemberNames();
+  std::sort(names.begin(), names.end(),
+            [&](const auto& a, const auto& b) { return object[a].getOffsetStart() < object[b].getOffsetStart(); });
+  return names;
+}
+
+void Object::finish() {
+  for (const std::string& key : keys()) {
+    if (std::find(asked_->begin(), asked_->end(), key) != asked_->end()) continue;
+    const std::string near = find_nearest(key, *asked_);
+    fail(key,
+         near.empty() ? fmt::format("unknown key; known here: {}", join(*asked_)) : fmt::format("unknown key; did you mean \"{}\"?", near));
+  }
+}
+
+/// Damerau-Levenshtein distance (adjacent swaps count one), three rows.
+static std::size_t calc_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+    std::swap(before, last);
+    std::swap(last, row);
+  }
+  return last[b.size()];
+}
+
+std::string find_nearest(std::string_view word, const std::vector<std::string>& known) {
+  std::string nearest;
+  std::size_t best = word.size() / 2 + 1;
+  if (word.size() > 200) return nearest;
+  for (const std::string& candidate : known) {
+    const std::size_t distance = calc_distance(word, candidate);
+    if (distance < best) {
+      best = distance;
+      nearest = candidate;
+    }
+  }
+  return nearest;
+}
+
+}  // namespace carillon::config

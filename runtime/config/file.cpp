@@ -1,0 +1,118 @@
+#include "runtime/config/file.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace carillon::config {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A POSIX file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int value) : value_(value) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (value_ >= 0) ::close(value_);
+  }
+  int get() const { return value_; }
+  bool close() {
+    const int value = value_;
+    value_ = -1;
+    return ::close(value) == 0;
+  }
+
+ private:
+  int value_ = -1;
+};
+
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
+void sync_folder(const fs::path& folder) {
+  const Descriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() >= 0) ::fsync(fd.get());
+}
+
+}  // namespace
+
+std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes) {
+  // O_NONBLOCK: opening a pipe without a writer must not wait.
+  const Descriptor fd(::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  if (fd.get() < 0) {
+    throw InputError(fmt::format("{}: cannot open this {}: {}; check the path", file.string(), what, std::strerror(errno)));
+  }
+  struct stat info {};
+  if (::fstat(fd.get(), &info) != 0 || !S_ISREG(info.st_mode)) {
+    throw InputError(fmt::format("{}: a {} must be a regular file, and this is {}; name the file itself", file.string(), what,
+                                 S_ISDIR(info.st_mode) ? "a folder" : "a pipe or a device"));
+  }
+  if (static_cast<std::uint64_t>(info.st_size) > max_bytes) {
+    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); check that this is the right file", file.string(),
+                                 info.st_size, what, max_bytes));
+  }
+  std::string bytes(static_cast<std::size_t>(info.st_size), '\0');
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got = ::read(fd.get(), bytes.data() + done, bytes.size() - done);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw InputError(fmt::format("{}: cannot read this {}: {}; check the disk", file.string(), what, std::strerror(errno)));
+    if (got == 0) break;  // the file shrank while we read it
+    done += static_cast<std::size_t>(got);
+  }
+  bytes.resize(done);
+  return bytes;
+}
+
+void write_file(const fs::path& file, std::string_view bytes) {
+  const fs::path temporary = folder_of(file) / fmt::format(".{}.tmp.{}", file.filename().string(), ::getpid());
+  const auto refuse = [&](int error) {
+    ::unlink(temporary.c_str());
+    throw SystemError(
+        fmt::format("{}: cannot write: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(error)));
+  };
+  Descriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  if (fd.get() < 0) refuse(errno);
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t put = ::write(fd.get(), bytes.data() + done, bytes.size() - done);
+    if (put < 0 && errno == EINTR) continue;
+    if (put <= 0) refuse(put < 0 ? errno : ENOSPC);
+    done += static_cast<std::size_t>(put);
+  }
+  if (::fsync(fd.get()) != 0) refuse(errno);
+  if (!fd.close()) refuse(errno);
+  if (::rename(temporary.c_str(), file.c_str()) != 0) refuse(errno);
+  sync_folder(folder_of(file));
+}
+
+void check_writable(const fs::path& file, std::string_view what) {
+  std::error_code error;
+  if (file.filename().empty()) throw InputError(fmt::format("{}: the {} needs a file name after the folder", file.string(), what));
+  const auto status = fs::status(file, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    throw InputError(fmt::format("{}: the {} cannot be written here: this is {}; name a file", file.string(), what,
+                                 fs::is_directory(status) ? "a folder" : "a pipe or a device"));
+  }
+  const fs::path folder = folder_of(file);
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) {
+    throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", folder.string(), what,
+                                 error ? error.message() : "it is not a folder"));
+  }
+  const fs::path probe = folder / fmt::format(".carillon-probe.{}", ::getpid());
+  const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600));
+  if (fd.get() < 0) {
+    throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", file.string(), what,
+                                 std::strerror(errno)));
+  }
+  ::unlink(probe.c_str());
+}
+
+}  // namespace carillon::config

@@ -1,0 +1,25 @@
+// Files that somebody else wrote, and files that must appear whole or not at all.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::config {
+
+/// The bytes of a regular file. Throws InputError when there is none, when it is a folder, a pipe or a device (never waits on one), when it
+/// cannot be read, or when it holds more than `max_bytes`. `what` says in messages what was expected ("job file").
+std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes);
+
+/// Writes the bytes to a temporary file beside `file`, fsyncs, renames it to `file` and fsyncs the folder: readers see the old content
+/// or the new. Throws SystemError when the disk refuses; nothing is left behind then.
+void write_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// Throws InputError unless `file` can be written: its folder exists (or can be made) and takes files, and `file` itself is no folder or
+/// device. Meant for before long work. `what` names the output in messages ("bank").
+void check_writable(const std::filesystem::path& file, std::string_view what);
+
+}  // namespace carillon::config

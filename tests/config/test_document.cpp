@@ -1,0 +1,101 @@
+#include <gtest/gtest.h>
+
+#include "runtime/config/document.hpp"
+
+namespace {
+
+using carillon::InputError;
+namespace config = carillon::config;
+
+config::Object parse(const std::string& text) { return config::parse_document(text, "some/dir/file.json").root(); }
+
+/// The message that `act` throws; the test fails when it throws nothing.
+template <class Act>
+std::string message_of(Act act) {
+  try {
+    act();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no InputError was thrown";
+  return "";
+}
+
+TEST(Document, reads_every_kind_of_value_and_comments) {
+  auto object = parse("{ // a comment\n \"a\": 1.5, \"b\": \"x\", \"c\": [1, 2, 3], \"d\": true, \"e\": {\"f\": 7} }");
+  EXPECT_EQ(object.number("a"), 1.5);
+  EXPECT_EQ(object.string("b"), "x");
+  EXPECT_EQ(object.numbers<3>("c")[2], 3.0);
+  EXPECT_TRUE(object.boolean_or("d", false));
+  auto inner = object.object("e");
+  EXPECT_EQ(inner.integer("f", 0, 10), 7);
+  inner.finish();
+  object.finish();
+}
+
+TEST(Document, slashes_inside_texts_are_no_comments) { EXPECT_EQ(parse(R"({"url": "a//b"})").string("url"), "a//b"); }
+
+TEST(Document, relative_paths_start_at_the_folder_of_the_file) {
+  const auto path = parse(R"({"mesh": "../m.msh"})").path("mesh");
+  EXPECT_TRUE(path.is_absolute());
+  EXPECT_TRUE(path.string().ends_with("some/m.msh")) << path;
+}
+
+TEST(Document, an_unknown_key_names_itself_its_line_and_the_nearest_known_key) {
+  auto object = parse("{\n\"density\": 1,\n\"densty_kg_m3\": 2}");
+  object.number("density");
+  object.number_or("density_kg_m3", 1);
+  const auto message = message_of([&] { object.finish(); });
+  EXPECT_NE(message.find("file.json:3:"), std::string::npos) << message;
+  EXPECT_NE(message.find("densty_kg_m3"), std::string::npos) << message;
+  EXPECT_NE(message.find("did you mean \"density_kg_m3\""), std::string::npos) << message;
+}
+
+TEST(Document, a_mistyped_required_key_is_reported_at_its_line) {
+  const auto message = message_of([] { parse("{\n\n\"messh\": \"x\"}").string("mesh"); });
+  EXPECT_NE(message.find("file.json:3:"), std::string::npos) << message;
+  EXPECT_NE(message.find("messh"), std::string::npos) << message;
+}
+
+TEST(Document, nested_lines_and_names_are_exact) {
+  auto list = parse("{\"bodies\": [\n{\"x\": 1},\n{\"x\": \"one\"}]}").objects("bodies");
+  const auto message = message_of([&] { list[1].number("x"); });
+  EXPECT_NE(message.find("file.json:3: \"bodies[1].x\""), std::string::npos) << message;
+}
+
+struct BadText {
+  const char* name;
+  const char* text;
+  const char* words;
+};
+class BadDocument : public testing::TestWithParam<BadText> {};
+TEST_P(BadDocument, is_refused_in_words) {
+  const auto message = message_of([&] {
+    auto object = parse(GetParam().text);
+    object.number("a", config::kPositive);
+  });
+  EXPECT_NE(message.find(GetParam().words), std::string::npos) << message;
+  EXPECT_NE(message.find("file.json:"), std::string::npos) << message;
+}
+INSTANTIATE_TEST_SUITE_P(Table, BadDocument,
+                         testing::Values(BadText{"empty", "", "not JSON"}, BadText{"array", "[1]", "JSON"},
+                                         BadText{"comma", "{\"a\": 1,\n \"b\" 2}", "file.json:2"},
+                                         BadText{"twice", "{\"a\": 1, \"a\": 2}", "Duplicate"}, BadText{"tail", "{\"a\": 1} x", "Extra"},
+                                         BadText{"text", "{\"a\": \"1\"}", "must be a number, and is the text \"1\""},
+                                         BadText{"negative", "{\"a\": -1}", "must be greater than 0, and is -1"},
+                                         BadText{"missing", "{}", "\"a\" is missing here"}, BadText{"huge", "{\"a\": 1e999}", "file.json"},
+                                         BadText{"nan", "{\"a\": NaN}", "not JSON"}, BadText{"list", "{\"a\": [1]}", "a list of 1"}),
+                         [](const auto& info) { return info.param.name; });
+
+TEST(Document, deep_nesting_is_refused_before_it_can_exhaust_the_stack) {
+  const auto message = message_of([] { parse("{\"a\": " + std::string(1000000, '[')); });
+  EXPECT_NE(message.find("brackets"), std::string::npos);
+}
+
+TEST(FindNearest, counts_swaps_and_gives_up_on_strangers) {
+  EXPECT_EQ(config::find_nearest("mesch", {"mesh", "mass"}), "mesh");
+  EXPECT_EQ(config::find_nearest("msah", {"mesh", "mash"}), "mash");
+  EXPECT_EQ(config::find_nearest("zzzz", {"mesh", "mass"}), "");
+}
+
+}  // namespace

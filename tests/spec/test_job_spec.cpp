@@ -1,0 +1,119 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "jobs/spec/job_spec.hpp"
+
+namespace {
+
+using carillon::InputError;
+using namespace carillon::spec;
+
+// OSG02 Table 1, ceramic bunny.
+const std::string kMaterial =
+    R"("material": {"lame_lambda_pa": 3.99e9, "lame_mu_pa": 2.05e9, "density_kg_m3": 2700, "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 10}}})";
+std::string job_with(const std::string& rest) { return "{\"mesh\": \"m.msh\", \"bank\": \"out/b.bank\",\n" + kMaterial + rest + "}"; }
+
+TEST(JobSpec, defaults_are_T10_consistent_20_Hz_to_20_kHz) {
+  const JobSpec job = parse_job(job_with(""), "/jobs/job.json");
+  EXPECT_EQ(job.element, Element::T10);
+  EXPECT_EQ(job.mass, Mass::consistent);
+  EXPECT_EQ(job.band_hz, (std::array<double, 2>{20.0, 20000.0}));
+  EXPECT_FALSE(job.max_modes || job.fixed);
+  EXPECT_EQ(job.mesh, "/jobs/m.msh");
+  EXPECT_EQ(job.bank, "/jobs/out/b.bank");
+}
+
+TEST(JobSpec, lame_constants_become_the_table_s_engineering_constants) {
+  // references: lambda 3.99e9, mu 2.05e9 is E = 5.454 GPa, nu = 0.3303.
+  const JobSpec job = parse_job(job_with(""), "/jobs/job.json");
+  EXPECT_NEAR(job.material.young_modulus_pa, 5.454e9, 1e6);
+  EXPECT_NEAR(job.material.poisson_ratio, 0.3303, 1e-4);
+  EXPECT_NEAR(job.material.lame_lambda_pa() / 3.99e9, 1.0, 1e-13);
+  EXPECT_NEAR(job.material.lame_mu_pa() / 2.05e9, 1.0, 1e-13);
+}
+
+TEST(JobSpec, the_resolved_job_is_a_job_again_and_resolves_to_itself) {
+  const JobSpec job =
+      parse_job(job_with(R"(, "element": "T4", "mass": "lumped", "max_modes": 7, "fixed": "x-min", "solver": {"tolerance": 1e-9})"),
+                "/jobs/a/job.json");
+  const std::string text = resolved_json(job, "/jobs/a/out", R"({"ranks": 2, "git": "abc"})");
+  const JobSpec again = parse_job(text, "/jobs/a/out/b.bank.resolved.json");
+  EXPECT_EQ(again.mesh, job.mesh);
+  EXPECT_EQ(again.bank, job.bank);
+  EXPECT_EQ(again.element, Element::T4);
+  EXPECT_EQ(*again.max_modes, 7);
+  EXPECT_EQ(*again.fixed->node_set, "x-min");
+  EXPECT_EQ(again.material.young_modulus_pa, job.material.young_modulus_pa);
+  EXPECT_EQ(resolved_json(again, "/jobs/a/out", R"({"ranks": 2, "git": "abc"})"), text);
+}
+
+TEST(JobSpec, a_resolved_job_moves_with_its_folder) {
+  const JobSpec job = parse_job(job_with(""), "/jobs/job.json");
+  const JobSpec moved = parse_job(resolved_json(job, "/jobs/out", ""), "/elsewhere/out/b.bank.resolved.json");
+  EXPECT_EQ(moved.mesh, "/elsewhere/m.msh");
+}
+
+struct BadJob {
+  const char* name;
+  std::string text;
+  const char* place;
+  const char* words;
+};
+class BadJobs : public testing::TestWithParam<BadJob> {};
+TEST_P(BadJobs, is_refused_with_the_line_and_the_mend) {
+  try {
+    parse_job(GetParam().text, "/jobs/job.json");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find(GetParam().place), std::string::npos) << message;
+    EXPECT_NE(message.find(GetParam().words), std::string::npos) << message;
+  }
+}
+
+std::string material_with(const std::string& inside) { return "{\"mesh\": \"m\", \"bank\": \"b\",\n\n\"material\": {" + inside + "}}"; }
+const std::string kDamping = R"(, "density_kg_m3": 1, "damping": {"rayleigh": {}})";
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, BadJobs,
+    testing::Values(
+        BadJob{"mistyped_key", job_with(",\n\"elment\": \"T4\""), "job.json:3:", "did you mean \"element\"?"},
+        BadJob{"mistyped_element", job_with(",\n\"element\": \"T11\""), "job.json:3:", "\"T4\", \"T10\""},
+        BadJob{"no_mesh", "{" + kMaterial + ", \"bank\": \"b\"}", "job.json:1:", "\"mesh\" is missing"},
+        BadJob{"mistyped_mesh", "{\n\"meshh\": \"m\", \"bank\": \"b\"}", "job.json:2:", "\"mesh\" is required"},
+        BadJob{"no_material", R"({"mesh": "m", "bank": "b"})", "job.json:1:", "\"material\" is missing"},
+        BadJob{"nu_half", material_with("\"young_modulus_pa\": 1,\n\"poisson_ratio\": 0.5" + kDamping),
+               "job.json:4:", "between -1 and 0.5"},
+        BadJob{"nu_minus_one", material_with("\"young_modulus_pa\": 1, \"poisson_ratio\": -1" + kDamping),
+               "job.json:3:", "between -1 and 0.5"},
+        BadJob{"both_pairs", material_with("\"young_modulus_pa\": 1, \"lame_mu_pa\": 1" + kDamping), "job.json:3:", "not both pairs"},
+        BadJob{"soft_lambda", material_with("\"lame_lambda_pa\": -1, \"lame_mu_pa\": 1" + kDamping), "job.json:3:", "greater than -2/3"},
+        BadJob{"no_density", material_with("\"young_modulus_pa\": 1, \"poisson_ratio\": 0.3, \"damping\": {\"rayleigh\": {}}"),
+               "job.json:3:", "density_kg_m3"},
+        BadJob{"zero_density",
+               material_with("\"young_modulus_pa\": 1, \"poisson_ratio\": 0.3, \"density_kg_m3\": 0, \"damping\": {\"rayleigh\": {}}"),
+               "job.json:3:", "greater than 0"},
+        BadJob{
+            "negative_damping",
+            material_with(
+                "\"young_modulus_pa\": 1, \"poisson_ratio\": 0.3, \"density_kg_m3\": 1, \"damping\": {\"rayleigh\": {\"alpha1_s\": -1}}"),
+            "job.json:3:", "not be negative"},
+        BadJob{"unknown_law",
+               material_with("\"young_modulus_pa\": 1, \"poisson_ratio\": 0.3, \"density_kg_m3\": 1, \"damping\": {\"raleigh\": {}}"),
+               "job.json:3:", "rayleigh"},
+        BadJob{"band_reversed", job_with(",\n\"band_hz\": [20000, 20]"), "job.json:3:", "low < high"},
+        BadJob{"band_of_three", job_with(",\n\"band_hz\": [1, 2, 3]"), "job.json:3:", "a list of 2 numbers"},
+        BadJob{"no_modes", job_with(",\n\"max_modes\": 0"), "job.json:3:", "from 1 to"},
+        BadJob{"half_a_mode", job_with(",\n\"max_modes\": 2.5"), "job.json:3:", "whole number"},
+        BadJob{"fixed_both", job_with(",\n\"fixed\": {\"node_set\": \"a\", \"box_m\": {\"min\": [0,0,0], \"max\": [1,1,1]}}"),
+               "job.json:3:", "one of"},
+        BadJob{"fixed_empty", job_with(",\n\"fixed\": {}"), "job.json:3:", "one of"},
+        BadJob{"box_reversed", job_with(",\n\"fixed\": {\"box_m\": {\"min\": [0,0,0], \"max\": [1,-1,1]}}"),
+               "job.json:3:", "at least that of"},
+        BadJob{"bank_is_mesh", "{\"mesh\": \"m\", \"bank\": \"x/../m\"," + kMaterial + "}", "job.json:1:", "overwrite the mesh"},
+        BadJob{"tolerance", job_with(",\n\"solver\": {\"tolerance\": 1}"), "job.json:3:", "between"},
+        BadJob{"path_is_number", "{\"mesh\": 5, \"bank\": \"b\"," + kMaterial + "}", "job.json:1:", "text in quotes"}),
+    [](const auto& info) { return info.param.name; });
+
+}  // namespace
