@@ -1,0 +1,43 @@
+// Building blocks of the parametric bodies (private to carillon::shapes).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "precompute/mesh/tet_mesh.hpp"
+
+namespace carillon::shapes {
+
+using mesh::Vec3;
+
+/// A Cartesian lattice of cells, cut into tetrahedra.
+struct Lattice {
+  std::array<int, 3> cells{1, 1, 1};
+  int periodic_axis = -1;                             // the last point of this axis is the first one again; needs an even number of cells
+  std::function<bool(int, int, int)> keep = nullptr;  // which cells exist; null keeps all
+};
+
+/// The lattice as a linear mesh: `place` maps a lattice point (i, j, k) to a position and has to keep the orientation of space.
+/// Points that no kept cell uses get no node. `indices`, if given, receives (i, j, k) of every node.
+mesh::TetMesh make_lattice(const Lattice& lattice, const std::function<Vec3(int, int, int)>& place,
+                           std::vector<std::array<int, 3>>* indices = nullptr);
+
+/// A triangulated surface; triangles are counter-clockwise seen from outside.
+struct Surface {
+  std::vector<Vec3> points;
+  std::vector<std::array<std::int32_t, 3>> triangles;
+};
+
+/// Appends to `mesh` the three tetrahedra of the prism between the triangle `bottom` and the triangle `top`, where `top` lies outward of
+/// `bottom`. The quadrilaterals are cut by the order of bottom's indices, so neighbouring prisms agree.
+void append_prism(mesh::TetMesh& mesh, std::array<std::int32_t, 3> bottom, std::array<std::int32_t, 3> top);
+
+/// Turns a linear mesh into a quadratic one. `place(a, b)` gives the mid-side node of the edge between the corners a < b. A mid-side node
+/// joins every named set that holds both ends of its edge.
+void raise_order(mesh::TetMesh& mesh, const std::function<Vec3(std::int32_t, std::int32_t)>& place);
+
+Vec3 calc_middle(const Vec3& a, const Vec3& b);
+
+}  // namespace carillon::shapes
