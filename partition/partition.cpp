@@ -1,0 +1,191 @@
+// Method: k-way partition of the dual graph and nested dissection of the node graph by METIS 5.
+// Source: Karypis and Kumar 1998, "A fast and high quality multilevel scheme for partitioning irregular graphs"; "Multilevel k-way
+//   partitioning scheme for irregular graphs" (the METIS manual 5.1 names the options).
+// Deviations: the graphs are built here, by sorting, so that they are the same on every machine; a part that METIS leaves empty, which it
+//   may on a graph of few vertices, takes one element from the largest part.
+#include "partition/partition.hpp"
+
+#include <fmt/core.h>
+#include <metis.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace carillon::partition {
+namespace {
+
+static_assert(sizeof(idx_t) == sizeof(std::int32_t), "METIS has to be built with 32-bit indices");
+
+constexpr idx_t kSeed = 1;
+
+void check_metis(int status, const char* what) {
+  if (status == METIS_OK) return;
+  if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more", what));
+  throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));
+}
+
+/// Compressed rows from a list of directed pairs, sorted and without repetitions.
+Graph make_graph(std::vector<std::pair<std::int32_t, std::int32_t>>& pairs, std::int32_t vertices) {
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  if (pairs.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
+    throw InputError(fmt::format("the mesh is too large: its graph has {} entries, 32-bit indices end at 2147483647; use a coarser mesh",
+                                 pairs.size()));
+  Graph graph;
+  graph.offsets.assign(static_cast<std::size_t>(vertices) + 1, 0);
+  graph.neighbours.reserve(pairs.size());
+  for (const auto& [from, to] : pairs) {
+    ++graph.offsets[from + 1];
+    graph.neighbours.push_back(to);
+  }
+  std::partial_sum(graph.offsets.begin(), graph.offsets.end(), graph.offsets.begin());
+  return graph;
+}
+
+/// The number of connected pieces of each part (of the whole graph when `part` is all zero).
+std::vector<int> count_pieces(const Graph& graph, const std::vector<std::int32_t>& part, int parts) {
+  std::vector<int> pieces(parts, 0);
+  std::vector<bool> seen(graph.vertex_count(), false);
+  std::vector<std::int32_t> front;
+  for (std::int32_t start = 0; start < graph.vertex_count(); ++start) {
+    if (seen[start]) continue;
+    ++pieces[part[start]];
+    seen[start] = true;
+    front.assign(1, start);
+    while (!front.empty()) {
+      const std::int32_t v = front.back();
+      front.pop_back();
+      for (std::int32_t k = graph.offsets[v]; k < graph.offsets[v + 1]; ++k) {
+        const std::int32_t w = graph.neighbours[k];
+        if (seen[w] || part[w] != part[v]) continue;
+        seen[w] = true;
+        front.push_back(w);
+      }
+    }
+  }
+  return pieces;
+}
+
+Quality find_quality(const Graph& dual, const std::vector<std::int32_t>& part, int parts) {
+  Quality quality;
+  quality.elements.assign(parts, 0);
+  for (const std::int32_t p : part) ++quality.elements[p];
+  quality.balance = static_cast<double>(*std::max_element(quality.elements.begin(), quality.elements.end())) * parts / part.size();
+  for (std::int32_t v = 0; v < dual.vertex_count(); ++v)
+    for (std::int32_t k = dual.offsets[v]; k < dual.offsets[v + 1]; ++k)
+      if (v < dual.neighbours[k] && part[v] != part[dual.neighbours[k]]) ++quality.edge_cut;
+  const std::vector<int> pieces = count_pieces(dual, part, parts);
+  quality.contiguous = std::all_of(pieces.begin(), pieces.end(), [](int n) { return n == 1; });
+  return quality;
+}
+
+void fill_empty_parts(std::vector<std::int32_t>& part, int parts) {
+  std::vector<std::int64_t> size(parts, 0);
+  for (const std::int32_t p : part) ++size[p];
+  for (int empty = 0; empty < parts; ++empty) {
+    if (size[empty] > 0) continue;
+    const auto largest = static_cast<std::int32_t>(std::max_element(size.begin(), size.end()) - size.begin());
+    *std::find(part.rbegin(), part.rend(), largest) = empty;
+    --size[largest];
+    ++size[empty];
+  }
+}
+
+}  // namespace
+
+Graph make_dual_graph(std::span<const std::int32_t> corners) {
+  constexpr std::array<std::array<int, 3>, 4> kFaceCorners{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+  const auto elements = static_cast<std::int32_t>(corners.size() / 4);
+  struct Face {
+    std::array<std::int32_t, 3> nodes;
+    std::int32_t element;
+    bool operator<(const Face& other) const { return std::tie(nodes, element) < std::tie(other.nodes, other.element); }
+  };
+  std::vector<Face> faces;
+  faces.reserve(4 * static_cast<std::size_t>(elements));
+  for (std::int32_t e = 0; e < elements; ++e)
+    for (const auto& local : kFaceCorners) {
+      Face face{{corners[4 * e + local[0]], corners[4 * e + local[1]], corners[4 * e + local[2]]}, e};
+      std::sort(face.nodes.begin(), face.nodes.end());
+      faces.push_back(face);
+    }
+  std::sort(faces.begin(), faces.end());
+  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
+  for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
+    if (faces[i].nodes != faces[i + 1].nodes) continue;
+    if (i + 2 < faces.size() && faces[i].nodes == faces[i + 2].nodes)
+      throw InputError(fmt::format("tetrahedra {}, {} and {} share one face (nodes {}, {}, {}); at most two can. Mend the mesh",
+                                   faces[i].element, faces[i + 1].element, faces[i + 2].element, faces[i].nodes[0], faces[i].nodes[1],
+                                   faces[i].nodes[2]));
+    pairs.emplace_back(faces[i].element, faces[i + 1].element);
+    pairs.emplace_back(faces[i + 1].element, faces[i].element);
+  }
+  return make_graph(pairs, elements);
+}
+
+Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
+  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
+  pairs.reserve(elements.size() * (width - 1));
+  for (std::size_t first = 0; first + width <= elements.size(); first += width) {
+    const auto element = elements.subspan(first, width);
+    for (const std::int32_t i : element)
+      for (const std::int32_t j : element)
+        if (i >= 0 && j >= 0 && i != j) pairs.emplace_back(i, j);
+  }
+  return make_graph(pairs, nodes);
+}
+
+Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
+  const auto elements = static_cast<std::int64_t>(corners.size() / 4);
+  if (parts < 1) throw InputError(fmt::format("a mesh cannot be cut into {} parts; ask for at least one", parts));
+  if (elements < parts)
+    throw InputError(fmt::format("the mesh has {} tetrahedra, fewer than the {} ranks; start at most {} ranks", elements, parts, elements));
+  if (elements > std::numeric_limits<std::int32_t>::max() / 4)
+    throw InputError(fmt::format("the mesh is too large: {} tetrahedra, 32-bit indices allow 536870911; use a coarser mesh", elements));
+  Graph dual = make_dual_graph(corners);
+  Partition result;
+  result.part.assign(elements, 0);
+  if (parts > 1) {
+    // METIS refuses contiguous parts of a graph that is itself in pieces, and prints where it should return: so ask first.
+    const bool connected = count_pieces(dual, result.part, 1).front() == 1;
+    std::array<idx_t, METIS_NOPTIONS> options{};
+    METIS_SetDefaultOptions(options.data());
+    options[METIS_OPTION_NUMBERING] = 0;
+    options[METIS_OPTION_SEED] = kSeed;
+    options[METIS_OPTION_CONTIG] = connected ? 1 : 0;
+    idx_t vertices = dual.vertex_count();
+    idx_t constraints = 1;
+    idx_t part_count = parts;
+    idx_t cut = 0;
+    check_metis(METIS_PartGraphKway(&vertices, &constraints, dual.offsets.data(), dual.neighbours.data(), nullptr, nullptr, nullptr,
+                                    &part_count, nullptr, nullptr, options.data(), &cut, result.part.data()),
+                "METIS_PartGraphKway");
+    fill_empty_parts(result.part, parts);
+  }
+  result.quality = find_quality(dual, result.part, parts);
+  return result;
+}
+
+std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
+  idx_t vertices = graph.vertex_count();
+  std::vector<std::int32_t> position(vertices);
+  std::iota(position.begin(), position.end(), 0);
+  if (graph.neighbours.empty()) return position;
+  std::array<idx_t, METIS_NOPTIONS> options{};
+  METIS_SetDefaultOptions(options.data());
+  options[METIS_OPTION_NUMBERING] = 0;
+  options[METIS_OPTION_SEED] = kSeed;
+  std::vector<std::int32_t> vertex_at(vertices);
+  // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
+  Graph copy = graph;
+  check_metis(METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(),
+                           position.data()),
+              "METIS_NodeND");
+  return position;
+}
+
+}  // namespace carillon::partition

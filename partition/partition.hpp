@@ -1,0 +1,51 @@
+// Graphs cut into parts: which rank gets which tetrahedra, and in which order a factorisation eliminates nodes. METIS inside; no MPI, no PETSc.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::partition {
+
+/// An undirected graph in compressed rows: the neighbours of vertex v are neighbours[offsets[v]] ... neighbours[offsets[v + 1] - 1],
+/// ascending, without v itself.
+struct Graph {
+  std::vector<std::int32_t> offsets;     // (vertices + 1)
+  std::vector<std::int32_t> neighbours;  // (2 edges)
+
+  std::int32_t vertex_count() const { return offsets.empty() ? 0 : static_cast<std::int32_t>(offsets.size()) - 1; }
+};
+
+/// How good a partition is.
+struct Quality {
+  std::vector<std::int64_t> elements;  // per part
+  double balance = 1.0;                // largest part / mean part
+  std::int64_t edge_cut = 0;           // pairs of elements that share a face and not a part
+  bool contiguous = true;              // every part is connected through faces
+};
+
+struct Partition {
+  std::vector<std::int32_t> part;  // (elements), 0 <= part < parts
+  Quality quality;
+};
+
+/// The dual graph of tetrahedra: elements are vertices, shared faces are edges. corners: (E, 4) node indices.
+/// Throws InputError when more than two tetrahedra share a face.
+Graph make_dual_graph(std::span<const std::int32_t> corners);
+
+/// The node graph of a mesh: two nodes are neighbours when an element holds both. elements: (E, width) node indices in [0, nodes);
+/// negative entries are skipped (nodes that take no part). Throws InputError when the graph exceeds 32-bit indices.
+Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::int32_t nodes);
+
+/// Cuts tetrahedra into `parts` parts of nearly equal size with few shared faces between them: METIS k-way on the dual graph, contiguous
+/// parts where METIS can make them. No part is empty. The same input gives the same answer. corners: (E, 4).
+/// Throws InputError when there are fewer elements than parts, SystemError when METIS runs out of memory.
+Partition partition_elements(std::span<const std::int32_t> corners, int parts);
+
+/// Fill-reducing order of a graph by METIS nested dissection: result[v] is the position of vertex v in the elimination order (zero-based),
+/// a permutation. This is MUMPS' PERM_IN less one. Throws SystemError when METIS runs out of memory.
+std::vector<std::int32_t> order_nested_dissection(const Graph& graph);
+
+}  // namespace carillon::partition
