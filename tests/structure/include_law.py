@@ -1,0 +1,114 @@
+#!/usr/bin/env python3
+"""The include law: which folder may include what. Arrows go from heavy to light; anything not listed is forbidden.
+
+usage: include_law.py SOURCE_DIR        exit 1 and one line per breach
+       include_law.py --self-test       proves that a breach is found
+"""
+import pathlib
+import re
+import sys
+
+# Third-party headers, by prefix of the include path, and the name the table below uses for them.
+LIBRARIES = {
+    "json": ["json/"],
+    "fmt": ["fmt/"],
+    "cli": ["CLI/"],
+    "hdf5": ["hdf5", "H5"],
+    "openssl": ["openssl/"],
+    "eigen": ["Eigen/", "unsupported/Eigen/"],
+    "simbody": ["Simbody.h", "SimTKcommon", "SimTKmath", "simbody/", "SimTK"],
+    "sndfile": ["sndfile"],
+    "cairo": ["cairo"],
+    "metis": ["metis.h"],
+    "mpi": ["mpi.h"],
+    "petsc": ["petsc", "slepc"],
+    "mumps": ["dmumps_c.h"],
+    "cholmod": ["cholmod.h", "suitesparse/"],
+    "cgal": ["CGAL/", "boost/"],
+    "openvdb": ["openvdb/", "tbb/"],
+    "xml": ["pugixml.hpp"],
+    "zlib": ["zlib.h"],
+}
+# folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
+LAW = {
+    "runtime/config": ([], ["json", "fmt"]),
+    "runtime/bank": (["runtime/config"], ["json", "fmt", "hdf5", "openssl", "cli"]),
+    "runtime/synth": (["runtime/config", "runtime/bank"], ["fmt", "eigen"]),
+    "runtime/contact": (["runtime/config", "runtime/bank"], ["fmt", "eigen", "simbody"]),
+    "runtime/host": (["runtime/config", "runtime/bank", "runtime/synth", "runtime/contact"], ["fmt", "json", "cli", "eigen", "sndfile", "cairo"]),
+    "partition": (["runtime/config"], ["fmt", "metis"]),
+    "jobs/spec": (["runtime/config"], ["fmt", "json"]),
+    "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
+    "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
+    "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "json", "cli", "cgal", "openvdb"]),
+    "precompute/petsc": (["runtime/config"], ["fmt", "mpi", "petsc"]),
+    "precompute/fem": (["runtime/config", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc"], ["fmt", "mpi", "petsc", "eigen"]),
+    "precompute/eigen": (["runtime/config", "partition", "precompute/petsc"], ["fmt", "mpi", "petsc", "mumps", "cholmod", "eigen"]),
+    "precompute/io": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/eigen"],
+                      ["fmt", "json", "mpi", "petsc", "hdf5"]),
+    "precompute": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/eigen", "precompute/io"],
+                   ["fmt", "cli", "mpi"]),
+}
+# Finer than folders: the only files that may include these.
+ONLY_IN = {"hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/io/[a-z0-9_]+\.cpp)$"), "simbody": re.compile(r"^runtime/contact/[a-z0-9_]+\.(cpp|hpp)$"),
+           "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$")}
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+
+def library_of(path):
+    for name, prefixes in LIBRARIES.items():
+        if any(path.startswith(prefix) for prefix in prefixes):
+            return name
+    return None
+
+
+def find_breaches(files):
+    """files: (path relative to the root, text) pairs -> list of messages."""
+    breaches = []
+    for path, text in files:
+        folder = str(pathlib.PurePosixPath(path).parent)
+        if folder not in LAW:
+            breaches.append(f"{path}: folder {folder} is not in the include law; add it to tests/structure/include_law.py")
+            continue
+        ours, libraries = LAW[folder]
+        for number, line in enumerate(text.splitlines(), 1):
+            match = INCLUDE.match(line)
+            if not match:
+                continue
+            bracket, target = match.groups()
+            if bracket == '"':
+                target_folder = str(pathlib.PurePosixPath(target).parent)
+                if target_folder != folder and target_folder not in ours:
+                    breaches.append(f"{path}:{number}: {folder} may not include {target_folder} ({target})")
+                continue
+            library = library_of(target)
+            if library and library not in libraries:
+                breaches.append(f"{path}:{number}: {folder} may not include {library} ({target})")
+            elif library in ONLY_IN and not ONLY_IN[library].match(path):
+                breaches.append(f"{path}:{number}: {library} is kept to {ONLY_IN[library].pattern}")
+    return breaches
+
+
+def read_tree(root):
+    for top in ("runtime", "precompute", "partition", "jobs"):
+        for path in sorted((root / top).rglob("*")):
+            if path.suffix in (".cpp", ".hpp", ".h", ".c"):
+                yield path.relative_to(root).as_posix(), path.read_text()
+
+
+def self_test():
+    bad = [("runtime/synth/x.cpp", "#include <mpi.h>\n"), ("runtime/bank/x.hpp", "#include <hdf5.h>\n"), ("runtime/bank/x.cpp", '#include "precompute/mesh/tet_mesh.hpp"\n'),
+           ("runtime/new/x.cpp", ""), ("jobs/spec/x.cpp", "  #  include  <petscmat.h>\n"), ("precompute/mesh/x.cpp", '#include "precompute/fem/a.hpp"\n')]
+    for one in bad:
+        assert len(find_breaches([one])) == 1, one
+    good = [("runtime/bank/x.cpp", '#include <hdf5.h>\n#include <vector>\n#include "runtime/config/error.hpp"\n// #include <mpi.h>\n')]
+    assert not find_breaches(good)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--self-test"]:
+        self_test()
+        sys.exit(0)
+    found = find_breaches(read_tree(pathlib.Path(sys.argv[1])))
+    print("\n".join(found) if found else "the include law holds")
+    sys.exit(1 if found else 0)
