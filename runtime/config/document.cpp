@@ -7,7 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <regex>
+#include <cstdio>
 
 #include "runtime/config/file.hpp"
 
@@ -65,13 +65,16 @@ std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& valu
 
 /// Turns jsoncpp's report ("* Line 3, Column 5\n  Missing ',' ...") into "file:3: ...".
 [[noreturn]] void fail_syntax(const std::filesystem::path& file, const std::string& report) {
-  static const std::regex place(R"(\* Line (\d+), Column (\d+)\s+([^\n]*))");
-  std::smatch match;
-  if (std::regex_search(report, match, place)) {
-    throw InputError(fmt::format("{}:{}: this is not JSON (column {}): {}; mend the text there", file.string(), match[1].str(),
-                                 match[2].str(), match[3].str()));
+  int line = 1;
+  int column = 1;
+  std::string reason = report;
+  if (std::sscanf(report.c_str(), "* Line %d, Column %d", &line, &column) == 2) {
+    const auto start = std::min(report.find('\n'), report.size());
+    reason = report.substr(start, report.find('\n', start + 1) - start);
   }
-  throw InputError(fmt::format("{}:1: this is not JSON: {}; mend the text", file.string(), report));
+  reason.erase(0, reason.find_first_not_of(" \n"));
+  throw InputError(
+      fmt::format("{}:{}: this is not JSON (column {}): {}; mend the text there", file.string(), line, column, reason.substr(0, 200)));
 }
 
 /// Depth of brackets outside strings and comments, so that the parser's recursion is bounded before it starts.
@@ -143,7 +146,8 @@ bool Object::has_string(std::string_view key) { return has(key) && json(value_)[
 namespace {
 
 std::string full_name(const std::string& name, std::string_view key) {
-  return name.empty() ? std::string(key) : fmt::format("{}.{}", name, key);
+  const std::string_view shown = key.substr(0, 80);  // a hostile key must not flood the terminal
+  return name.empty() ? std::string(shown) : fmt::format("{}.{}", name, shown);
 }
 
 }  // namespace
@@ -158,15 +162,30 @@ void Object::fail(std::string_view key, const std::string& message) const {
 
 namespace {
 
-/// The value of a required key; when it is missing, a key that nobody knows and that is near is the likeliest cause.
-const Json::Value& require(Object& object, const Json::Value& value, std::string_view key) {
-  if (!object.has(key)) {
-    std::vector<std::string> present = value.getMemberNames();
-    const std::string near = find_nearest(key, present);
-    object.fail(near.empty() ? "" : near, near.empty() ? fmt::format("\"{}\" is missing here; add it", key)
-                                                       : fmt::format("unknown key; \"{}\" is required here: did you mean it?", key));
+/// Damerau-Levenshtein distance (adjacent swaps count one), three rows.
+std::size_t calc_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+    std::swap(before, last);
+    std::swap(last, row);
   }
-  return value[std::string(key)];
+  return last[b.size()];
+}
+
+/// The key of `present` that `wanted` was probably meant to be: within a quarter of its length, or one name containing the other.
+std::string find_misspelt(std::string_view wanted, const std::vector<std::string>& present, const std::vector<std::string>& known) {
+  for (const std::string& key : present) {
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    const bool contained = key.find(wanted) != std::string::npos || (key.size() > 3 && wanted.find(key) != std::string_view::npos);
+    if (contained || (key.size() <= 200 && calc_distance(wanted, key) <= std::max<std::size_t>(1, wanted.size() / 4))) return key;
+  }
+  return "";
 }
 
 double to_number(const Object& object, const Json::Value& value, std::string_view key, Range range) {
@@ -182,8 +201,17 @@ double to_number(const Object& object, const Json::Value& value, std::string_vie
 
 }  // namespace
 
+const void* Object::require_value(std::string_view key) {
+  if (!has(key)) {
+    const std::string near = find_misspelt(key, keys(), *asked_);
+    fail(near, near.empty() ? fmt::format("\"{}\" is missing here; add it", key)
+                            : fmt::format("unknown key; \"{}\" is required here: did you mean \"{}\"?", key, key));
+  }
+  return &json(value_)[std::string(key)];
+}
+
 std::string Object::string(std::string_view key) {
-  const Json::Value& value = require(*this, json(value_), key);
+  const Json::Value& value = json(require_value(key));
   if (!value.isString()) fail(key, fmt::format("must be a text in quotes, and is {}", kind_of(value)));
   if (value.asString().empty()) fail(key, "must not be empty");
   if (value.asString().find('\0') != std::string::npos) fail(key, "must not hold a zero byte");
@@ -203,14 +231,14 @@ std::string Object::choice_or(std::string_view key, const std::vector<std::strin
   return has(key) ? choice(key, choices) : std::string(fallback);
 }
 
-double Object::number(std::string_view key, Range range) { return to_number(*this, require(*this, json(value_), key), key, range); }
+double Object::number(std::string_view key, Range range) { return to_number(*this, json(require_value(key)), key, range); }
 double Object::number_or(std::string_view key, double fallback, Range range) { return has(key) ? number(key, range) : fallback; }
 std::optional<double> Object::number_if(std::string_view key, Range range) {
   return has(key) ? std::optional(number(key, range)) : std::nullopt;
 }
 
 long long Object::integer(std::string_view key, long long low, long long high) {
-  const Json::Value& value = require(*this, json(value_), key);
+  const Json::Value& value = json(require_value(key));
   if (!value.isInt64()) fail(key, fmt::format("must be a whole number, and is {}", kind_of(value)));
   const long long number = value.asInt64();
   if (number < low || number > high) fail(key, fmt::format("must be from {} to {}, and is {}", low, high, number));
@@ -229,13 +257,13 @@ bool Object::boolean_or(std::string_view key, bool fallback) {
 }
 
 void Object::copy_numbers(std::string_view key, double* values, std::size_t count) {
-  const Json::Value& list = require(*this, json(value_), key);
+  const Json::Value& list = json(require_value(key));
   if (!list.isArray() || list.size() != count) fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
   for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list[static_cast<Json::ArrayIndex>(i)], key, {});
 }
 
 Object Object::object(std::string_view key) {
-  const Json::Value& value = require(*this, json(value_), key);
+  const Json::Value& value = json(require_value(key));
   if (!value.isObject()) fail(key, fmt::format("must be an object in braces, and is {}", kind_of(value)));
   return Object(data_, &value, full_name(name_, key));
 }
@@ -278,22 +306,6 @@ void Object::finish() {
     fail(key,
          near.empty() ? fmt::format("unknown key; known here: {}", join(*asked_)) : fmt::format("unknown key; did you mean \"{}\"?", near));
   }
-}
-
-/// Damerau-Levenshtein distance (adjacent swaps count one), three rows.
-static std::size_t calc_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
-    }
-    std::swap(before, last);
-    std::swap(last, row);
-  }
-  return last[b.size()];
 }
 
 std::string find_nearest(std::string_view word, const std::vector<std::string>& known) {

@@ -88,6 +88,8 @@ class Object {
   Object(std::shared_ptr<DocumentData> data, const void* value, std::string name);
 
  private:
+  /// The Json::Value of a required key; when it is missing, a key that is near and that nobody asked for is named as the likely cause.
+  const void* require_value(std::string_view key);
   void copy_numbers(std::string_view key, double* values, std::size_t count);
   std::shared_ptr<DocumentData> data_;
   const void* value_ = nullptr;  // a Json::Value of *data_

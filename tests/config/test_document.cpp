@@ -57,6 +57,12 @@ TEST(Document, a_mistyped_required_key_is_reported_at_its_line) {
   EXPECT_NE(message.find("messh"), std::string::npos) << message;
 }
 
+TEST(Document, a_missing_key_is_not_blamed_on_a_key_that_is_near_by_chance) {
+  const auto message = message_of([] { parse("{\n\"mass\": 1}").string("mesh"); });
+  EXPECT_NE(message.find("\"mesh\" is missing"), std::string::npos) << message;
+  EXPECT_EQ(message.find("mass"), std::string::npos) << message;
+}
+
 TEST(Document, nested_lines_and_names_are_exact) {
   auto list = parse("{\"bodies\": [\n{\"x\": 1},\n{\"x\": \"one\"}]}").objects("bodies");
   const auto message = message_of([&] { list[1].number("x"); });
@@ -90,6 +96,12 @@ INSTANTIATE_TEST_SUITE_P(Table, BadDocument,
 TEST(Document, deep_nesting_is_refused_before_it_can_exhaust_the_stack) {
   const auto message = message_of([] { parse("{\"a\": " + std::string(1000000, '[')); });
   EXPECT_NE(message.find("brackets"), std::string::npos);
+}
+
+TEST(Document, a_key_of_a_megabyte_given_twice_is_one_short_message) {
+  const std::string key = "\"" + std::string(1 << 20, 'k') + "\": 1";
+  const auto message = message_of([&] { parse("{" + key + ", " + key + "}"); });
+  EXPECT_LT(message.size(), 1000u);
 }
 
 TEST(FindNearest, counts_swaps_and_gives_up_on_strangers) {
