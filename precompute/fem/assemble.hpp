@@ -1,0 +1,35 @@
+// K and M of the whole body as distributed PETSc matrices, and its rigid-body data.
+#pragma once
+
+#include <mpi.h>
+
+#include "jobs/spec/job_spec.hpp"
+#include "precompute/fem/distribute.hpp"
+#include "precompute/petsc/handle.hpp"
+
+namespace carillon::fem {
+
+/// The equations of motion M u'' + K u = 0 of the free nodes. Held nodes are eliminated. Row 3 r + d is direction d of the node whose
+/// LocalMesh::row is r; each rank holds the rows of the free nodes that it owns.
+struct System {
+  petsc::MatHandle stiffness;  // K [N/m], (3n, 3n), AIJ, both triangles, symmetric positive semidefinite
+  petsc::MatHandle mass;       // M [kg], (3n, 3n), AIJ, in K's pattern (diagonal when lumped), symmetric positive definite
+};
+
+/// Mass, centre, inertia and volume of the body, held nodes included; axes of the mesh.
+struct RigidBody {
+  double mass_kg = 0.0;
+  Vec3 centre_m{};
+  std::array<double, 9> inertia_kg_m2{};  // (3, 3) row-major, about the centre of mass
+  double volume_m3 = 0.0;
+};
+
+/// Assembles K and M with exact preallocation. docs/equations.md, elasticity; OSG02 section 3.2.
+/// Collective. Throws on every rank: InputError naming an element whose Jacobian is not positive everywhere (inside out, or a mid-side node
+/// out of place); SystemError when memory runs out.
+System assemble(MPI_Comm comm, const LocalMesh& local, const spec::Material& material, spec::Mass mass);
+
+/// Integrates the rigid-body data over the tetrahedra. Collective.
+RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, double density_kg_m3);
+
+}  // namespace carillon::fem

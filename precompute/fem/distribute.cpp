@@ -1,0 +1,299 @@
+// Method: METIS k-way on the dual graph gives elements to ranks; a node goes to that rank among those of its elements which owns the fewest
+//   nodes so far, so that ownership stays balanced along the seams. Rank 0 packs and sends one rank's piece at a time.
+// Source: Karypis and Kumar 1998 (METIS).
+// Deviations: none.
+#include "precompute/fem/distribute.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "partition/partition.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::fem {
+namespace {
+
+/// Everything that rank 0 decides before it sends.
+struct Plan {
+  std::vector<std::int32_t> part;       // (E) rank of each element
+  std::vector<std::int32_t> owner;      // (N) rank of each node, -1: no element uses it
+  std::vector<std::int32_t> component;  // (N)
+  std::vector<bool> held;               // (N)
+  std::vector<std::int32_t> row;        // (N), -1: held or unused
+  std::vector<std::int32_t> first_row;  // (ranks + 1)
+};
+
+/// One rank's piece as it travels.
+struct Piece {
+  std::vector<std::int32_t> numbers;  // header, then tets, tet_in_mesh, node_in_mesh, row, component
+  std::vector<double> positions;
+};
+
+std::vector<std::int32_t> find_components(const mesh::TetMesh& mesh, std::int32_t& count) {
+  std::vector<std::int32_t> parent(mesh.nodes.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](std::int32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  std::vector<bool> used(mesh.nodes.size(), false);
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (const std::int32_t node : mesh.tet(e)) {
+      used[node] = true;
+      const std::int32_t a = root(mesh.tet(e)[0]), b = root(node);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  std::vector<std::int32_t> component(mesh.nodes.size(), -1);
+  count = 0;
+  for (std::size_t v = 0; v < component.size(); ++v)
+    if (used[v]) component[v] = root(v) == static_cast<std::int32_t>(v) ? count++ : component[root(v)];
+  return component;
+}
+
+std::vector<std::int32_t> find_owners(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& part, int ranks) {
+  // Each node's candidates are the ranks of its elements; most have one, so the rest are kept apart in a sorted list of pairs.
+  std::vector<std::int32_t> owner(mesh.nodes.size(), -1);
+  std::vector<std::pair<std::int32_t, std::int32_t>> shared;
+  std::vector<bool> on_seam(mesh.nodes.size(), false);
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (const std::int32_t node : mesh.tet(e)) {
+      if (owner[node] < 0) owner[node] = part[e];
+      if (owner[node] != part[e]) on_seam[node] = true;
+    }
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (const std::int32_t node : mesh.tet(e))
+      if (on_seam[node]) shared.emplace_back(node, part[e]);
+  std::sort(shared.begin(), shared.end());
+  shared.erase(std::unique(shared.begin(), shared.end()), shared.end());
+  std::vector<std::int64_t> owned(ranks, 0);
+  for (std::size_t v = 0; v < owner.size(); ++v)
+    if (owner[v] >= 0 && !on_seam[v]) ++owned[owner[v]];
+  for (std::size_t i = 0; i < shared.size();) {
+    const std::int32_t node = shared[i].first;
+    std::int32_t best = shared[i].second;
+    for (; i < shared.size() && shared[i].first == node; ++i)
+      if (owned[shared[i].second] < owned[best]) best = shared[i].second;
+    owner[node] = best;
+    ++owned[best];
+  }
+  return owner;
+}
+
+void check_held(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes) {
+  for (const std::int32_t node : held_nodes)
+    if (node < 0 || node >= static_cast<std::int64_t>(mesh.nodes.size()))
+      throw InputError(fmt::format("held node {} is not in the mesh, which has {} nodes", node, mesh.nodes.size()));
+}
+
+Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, int ranks, bool with_order, Distribution& out) {
+  check_held(mesh, held_nodes);
+  std::vector<std::int32_t> corners;
+  corners.reserve(4 * mesh.tet_count());
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) corners.insert(corners.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
+  partition::Partition cut = partition::partition_elements(corners, ranks);
+
+  Plan plan;
+  plan.part = std::move(cut.part);
+  plan.component = find_components(mesh, out.components);
+  plan.owner = find_owners(mesh, plan.part, ranks);
+  plan.held.assign(mesh.nodes.size(), false);
+  for (const std::int32_t node : held_nodes) plan.held[node] = true;
+
+  plan.first_row.assign(ranks + 1, 0);
+  for (std::size_t v = 0; v < plan.owner.size(); ++v) {
+    if (plan.owner[v] < 0) continue;
+    ++out.nodes;
+    if (!plan.held[v]) ++plan.first_row[plan.owner[v] + 1];
+  }
+  std::partial_sum(plan.first_row.begin(), plan.first_row.end(), plan.first_row.begin());
+  out.free_nodes = plan.first_row.back();
+  if (out.free_nodes == 0)
+    throw InputError("'fixed' holds every node of the mesh, so that nothing can move; hold fewer nodes (a smaller box or node set)");
+  if (out.free_nodes > std::numeric_limits<std::int32_t>::max() / 3)
+    throw InputError(fmt::format("the mesh has {} free nodes, 32-bit matrix rows end at 715827882; use a coarser mesh", out.free_nodes));
+  std::vector<std::int32_t> next(plan.first_row.begin(), plan.first_row.end() - 1);
+  plan.row.assign(mesh.nodes.size(), -1);
+  for (std::size_t v = 0; v < plan.owner.size(); ++v)
+    if (plan.owner[v] >= 0 && !plan.held[v]) plan.row[v] = next[plan.owner[v]]++;
+
+  out.tets = mesh.tet_count();
+  out.report.element_balance = cut.quality.balance;
+  out.report.edge_cut = cut.quality.edge_cut;
+  out.report.contiguous = cut.quality.contiguous;
+  if (!held_nodes.empty()) {
+    out.held_m.assign(out.components, {});
+    for (std::size_t v = 0; v < plan.held.size(); ++v)
+      if (plan.held[v] && plan.owner[v] >= 0) out.held_m[plan.component[v]].push_back(mesh.nodes[v]);
+  }
+  if (with_order) {
+    std::vector<std::int32_t> rows(mesh.tets.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = plan.row[mesh.tets[i]];
+    const auto graph = partition::make_node_graph(rows, mesh.nodes_per_tet(), static_cast<std::int32_t>(out.free_nodes));
+    out.elimination_position = partition::order_nested_dissection(graph);
+  }
+  return plan;
+}
+
+constexpr int kHeader = 6;
+
+/// Packs the piece of `rank`. `elements` are its elements; `local` is scratch of (N) entries, all -1 before and after.
+Piece pack(const mesh::TetMesh& mesh, const Plan& plan, const std::vector<std::int32_t>& elements, int rank,
+           std::vector<std::int32_t>& local) {
+  std::vector<std::int32_t> touched;
+  const auto touch = [&](std::int32_t node) {
+    if (local[node] >= 0) return;
+    local[node] = 0;
+    touched.push_back(node);
+  };
+  for (const std::int32_t e : elements)
+    for (const std::int32_t node : mesh.tet(e)) touch(node);
+  const auto kind = [&](std::int32_t node) { return plan.owner[node] != rank ? 2 : plan.held[node] ? 1 : 0; };
+  std::sort(touched.begin(), touched.end(),
+            [&](std::int32_t a, std::int32_t b) { return std::pair(kind(a), a) < std::pair(kind(b), b); });
+  const auto count = [&](int wanted) {
+    return static_cast<std::int32_t>(std::count_if(touched.begin(), touched.end(), [&](std::int32_t v) { return kind(v) == wanted; }));
+  };
+  const std::int32_t free_nodes = count(0), owned = free_nodes + count(1), nodes = static_cast<std::int32_t>(touched.size());
+
+  Piece piece;
+  piece.numbers = {mesh.order, static_cast<std::int32_t>(elements.size()), nodes, free_nodes, owned, plan.first_row[rank]};
+  for (std::int32_t i = 0; i < nodes; ++i) local[touched[i]] = i;
+  for (const std::int32_t e : elements)
+    for (const std::int32_t node : mesh.tet(e)) piece.numbers.push_back(local[node]);
+  piece.numbers.insert(piece.numbers.end(), elements.begin(), elements.end());
+  piece.numbers.insert(piece.numbers.end(), touched.begin(), touched.end());
+  for (const std::int32_t node : touched) piece.numbers.push_back(plan.row[node]);
+  for (const std::int32_t node : touched) piece.numbers.push_back(plan.component[node]);
+  for (const std::int32_t node : touched) {
+    piece.positions.insert(piece.positions.end(), mesh.nodes[node].begin(), mesh.nodes[node].end());
+    local[node] = -1;
+  }
+  return piece;
+}
+
+LocalMesh unpack(const Piece& piece) {
+  LocalMesh local;
+  const auto& n = piece.numbers;
+  local.order = n[0];
+  local.free_nodes = n[3];
+  local.owned_nodes = n[4];
+  local.first_row = n[5];
+  auto at = n.begin() + kHeader;
+  const auto take = [&](std::vector<std::int32_t>& into, std::size_t count) {
+    into.assign(at, at + static_cast<std::ptrdiff_t>(count));
+    at += static_cast<std::ptrdiff_t>(count);
+  };
+  take(local.tets, static_cast<std::size_t>(n[1]) * local.nodes_per_tet());
+  take(local.tet_in_mesh, n[1]);
+  take(local.node_in_mesh, n[2]);
+  take(local.row, n[2]);
+  take(local.component, n[2]);
+  local.nodes_m.resize(n[2]);
+  for (std::int32_t i = 0; i < n[2]; ++i)
+    for (int k = 0; k < 3; ++k) local.nodes_m[i][k] = piece.positions[3 * i + k];
+  return local;
+}
+
+/// Sends and receives of any length: MPI counts are 32-bit, so long arrays travel in blocks.
+template <typename T>
+void send(MPI_Comm comm, const std::vector<T>& data, int to, MPI_Datatype type) {
+  const std::int64_t size = static_cast<std::int64_t>(data.size());
+  MPI_Send(&size, 1, MPI_INT64_T, to, 0, comm);
+  for (std::int64_t done = 0; done < size; done += 1 << 28)
+    MPI_Send(data.data() + done, static_cast<int>(std::min<std::int64_t>(size - done, 1 << 28)), type, to, 1, comm);
+}
+
+template <typename T>
+void receive(MPI_Comm comm, std::vector<T>& data, MPI_Datatype type) {
+  std::int64_t size = 0;
+  MPI_Recv(&size, 1, MPI_INT64_T, 0, 0, comm, MPI_STATUS_IGNORE);
+  data.resize(size);
+  for (std::int64_t done = 0; done < size; done += 1 << 28)
+    MPI_Recv(data.data() + done, static_cast<int>(std::min<std::int64_t>(size - done, 1 << 28)), type, 0, 1, comm, MPI_STATUS_IGNORE);
+}
+
+void share_facts(MPI_Comm comm, Distribution& out) {
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  std::array<std::int64_t, 6> numbers{out.nodes,          out.tets, out.free_nodes, out.components, out.report.edge_cut,
+                                      out.report.contiguous};
+  MPI_Bcast(numbers.data(), static_cast<int>(numbers.size()), MPI_INT64_T, 0, comm);
+  out.nodes = numbers[0];
+  out.tets = numbers[1];
+  out.free_nodes = numbers[2];
+  out.components = static_cast<std::int32_t>(numbers[3]);
+  out.report.edge_cut = numbers[4];
+  out.report.contiguous = numbers[5] != 0;
+  MPI_Bcast(&out.report.element_balance, 1, MPI_DOUBLE, 0, comm);
+  out.report.ranks.resize(ranks);
+  std::array<std::int64_t, 3> mine{out.local.tet_count(), out.local.owned_nodes,
+                                   static_cast<std::int64_t>(out.local.nodes_m.size()) - out.local.owned_nodes};
+  std::vector<std::int64_t> all(3 * static_cast<std::size_t>(ranks));
+  MPI_Allgather(mine.data(), 3, MPI_INT64_T, all.data(), 3, MPI_INT64_T, comm);
+  std::int64_t largest = 0;
+  for (int r = 0; r < ranks; ++r) {
+    out.report.ranks[r] = {all[3 * r], all[3 * r + 1], all[3 * r + 2]};
+    largest = std::max(largest, all[3 * r + 1]);
+  }
+  out.report.node_balance = static_cast<double>(largest) * ranks / static_cast<double>(out.nodes);
+
+  std::int64_t lists = static_cast<std::int64_t>(out.held_m.size());
+  MPI_Bcast(&lists, 1, MPI_INT64_T, 0, comm);
+  out.held_m.resize(lists);
+  for (auto& list : out.held_m) {
+    std::int64_t size = static_cast<std::int64_t>(list.size());
+    MPI_Bcast(&size, 1, MPI_INT64_T, 0, comm);
+    list.resize(size);
+    MPI_Bcast(list.data(), petsc::to_petsc_int(3 * size), MPI_DOUBLE, 0, comm);
+  }
+}
+
+}  // namespace
+
+Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, bool with_order) {
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  Distribution out;
+  Plan plan;
+  petsc::run_agreed(comm, [&] {
+    if (rank == 0) plan = make_plan(mesh, held_nodes, ranks, with_order, out);
+  });
+  if (rank == 0) {
+    std::vector<std::vector<std::int32_t>> elements(ranks);
+    for (std::size_t e = 0; e < plan.part.size(); ++e) elements[plan.part[e]].push_back(static_cast<std::int32_t>(e));
+    std::vector<std::int32_t> scratch(mesh.nodes.size(), -1);
+    for (int to = 1; to < ranks; ++to) {
+      const Piece piece = pack(mesh, plan, elements[to], to, scratch);
+      send(comm, piece.numbers, to, MPI_INT32_T);
+      send(comm, piece.positions, to, MPI_DOUBLE);
+    }
+    out.local = unpack(pack(mesh, plan, elements[0], 0, scratch));
+    out.row_of_node = std::move(plan.row);
+  } else {
+    Piece piece;
+    receive(comm, piece.numbers, MPI_INT32_T);
+    receive(comm, piece.positions, MPI_DOUBLE);
+    out.local = unpack(piece);
+  }
+  share_facts(comm, out);
+  return out;
+}
+
+std::string describe(const PartitionReport& report) {
+  std::string text = fmt::format("{} rank{}, {} faces cut, balance {:.3f} (elements) {:.3f} (nodes){}\n", report.ranks.size(),
+                                 report.ranks.size() == 1 ? "" : "s", report.edge_cut, report.element_balance, report.node_balance,
+                                 report.contiguous ? "" : ", not contiguous");
+  for (std::size_t r = 0; r < report.ranks.size(); ++r)
+    text += fmt::format("  rank {}: {} tetrahedra, {} nodes of its own, {} halo nodes\n", r, report.ranks[r].elements,
+                        report.ranks[r].owned_nodes, report.ranks[r].halo_nodes);
+  return text;
+}
+
+}  // namespace carillon::fem

@@ -1,0 +1,290 @@
+// Distribution and assembly on 1, 2 and 3 ranks against values that know nothing of ranks: closed forms of fields on a box.
+#include "precompute/fem/assemble.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <set>
+
+#include "precompute/petsc/session.hpp"
+#include "tests/support/box_mesh.hpp"
+
+namespace carillon::fem {
+namespace {
+
+using testing::HasSubstr;
+
+const MPI_Comm kWorld = PETSC_COMM_WORLD;
+const spec::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
+constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
+
+int get_rank() {
+  int rank = 0;
+  MPI_Comm_rank(kWorld, &rank);
+  return rank;
+}
+
+int get_ranks() {
+  int ranks = 1;
+  MPI_Comm_size(kWorld, &ranks);
+  return ranks;
+}
+
+mesh::TetMesh on_rank_0(const mesh::TetMesh& whole) { return get_rank() == 0 ? whole : mesh::TetMesh{}; }
+
+Distribution distribute_box(const mesh::TetMesh& whole, const std::vector<std::int32_t>& held = {}) {
+  return distribute(kWorld, on_rank_0(whole), get_rank() == 0 ? held : std::vector<std::int32_t>{}, true);
+}
+
+using Field = std::function<Vec3(const Vec3&)>;
+
+petsc::VecHandle sample(const System& system, const LocalMesh& local, const Field& field) {
+  petsc::VecHandle vector;
+  petsc::check(MatCreateVecs(system.stiffness, vector.out(), nullptr));
+  double* values = nullptr;
+  petsc::check(VecGetArray(vector, &values));
+  for (int i = 0; i < local.free_nodes; ++i) {
+    const Vec3 value = field(local.nodes_m[i]);
+    for (int d = 0; d < 3; ++d) values[3 * i + d] = value[d];
+  }
+  petsc::check(VecRestoreArray(vector, &values));
+  return vector;
+}
+
+double product(const Mat matrix, const Vec x, const Vec y) {
+  petsc::VecHandle image;
+  petsc::check(VecDuplicate(x, image.out()));
+  petsc::check(MatMult(matrix, y, image));
+  double value = 0;
+  petsc::check(VecDot(x, image, &value));
+  return value;
+}
+
+double find_norm(const Mat matrix) {
+  double norm = 0;
+  petsc::check(MatNorm(matrix, NORM_FROBENIUS, &norm));
+  return norm;
+}
+
+class Assembly : public testing::TestWithParam<std::tuple<int, spec::Mass>> {
+ protected:
+  int order() const { return std::get<0>(GetParam()); }
+  mesh::TetMesh box = tests::make_box({5, 4, 3}, kSize, order());
+  Distribution pieces = distribute_box(box);
+  System system = assemble(kWorld, pieces.local, kSteel, std::get<1>(GetParam()));
+};
+
+TEST_P(Assembly, gives_the_strain_energy_of_two_linear_fields_to_rounding) {
+  const auto x = sample(system, pieces.local, [](const Vec3& p) { return Vec3{p[0] + 2 * p[1], 0, 3 * p[2]}; });
+  const auto y = sample(system, pieces.local, [](const Vec3& p) { return Vec3{p[0], p[0] - p[1], p[1]}; });
+  // sigma(x) : eps(y) V with eps(x) = [1 1 0; 1 0 0; 0 0 3], eps(y) = [1 .5 0; .5 -1 .5; 0 .5 0].
+  const double lambda = kSteel.lame_lambda_pa(), mu = kSteel.lame_mu_pa();
+  const double expected = (lambda * 4 * 0 + 2 * mu * (1 + 2 * 0.5)) * kSize[0] * kSize[1] * kSize[2];
+  EXPECT_NEAR(product(system.stiffness, x, y), expected, 1e-12 * expected);
+}
+
+TEST_P(Assembly, gives_no_force_under_rigid_motions) {
+  for (int motion = 0; motion < 6; ++motion) {
+    const int a = motion % 3, b = (a + 1) % 3, c = (a + 2) % 3;
+    const auto x = sample(system, pieces.local, [&](const Vec3& p) {
+      Vec3 u{};
+      if (motion < 3) {
+        u[a] = 1;
+      } else {
+        u[b] = -p[c];
+        u[c] = p[b];
+      }
+      return u;
+    });
+    petsc::VecHandle force;
+    petsc::check(VecDuplicate(x, force.out()));
+    petsc::check(MatMult(system.stiffness, x, force));
+    double norm = 0;
+    petsc::check(VecNorm(force, NORM_2, &norm));
+    EXPECT_LT(norm, 1e-13 * find_norm(system.stiffness)) << motion;
+  }
+}
+
+TEST_P(Assembly, gives_the_mass_in_every_direction_and_none_between_directions) {
+  const double expected = 7850 * kSize[0] * kSize[1] * kSize[2];
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) {
+      const auto x = sample(system, pieces.local, [&](const Vec3&) { return Vec3{a == 0 ? 1. : 0., a == 1 ? 1. : 0., a == 2 ? 1. : 0.}; });
+      const auto y = sample(system, pieces.local, [&](const Vec3&) { return Vec3{b == 0 ? 1. : 0., b == 1 ? 1. : 0., b == 2 ? 1. : 0.}; });
+      EXPECT_NEAR(product(system.mass, x, y), a == b ? expected : 0, 1e-12 * expected);
+    }
+}
+
+TEST_P(Assembly, gives_exactly_the_kinetic_energy_of_a_linear_field_when_consistent) {
+  const auto x = sample(system, pieces.local, [](const Vec3& p) { return Vec3{p[0], 0, 0}; });
+  const double exact = 7850 * std::pow(kSize[0], 3) / 3 * kSize[1] * kSize[2];
+  const double value = product(system.mass, x, x);
+  if (std::get<1>(GetParam()) == spec::Mass::consistent) {
+    EXPECT_NEAR(value, exact, 1e-12 * exact);
+  } else {
+    EXPECT_NEAR(value, exact, 0.05 * exact);
+  }
+}
+
+TEST_P(Assembly, needs_no_memory_beyond_its_preallocation_and_wastes_none) {
+  for (const Mat matrix : {system.stiffness.get(), system.mass.get()}) {
+    MatInfo info;
+    petsc::check(MatGetInfo(matrix, MAT_GLOBAL_SUM, &info));
+    EXPECT_EQ(info.mallocs, 0);
+    EXPECT_EQ(info.nz_unneeded, 0);
+    EXPECT_EQ(info.nz_allocated, info.nz_used);
+    PetscBool symmetric = PETSC_FALSE;
+    if (get_ranks() == 1) {
+      petsc::check(MatSetOption(matrix, MAT_SYMMETRY_ETERNAL, PETSC_FALSE));
+      petsc::check(MatSetOption(matrix, MAT_SYMMETRIC, PETSC_FALSE));
+      petsc::check(MatIsSymmetric(matrix, 1e-12 * find_norm(matrix), &symmetric));
+      EXPECT_TRUE(symmetric);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Assembly, testing::Combine(testing::Values(1, 2), testing::Values(spec::Mass::consistent, spec::Mass::lumped)),
+                         [](const auto& info) {
+                           return std::string(std::get<0>(info.param) == 1 ? "T4_" : "T10_") +
+                                  (std::get<1>(info.param) == spec::Mass::consistent ? "consistent" : "lumped");
+                         });
+
+TEST(Distribution, gives_every_rank_its_own_elements_and_their_nodes_and_nothing_else) {
+  const auto box = tests::make_box({6, 4, 3}, kSize, 2);
+  const Distribution pieces = distribute_box(box, {0, 1, 2});
+  const LocalMesh& local = pieces.local;
+  std::set<std::int32_t> touched, held;
+  for (int e = 0; e < local.tet_count(); ++e)
+    for (int i = 0; i < 10; ++i) {
+      const std::int32_t node = local.tets[10 * e + i];
+      ASSERT_EQ(local.node_in_mesh[node], box.tet(local.tet_in_mesh[e])[i]);
+      ASSERT_EQ(local.nodes_m[node], box.nodes[local.node_in_mesh[node]]);
+      touched.insert(node);
+    }
+  EXPECT_EQ(touched.size(), local.nodes_m.size());
+  EXPECT_EQ(*touched.rbegin() + 1, static_cast<int>(local.nodes_m.size()));
+  for (int i = 0; i < local.free_nodes; ++i) EXPECT_EQ(local.row[i], local.first_row + i);
+  for (std::size_t i = 0; i < local.row.size(); ++i) EXPECT_EQ(local.row[i] < 0, local.node_in_mesh[i] < 3);
+
+  std::vector<int> times(box.nodes.size(), 0), elements(box.tet_count(), 0);
+  for (int i = 0; i < local.owned_nodes; ++i) ++times[local.node_in_mesh[i]];
+  for (const auto e : local.tet_in_mesh) ++elements[e];
+  MPI_Allreduce(MPI_IN_PLACE, times.data(), static_cast<int>(times.size()), MPI_INT, MPI_SUM, kWorld);
+  MPI_Allreduce(MPI_IN_PLACE, elements.data(), static_cast<int>(elements.size()), MPI_INT, MPI_SUM, kWorld);
+  EXPECT_THAT(times, testing::Each(1));
+  EXPECT_THAT(elements, testing::Each(1));
+
+  ASSERT_EQ(static_cast<int>(pieces.report.ranks.size()), get_ranks());
+  EXPECT_EQ(pieces.report.ranks[get_rank()].halo_nodes, static_cast<std::int64_t>(local.nodes_m.size()) - local.owned_nodes);
+  EXPECT_EQ(pieces.report.edge_cut > 0, get_ranks() > 1);
+  EXPECT_LT(pieces.report.element_balance, 1.1);
+  EXPECT_LT(pieces.report.node_balance, 1.2);
+  EXPECT_EQ(pieces.free_nodes, static_cast<std::int64_t>(box.nodes.size()) - 3);
+  EXPECT_EQ(pieces.nodes, static_cast<std::int64_t>(box.nodes.size()));
+}
+
+TEST(Distribution, orders_the_free_nodes_for_elimination_by_a_permutation_on_rank_0) {
+  const Distribution pieces = distribute_box(tests::make_box({4, 3, 3}, kSize), {5});
+  auto position = pieces.elimination_position;
+  if (get_rank() != 0) {
+    EXPECT_TRUE(position.empty());
+    return;
+  }
+  std::sort(position.begin(), position.end());
+  std::vector<std::int32_t> natural(pieces.free_nodes);
+  std::iota(natural.begin(), natural.end(), 0);
+  EXPECT_EQ(position, natural);
+}
+
+TEST(Distribution, numbers_two_separate_bodies_and_lists_the_held_nodes_of_each) {
+  auto both = tests::make_box({2, 2, 2}, kSize);
+  const auto other = tests::make_box({3, 2, 2}, kSize, 1, {1, 0, 0});
+  const auto shift = static_cast<std::int32_t>(both.nodes.size());
+  both.nodes.insert(both.nodes.end(), other.nodes.begin(), other.nodes.end());
+  both.nodes.push_back({9, 9, 9});  // no element uses this node
+  for (const auto node : other.tets) both.tets.push_back(node + shift);
+  const Distribution pieces = distribute_box(both, {shift, shift + 1});
+  EXPECT_EQ(pieces.components, 2);
+  ASSERT_EQ(pieces.held_m.size(), 2u);
+  EXPECT_TRUE(pieces.held_m[0].empty());
+  ASSERT_EQ(pieces.held_m[1].size(), 2u);
+  EXPECT_EQ(pieces.held_m[1][0], (Vec3{1, 0, 0}));
+  EXPECT_EQ(pieces.nodes, static_cast<std::int64_t>(both.nodes.size()) - 1);
+  for (std::size_t i = 0; i < pieces.local.nodes_m.size(); ++i) EXPECT_EQ(pieces.local.component[i], pieces.local.nodes_m[i][0] >= 1 ? 1 : 0);
+}
+
+TEST(Distribution, fails_on_every_rank_with_one_message_when_nothing_can_move) {
+  const auto box = tests::make_box({2, 2, 2}, kSize);
+  std::vector<std::int32_t> all(box.nodes.size());
+  std::iota(all.begin(), all.end(), 0);
+  try {
+    distribute_box(box, all);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("holds every node"));
+  }
+  EXPECT_THROW(distribute_box(box, {-1}), InputError);
+}
+
+TEST(Distribution, fails_on_every_rank_when_there_are_fewer_elements_than_ranks) {
+  mesh::TetMesh one;
+  one.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  one.tets = {0, 1, 2, 3};
+  if (get_ranks() == 1) {
+    EXPECT_EQ(distribute_box(one).free_nodes, 4);
+  } else {
+    EXPECT_THROW(distribute_box(one), InputError);
+  }
+}
+
+TEST(Elimination, of_held_nodes_leaves_the_rows_of_the_others_as_they_were) {
+  const auto box = tests::make_box({3, 2, 2}, kSize, 2);
+  std::vector<std::int32_t> held;
+  for (std::size_t i = 0; i < box.nodes.size(); ++i)
+    if (box.nodes[i][0] == 0) held.push_back(static_cast<std::int32_t>(i));
+  const Distribution pieces = distribute_box(box, held);
+  const System system = assemble(kWorld, pieces.local, kSteel, spec::Mass::consistent);
+  PetscInt rows = 0;
+  petsc::check(MatGetSize(system.stiffness, &rows, nullptr));
+  EXPECT_EQ(rows, 3 * static_cast<PetscInt>(box.nodes.size() - held.size()));
+  // A field that is zero on the held face has the energy of the free body: u_x = x, so E_oed V.
+  const auto x = sample(system, pieces.local, [](const Vec3& p) { return Vec3{p[0], 0, 0}; });
+  const double expected = (kSteel.lame_lambda_pa() + 2 * kSteel.lame_mu_pa()) * kSize[0] * kSize[1] * kSize[2];
+  EXPECT_NEAR(product(system.stiffness, x, x), expected, 1e-12 * expected);
+}
+
+TEST(Assembling, a_mesh_with_an_element_inside_out_fails_on_every_rank_and_names_it) {
+  auto box = tests::make_box({3, 2, 2}, kSize);
+  std::swap(box.tets[4 * 17], box.tets[4 * 17 + 1]);
+  const Distribution pieces = distribute_box(box);
+  try {
+    assemble(kWorld, pieces.local, kSteel, spec::Mass::consistent);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("element 17 of the mesh"));
+  }
+}
+
+TEST(RigidData, of_a_box_far_from_the_origin_is_exact) {
+  for (const int order : {1, 2}) {
+    const Distribution pieces = distribute_box(tests::make_box({4, 3, 2}, kSize, order, {100, -50, 20}));
+    const RigidBody body = calc_rigid_body(kWorld, pieces.local, 7850);
+    const double mass = 7850 * kSize[0] * kSize[1] * kSize[2];
+    EXPECT_NEAR(body.volume_m3, mass / 7850, 1e-13);
+    EXPECT_NEAR(body.mass_kg, mass, 1e-10);
+    const Vec3 centre{100 + kSize[0] / 2, -50 + kSize[1] / 2, 20 + kSize[2] / 2};
+    for (int r = 0; r < 3; ++r) {
+      EXPECT_NEAR(body.centre_m[r], centre[r], 1e-11);
+      for (int c = 0; c < 3; ++c) {
+        const double a = kSize[(r + 1) % 3], b = kSize[(r + 2) % 3];
+        EXPECT_NEAR(body.inertia_kg_m2[3 * r + c], r == c ? mass / 12 * (a * a + b * b) : 0.0, 1e-11);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::fem
