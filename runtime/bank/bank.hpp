@@ -20,8 +20,8 @@ using Vec3 = std::array<double, 3>;
 /// Rigid-body data of the undeformed solid, in the frame of the mesh.
 struct RigidBody {
   double mass_kg = 0.0;
-  Vec3 centre_m{};                           // centre of mass
-  std::array<double, 9> inertia_kg_m2{};     // (3, 3) row-major, about the centre of mass, axes of the mesh
+  Vec3 centre_m{};                        // centre of mass
+  std::array<double, 9> inertia_kg_m2{};  // (3, 3) row-major, about the centre of mass, axes of the mesh
   double volume_m3 = 0.0;
 };
 
@@ -36,16 +36,16 @@ struct Material {
 
 /// Sizes of the solve behind the bank.
 struct Counts {
-  std::int64_t nodes = 0;       // of the volume mesh as solved (mid-side nodes included)
+  std::int64_t nodes = 0;  // of the volume mesh as solved (mid-side nodes included)
   std::int64_t tets = 0;
-  std::int64_t components = 0;  // connected
-  std::int64_t rigid_modes = 0; // deflated: six per free component, fewer where nodes are held
+  std::int64_t components = 0;   // connected
+  std::int64_t rigid_modes = 0;  // deflated: six per free component, fewer where nodes are held
 };
 
 /// A mode bank. V vertices, T triangles, m modes; rows of `shape` are (V, m, 3) so that all modes of a vertex are adjacent.
 struct Bank {
-  std::vector<Vec3> vertices_m;                          // (V), surface only, frame of the mesh
-  std::vector<std::array<std::int32_t, 3>> triangles;    // (T), outward, counter-clockwise from outside
+  std::vector<Vec3> vertices_m;                        // (V), surface only, frame of the mesh
+  std::vector<std::array<std::int32_t, 3>> triangles;  // (T), outward, counter-clockwise from outside
 
   std::vector<double> eigenvalue_rad2_s2;  // (m), ascending, lambda = omega^2
   std::vector<double> decay_per_s;         // (m), d = (alpha1 lambda + alpha2) / 2
@@ -78,17 +78,38 @@ struct Bank {
 /// Rounds to nearest; the scale of a mode is its largest absolute component / 32767.
 void quantise_shapes(Bank& bank, std::span<const double> shapes /* (V, m, 3) */);
 
+/// One property of a bank that was looked at: its figure in words, and what is wrong with it (empty when nothing is).
+struct Check {
+  std::string property;  // "residuals"
+  std::string figure;    // "worst 3.1e-09 at mode 12, limit 1e-04"
+  std::vector<std::string> faults;
+};
+
+/// Looks at every property of a bank's content, in a fixed order. When the array sizes disagree only that is reported.
+std::vector<Check> calc_checks(const Bank& bank);
+
 /// Everything that can be wrong with a bank's content, in words; empty when it is sane. Whole: array sizes agree, all numbers finite.
 /// Sane: eigenvalues positive and ascending, decays >= 0 and equal to the damping law, residuals below 1e-4, triangles inside range and
 /// closed and outward, inertia positive definite and physically possible, scales >= 0.
 std::vector<std::string> find_faults(const Bank& bank);
 
 /// Reads a bank. Throws InputError for anything that is not a whole bank of a version this reader knows: missing file, not a bank,
-/// newer major version, truncated or changed bytes (checksum), arrays that disagree. Bytes are untrusted.
+/// newer major version, truncated or changed bytes (checksum), arrays that disagree, content that is not sane. Bytes are untrusted: no
+/// byte is interpreted by HDF5, and no more memory is taken than the file is long. SystemError when the disk fails to read.
 Bank read_bank(const std::filesystem::path& file);
 
-/// Writes a bank: temporary file beside `file`, fsync, rename, fsync of the folder. Throws InputError when find_faults() is not empty
-/// (nothing is written), SystemError when the disk refuses (nothing is left behind).
+/// The same from bytes in memory; `name` stands for the file in messages.
+Bank parse_bank(std::span<const std::byte> bytes, const std::string& name = "bank in memory");
+
+/// The same as read_bank, but an insane content is no error: for programs that report on it with calc_checks(). Array sizes agree.
+Bank read_bank_unchecked(const std::filesystem::path& file);
+
+/// The shapes of all modes at one vertex, (m) [kg^-1/2], without reading the rest of the file: version and length are checked, the
+/// checksum is not (that would read it all). Throws InputError as read_bank does, and when there is no such vertex.
+std::vector<Vec3> read_shape_row(const std::filesystem::path& file, std::size_t vertex);
+
+/// Writes a bank: temporary file beside `file`, fsync, rename, fsync of the folder. Throws InputError when find_faults() is not empty or
+/// `file` cannot name a bank (nothing is written), SystemError when the disk refuses (nothing is left behind). A link is followed.
 void write_bank(const Bank& bank, const std::filesystem::path& file);
 
 }  // namespace carillon::bank

@@ -1,0 +1,317 @@
+// What makes a bank sane.
+// Method: every property that a solve must have delivered is looked at from the numbers of the bank alone.
+//   Surface: a closed oriented surface passes every edge once in each direction; its signed volume (divergence theorem, sum of
+//   a . (b x c) / 6 over the triangles) is positive when it is outward.
+//   Inertia: the second moments S = tr(I)/2 1 - I of a body of positive density are positive definite, which implies that I is and that its
+//   principal moments obey the triangle inequality; S_ii / mass is at most the square of the largest distance from the centre.
+// Deviations: the enclosed volume of the triangles is compared with volume_m3 only within a factor of two, since curved elements bulge.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+namespace {
+
+constexpr double kResidualLimit = 1e-4;
+constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by the same formula
+constexpr double kMassTolerance = 0.01;  // mass against density times volume
+
+/// The first three faults in full, the others counted.
+class Faults {
+ public:
+  template <class... Values>
+  void add(fmt::format_string<Values...> text, Values&&... values) {
+    if (++count_ <= 3) told_.push_back(fmt::format(text, std::forward<Values>(values)...));
+  }
+  std::vector<std::string> take() {
+    if (count_ > 3) told_.back() += fmt::format(" (and {} more)", count_ - 3);
+    return std::move(told_);
+  }
+
+ private:
+  std::vector<std::string> told_;
+  std::size_t count_ = 0;
+};
+
+Check check_arrays(const Bank& bank) {
+  Faults faults;
+  const std::size_t vertices = bank.vertex_count();
+  const std::size_t modes = bank.mode_count();
+  const auto expect = [&](const char* name, std::size_t size, std::size_t wanted) {
+    if (size != wanted) faults.add("arrays disagree: {} holds {} values and {} are wanted", name, size, wanted);
+  };
+  expect("decay", bank.decay_per_s.size(), modes);
+  expect("residual", bank.residual.size(), modes);
+  expect("radiation_gain", bank.radiation_gain.size(), modes);
+  expect("shape_scale", bank.shape_scale.size(), modes);
+  expect("shape", bank.shape.size(), vertices * modes * 3);
+  if (vertices < 4 || bank.triangles.size() < 4) {
+    faults.add("the surface has {} vertices and {} triangles; a solid has at least four of each", vertices, bank.triangles.size());
+  }
+  if (vertices > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
+    faults.add("{} vertices are more than 2^31 - 1", vertices);
+  return {"arrays", fmt::format("{} vertices, {} triangles, {} modes", vertices, bank.triangles.size(), modes), faults.take()};
+}
+
+Check check_numbers(const Bank& bank) {
+  Faults faults;
+  std::size_t count = 0;
+  const auto look = [&](const char* name, const double* values, std::size_t size) {
+    count += size;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (!std::isfinite(values[i])) faults.add("{}[{}] is {}, not a finite number", name, i, values[i]);
+    }
+  };
+  look("vertices", bank.vertices_m.empty() ? nullptr : bank.vertices_m[0].data(), 3 * bank.vertex_count());
+  look("eigenvalue", bank.eigenvalue_rad2_s2.data(), bank.mode_count());
+  look("decay", bank.decay_per_s.data(), bank.mode_count());
+  look("residual", bank.residual.data(), bank.mode_count());
+  look("radiation_gain", bank.radiation_gain.data(), bank.mode_count());
+  look("shape_scale", bank.shape_scale.data(), bank.mode_count());
+  look("band_hz", bank.band_hz.data(), 2);
+  look("mass_kg", &bank.rigid.mass_kg, 1);
+  look("centre_m", bank.rigid.centre_m.data(), 3);
+  look("inertia_kg_m2", bank.rigid.inertia_kg_m2.data(), 9);
+  look("volume_m3", &bank.rigid.volume_m3, 1);
+  const Material& material = bank.material;
+  look("young_modulus_pa", &material.young_modulus_pa, 1);
+  look("poisson_ratio", &material.poisson_ratio, 1);
+  look("density_kg_m3", &material.density_kg_m3, 1);
+  look("alpha1_s", &material.alpha1_s, 1);
+  look("alpha2_per_s", &material.alpha2_per_s, 1);
+  return {"numbers", fmt::format("{} looked at", count), faults.take()};
+}
+
+Check check_eigenvalues(const Bank& bank) {
+  Faults faults;
+  const auto& lambda = bank.eigenvalue_rad2_s2;
+  for (std::size_t i = 0; i < lambda.size(); ++i) {
+    if (!(lambda[i] > 0.0)) faults.add("eigenvalue[{}] is {:.6g} rad^2/s^2, not positive", i, lambda[i]);
+    if (i > 0 && !(lambda[i] >= lambda[i - 1])) faults.add("eigenvalue[{}] is below the one before it: not ascending", i);
+  }
+  const auto figure = lambda.empty() ? std::string("no modes")
+                                     : fmt::format("ascending from {:.2f} to {:.2f} Hz", bank.freq_hz(0), bank.freq_hz(lambda.size() - 1));
+  return {"frequencies", figure, faults.take()};
+}
+
+Check check_band(const Bank& bank) {
+  Faults faults;
+  const auto [low, high] = bank.band_hz;
+  if (!(low >= 0.0 && low < high)) faults.add("band_hz is [{:.6g}, {:.6g}], not an ascending pair of frequencies", low, high);
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    const double freq = bank.freq_hz(i);
+    if (!(freq >= low * (1.0 - kLawTolerance) && freq <= high * (1.0 + kLawTolerance))) {
+      faults.add("mode {} at {:.6g} Hz lies outside the band of {:.6g} to {:.6g} Hz", i, freq, low, high);
+    }
+  }
+  return {"band", fmt::format("{:g} to {:g} Hz, {}", low, high, bank.complete ? "every mode of it is here" : "cut by max_modes"),
+          faults.take()};
+}
+
+Check check_decay(const Bank& bank) {
+  Faults faults;
+  double worst = 0.0;
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    const double law = (bank.material.alpha1_s * bank.eigenvalue_rad2_s2[i] + bank.material.alpha2_per_s) / 2.0;
+    const double d = bank.decay_per_s[i];
+    if (!(d >= 0.0)) faults.add("decay[{}] is {:.6g} 1/s, negative", i, d);
+    if (!(std::abs(d - law) <= kLawTolerance * law)) faults.add("decay[{}] is {:.9g} 1/s, and the damping law gives {:.9g}", i, d, law);
+    if (law > 0.0) worst = std::max(worst, std::abs(d / law - 1.0));
+  }
+  return {"damping", fmt::format("agrees with (alpha1 lambda + alpha2) / 2 to {:.1e}", worst), faults.take()};
+}
+
+Check check_residuals(const Bank& bank) {
+  Faults faults;
+  std::size_t worst = 0;
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    if (!(bank.residual[i] >= 0.0 && bank.residual[i] < kResidualLimit)) {
+      faults.add("residual[{}] is {:.3g}, outside 0 to {:.0e}: the mode was not solved", i, bank.residual[i], kResidualLimit);
+    }
+    if (bank.residual[i] > bank.residual[worst]) worst = i;
+  }
+  const auto figure = bank.mode_count() == 0
+                          ? std::string("no modes")
+                          : fmt::format("worst {:.2e} at mode {}, limit {:.0e}", bank.residual[worst], worst, kResidualLimit);
+  return {"residuals", figure, faults.take()};
+}
+
+Check check_gains(const Bank& bank) {
+  Faults faults;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    if (!(bank.radiation_gain[i] >= 0.0)) faults.add("radiation_gain[{}] is {:.6g}, negative", i, bank.radiation_gain[i]);
+    largest = std::max(largest, bank.radiation_gain[i]);
+  }
+  return {"radiation", fmt::format("largest gain {:.4g} Pa s m^-1 kg^-1/2", largest), faults.take()};
+}
+
+Check check_shapes(const Bank& bank) {
+  Faults faults;
+  double step = 0.0;
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    if (!(bank.shape_scale[i] >= 0.0)) faults.add("shape_scale[{}] is {:.6g}, negative", i, bank.shape_scale[i]);
+    step = std::max(step, bank.shape_scale[i]);
+  }
+  return {"shapes", fmt::format("error at most {:.2e} kg^-1/2", step / 2.0), faults.take()};
+}
+
+/// a . (b x c) / 6 summed over the triangles, with corners relative to `origin`.
+double calc_enclosed_volume(const Bank& bank, const Vec3& origin) {
+  double volume = 0.0;
+  for (const auto& triangle : bank.triangles) {
+    Vec3 p[3];
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) p[i][k] = bank.vertices_m[static_cast<std::size_t>(triangle[i])][k] - origin[k];
+    }
+    volume += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+               p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /
+              6.0;
+  }
+  return volume;
+}
+
+/// Edges that are not passed exactly once in each direction.
+void find_open_edges(const Bank& bank, Faults& faults) {
+  struct Edge {
+    std::int32_t low, high;
+    bool forward;
+    std::int64_t triangle;
+    auto key() const { return std::pair(low, high); }
+  };
+  std::vector<Edge> edges;
+  edges.reserve(3 * bank.triangles.size());
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
+    for (int i = 0; i < 3; ++i) {
+      const std::int32_t a = bank.triangles[t][i], b = bank.triangles[t][(i + 1) % 3];
+      edges.push_back({std::min(a, b), std::max(a, b), a < b, static_cast<std::int64_t>(t)});
+    }
+  }
+  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.key() < b.key(); });
+  for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
+    while (last < edges.size() && edges[last].key() == edges[first].key()) ++last;
+    if (last - first == 2 && edges[first].forward != edges[first + 1].forward) continue;
+    const char* what = last - first == 1   ? "belongs to one triangle only: the surface is open"
+                       : last - first == 2 ? "is passed twice in one direction: triangles are turned against each other"
+                                           : "belongs to more than two triangles";
+    faults.add("the edge of vertices {} and {} (triangle {}) {}", edges[first].low, edges[first].high, edges[first].triangle, what);
+  }
+}
+
+Check check_surface(const Bank& bank) {
+  Faults faults;
+  bool usable = true;
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
+    const auto& [a, b, c] = bank.triangles[t];
+    for (const std::int32_t v : {a, b, c}) {
+      if (v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count()) continue;
+      faults.add("triangle {} names vertex {}, and there are {}", t, v, bank.vertex_count());
+      usable = false;
+    }
+    if (a == b || b == c || c == a) faults.add("triangle {} names a vertex twice", t);
+  }
+  if (!usable) return {"surface", "triangles out of range", faults.take()};
+  find_open_edges(bank, faults);
+  const double volume = calc_enclosed_volume(bank, bank.rigid.centre_m);
+  if (!(volume > 0.0)) {
+    faults.add("the surface encloses {:.6g} m^3: its triangles face inward", volume);
+  } else if (!(volume > 0.5 * bank.rigid.volume_m3 && volume < 2.0 * bank.rigid.volume_m3)) {
+    faults.add("the surface encloses {:.6g} m^3, and the volume is said to be {:.6g}", volume, bank.rigid.volume_m3);
+  }
+  return {"surface", fmt::format("closed, outward, encloses {:.6g} m^3", volume), faults.take()};
+}
+
+Check check_rigid_body(const Bank& bank) {
+  Faults faults;
+  const RigidBody& rigid = bank.rigid;
+  if (!(rigid.mass_kg > 0.0)) faults.add("mass_kg is {:.6g}, not positive", rigid.mass_kg);
+  if (!(rigid.volume_m3 > 0.0)) faults.add("volume_m3 is {:.6g}, not positive", rigid.volume_m3);
+  const double mass = bank.material.density_kg_m3 * rigid.volume_m3;
+  if (!(std::abs(rigid.mass_kg - mass) <= kMassTolerance * mass)) {
+    faults.add("mass_kg is {:.6g}, and density times volume gives {:.6g}", rigid.mass_kg, mass);
+  }
+  const auto& inertia = rigid.inertia_kg_m2;
+  const double trace = inertia[0] + inertia[4] + inertia[8];
+  double s[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      s[i][k] = (i == k ? trace / 2.0 : 0.0) - inertia[3 * i + k];
+      if (i < k && !(std::abs(inertia[3 * i + k] - inertia[3 * k + i]) <= kLawTolerance * std::abs(trace)))
+        faults.add("inertia_kg_m2 is not symmetric");
+    }
+  }
+  const double minor2 = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+  const double minor3 = s[0][0] * (s[1][1] * s[2][2] - s[1][2] * s[2][1]) - s[0][1] * (s[1][0] * s[2][2] - s[1][2] * s[2][0]) +
+                        s[0][2] * (s[1][0] * s[2][1] - s[1][1] * s[2][0]);
+  if (!(s[0][0] > 0.0 && minor2 > 0.0 && minor3 > 0.0)) {
+    faults.add("inertia_kg_m2 is not that of a solid: not positive definite, or one principal moment exceeds the sum of the others");
+  }
+  for (int k = 0; k < 3; ++k) {
+    double low = 0.0, high = 0.0;
+    for (const Vec3& vertex : bank.vertices_m) {
+      low = std::min(low, vertex[k] - rigid.centre_m[k]);
+      high = std::max(high, vertex[k] - rigid.centre_m[k]);
+    }
+    const double reach = std::max(-low, high);
+    if (!(low < 0.0 && high > 0.0)) faults.add("centre_m[{}] is {:.6g} m, outside the surface", k, rigid.centre_m[k]);
+    if (!(s[k][k] <= 1.1 * rigid.mass_kg * reach * reach)) faults.add("inertia_kg_m2 is too large for a surface of this size and mass");
+  }
+  return {"rigid body", fmt::format("{:.6g} kg, trace of inertia {:.6g} kg m^2, physically possible", rigid.mass_kg, trace), faults.take()};
+}
+
+Check check_material(const Bank& bank) {
+  Faults faults;
+  const Material& m = bank.material;
+  if (!(m.young_modulus_pa > 0.0)) faults.add("young_modulus_pa is {:.6g}, not positive", m.young_modulus_pa);
+  if (!(m.poisson_ratio > -1.0 && m.poisson_ratio < 0.5)) faults.add("poisson_ratio is {:.6g}, outside -1 to 0.5", m.poisson_ratio);
+  if (!(m.density_kg_m3 > 0.0)) faults.add("density_kg_m3 is {:.6g}, not positive", m.density_kg_m3);
+  if (!(m.alpha1_s >= 0.0)) faults.add("alpha1_s is {:.6g}, negative", m.alpha1_s);
+  if (!(m.alpha2_per_s >= 0.0)) faults.add("alpha2_per_s is {:.6g}, negative", m.alpha2_per_s);
+  return {"material", fmt::format("E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^3", m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3),
+          faults.take()};
+}
+
+Check check_solve(const Bank& bank) {
+  Faults faults;
+  const Counts& counts = bank.counts;
+  if (bank.element != "T4" && bank.element != "T10") faults.add("element is neither T4 nor T10");
+  if (bank.mass != "consistent" && bank.mass != "lumped") faults.add("mass is neither consistent nor lumped");
+  if (counts.nodes < static_cast<std::int64_t>(bank.vertex_count()))
+    faults.add("{} nodes are fewer than the vertices of the surface", counts.nodes);
+  if (counts.tets < 1) faults.add("{} tetrahedra", counts.tets);
+  if (counts.components < 1 || counts.components > counts.tets)
+    faults.add("{} connected components of {} tetrahedra", counts.components, counts.tets);
+  if (counts.rigid_modes < 0 || counts.rigid_modes / 6 > counts.components ||
+      (counts.rigid_modes / 6 == counts.components && counts.rigid_modes % 6 != 0)) {
+    faults.add("{} rigid modes of {} components", counts.rigid_modes, counts.components);
+  }
+  return {"solve",
+          fmt::format("{} elements, {} mass, {} nodes, {} tets, {} rigid modes", bank.element, bank.mass, counts.nodes, counts.tets,
+                      counts.rigid_modes),
+          faults.take()};
+}
+
+}  // namespace
+
+std::vector<Check> calc_checks(const Bank& bank) {
+  std::vector<Check> checks{check_arrays(bank)};
+  if (!checks[0].faults.empty()) return checks;
+  for (const auto check : {check_numbers, check_eigenvalues, check_band, check_decay, check_residuals, check_gains, check_shapes,
+                           check_surface, check_rigid_body, check_material, check_solve}) {
+    checks.push_back(check(bank));
+  }
+  return checks;
+}
+
+std::vector<std::string> find_faults(const Bank& bank) {
+  std::vector<std::string> faults;
+  for (Check& check : calc_checks(bank)) faults.insert(faults.end(), check.faults.begin(), check.faults.end());
+  return faults;
+}
+
+}  // namespace carillon::bank

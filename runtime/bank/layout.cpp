@@ -1,0 +1,68 @@
+#include "runtime/bank/layout.hpp"
+
+#include <bit>
+#include <charconv>
+
+namespace carillon::bank {
+
+// The arrays are copied between file and memory as they are.
+static_assert(std::endian::native == std::endian::little,
+              "Bank files are little-endian and so far only little-endian machines are served.");
+static_assert(sizeof(Vec3) == 24 && sizeof(std::array<std::int32_t, 3>) == 12, "Rows of three must lie without gaps.");
+
+std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
+  const std::uint64_t vertices = bank.vertices_m.size();
+  const std::uint64_t triangles = bank.triangles.size();
+  const std::uint64_t modes = bank.eigenvalue_rad2_s2.size();
+  const RigidBody& rigid = bank.rigid;
+  const Material& material = bank.material;
+  const Counts& counts = bank.counts;
+  return {
+      {"mesh/vertices", "<f8", {vertices, 3}, "m", "surface vertices", bank.vertices_m.data()},
+      {"mesh/triangles", "<i4", {triangles, 3}, "1", "vertices of a triangle, counter-clockwise from outside", bank.triangles.data()},
+      {"modes/eigenvalue", "<f8", {modes}, "rad^2/s^2", "lambda = omega^2, ascending", bank.eigenvalue_rad2_s2.data()},
+      {"modes/frequency_hz", "<f8", {modes}, "Hz", "undamped, sqrt(lambda) / 2 pi", form.freq_hz.data()},
+      {"modes/decay", "<f8", {modes}, "1/s", "d = (alpha1 lambda + alpha2) / 2", bank.decay_per_s.data()},
+      {"modes/residual", "<f8", {modes}, "1", "||K phi - lambda M phi|| / (lambda ||M phi||)", bank.residual.data()},
+      {"modes/radiation_gain", "<f8", {modes}, "Pa s m^-1 kg^-1/2", "pressure at 1 m for unit modal velocity", bank.radiation_gain.data()},
+      {"modes/shape_scale", "<f8", {modes}, "kg^-1/2", "of one integer step of modes/shape", bank.shape_scale.data()},
+      {"modes/shape", "<i2", {vertices, modes, 3}, "modes/shape_scale", "phi = shape * shape_scale, mass-normalised", bank.shape.data()},
+      {"rigid/mass_kg", "<f8", {}, "kg", "mass", &rigid.mass_kg},
+      {"rigid/centre_m", "<f8", {3}, "m", "centre of mass", rigid.centre_m.data()},
+      {"rigid/inertia_kg_m2", "<f8", {3, 3}, "kg m^2", "about the centre of mass, axes of the mesh", rigid.inertia_kg_m2.data()},
+      {"rigid/volume_m3", "<f8", {}, "m^3", "volume", &rigid.volume_m3},
+      {"material/young_modulus_pa", "<f8", {}, "Pa", "Young's modulus", &material.young_modulus_pa},
+      {"material/poisson_ratio", "<f8", {}, "1", "Poisson's ratio", &material.poisson_ratio},
+      {"material/density_kg_m3", "<f8", {}, "kg/m^3", "density", &material.density_kg_m3},
+      {"material/alpha1_s", "<f8", {}, "s", "stiffness-proportional damping", &material.alpha1_s},
+      {"material/alpha2_per_s", "<f8", {}, "1/s", "mass-proportional damping", &material.alpha2_per_s},
+      {"solve/nodes", "<i8", {}, "1", "nodes of the volume mesh as solved", &counts.nodes},
+      {"solve/tets", "<i8", {}, "1", "tetrahedra of the volume mesh", &counts.tets},
+      {"solve/components", "<i8", {}, "1", "connected components", &counts.components},
+      {"solve/rigid_modes", "<i8", {}, "1", "rigid modes that were deflated", &counts.rigid_modes},
+      {"solve/band_hz", "<f8", {2}, "Hz", "modes were looked for from here to there", bank.band_hz.data()},
+      {"solve/complete", "|u1", {}, "1", "1 when every mode of the band is here", &form.complete},
+      {"solve/element", "|S16", {}, "1", "T4 or T10", form.element.data()},
+      {"solve/mass", "|S16", {}, "1", "consistent or lumped", form.mass.data()},
+      {"provenance", "|S" + std::to_string(form.provenance.size()), {}, "1", "JSON text", form.provenance.data()},
+  };
+}
+
+std::uint64_t find_item_bytes(const std::string& dtype) {
+  if (dtype == "<f8" || dtype == "<i8") return 8;
+  if (dtype == "<i4") return 4;
+  if (dtype == "<i2") return 2;
+  if (dtype == "|u1") return 1;
+  if (dtype.size() < 3 || dtype.size() > 12 || dtype.substr(0, 2) != "|S") return 0;
+  std::uint64_t bytes = 0;
+  const auto [end, error] = std::from_chars(dtype.data() + 2, dtype.data() + dtype.size(), bytes);
+  return error == std::errc() && end == dtype.data() + dtype.size() ? bytes : 0;
+}
+
+std::uint64_t calc_bytes(const Field& field) {
+  std::uint64_t bytes = find_item_bytes(field.dtype);
+  for (const std::uint64_t extent : field.shape) bytes *= extent;
+  return bytes;
+}
+
+}  // namespace carillon::bank

@@ -1,0 +1,262 @@
+// Reading banks from bytes that nobody vouches for.
+// Method: the seal tells where each array lies; the file is read once from front to back, hashed, and its arrays are copied out on the way.
+//   Only then is the digest compared and the content looked at.
+// Deviations: HDF5 is not asked. libhdf5 1.10.8 was seen to crash (and to hang) on files with one changed byte, so its parser does not
+// belong
+//   between an untrusted file and a running game; the HDF5 structure of a bank is there for other programs.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <numbers>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/bank/layout.hpp"
+#include "runtime/bank/seal.hpp"
+
+namespace carillon::bank {
+namespace {
+
+/// An open regular file.
+class File {
+ public:
+  explicit File(const std::filesystem::path& path) : name_(path.string()) {
+    // Non-blocking, so that a FIFO without a writer cannot hang the program.
+    descriptor_ = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
+    if (descriptor_ < 0) {
+      const int error = errno;
+      if (error == ENOENT || error == ENOTDIR) throw InputError(name_ + ": no such file; give the path of a bank");
+      throw InputError(fmt::format("{}: cannot be opened: {}", name_, std::strerror(error)));
+    }
+    struct stat status {};
+    if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
+      ::close(descriptor_);
+      throw InputError(
+          fmt::format("{}: {}; give the path of a bank file", name_, S_ISDIR(status.st_mode) ? "is a folder" : "is not a regular file"));
+    }
+    length_ = static_cast<std::uint64_t>(status.st_size);
+  }
+  ~File() { ::close(descriptor_); }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
+  const std::string& name() const { return name_; }
+  std::uint64_t length() const { return length_; }
+
+  /// Fills `bytes` from `offset`. SystemError when the disk fails, InputError when the file ends early.
+  void read(std::uint64_t offset, std::span<std::byte> bytes) const {
+    while (!bytes.empty()) {
+      const ssize_t got = ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+      if (got < 0 && errno == EINTR) continue;
+      if (got < 0) throw SystemError(fmt::format("{}: cannot be read at byte {}: {}", name_, offset, std::strerror(errno)));
+      if (got == 0)
+        throw InputError(fmt::format("{}: truncated at byte {} while it was read; read it again when its writer is done", name_, offset));
+      offset += static_cast<std::uint64_t>(got);
+      bytes = bytes.subspan(static_cast<std::size_t>(got));
+    }
+  }
+
+  Seal read_seal() const {
+    std::string head(std::min<std::uint64_t>(length_, kSealBytes), '\0');
+    read(0, std::as_writable_bytes(std::span(head)));
+    return parse_seal(head, length_, name_);
+  }
+
+ private:
+  std::string name_;
+  int descriptor_ = -1;
+  std::uint64_t length_ = 0;
+};
+
+const Extent& get_extent(const Seal& seal, const std::string& field, const std::string& name) {
+  const auto found = seal.extents.find(field);
+  if (found == seal.extents.end()) throw InputError(fmt::format("{}: the array {} is missing; write the bank again", name, field));
+  return found->second;
+}
+
+/// Number of rows of an array that has at least one index.
+std::uint64_t get_rows(const Seal& seal, const std::string& field, const std::string& name) {
+  const Extent& extent = get_extent(seal, field, name);
+  if (extent.shape.empty())
+    throw InputError(fmt::format("{}: {} is a single number instead of an array; write the bank again", name, field));
+  return extent.shape[0];
+}
+
+/// "<f8 (4, 3)"
+std::string describe(const std::string& dtype, const std::vector<std::uint64_t>& shape) {
+  return shape.empty() ? dtype + " alone" : fmt::format("{} ({})", dtype, fmt::join(shape, ", "));
+}
+
+/// Throws unless the array in the file has the type and the extents that the other arrays ask for.
+void check_extent(const Field& wanted, const Extent& extent, const std::string& name) {
+  if (extent.dtype != wanted.dtype || extent.shape != wanted.shape) {
+    throw InputError(fmt::format("{}: arrays disagree: {} is {}, and {} is wanted; write the bank again", name, wanted.name,
+                                 describe(extent.dtype, extent.shape), describe(wanted.dtype, wanted.shape)));
+  }
+}
+
+/// Bytes of the file from first to last, in pieces: calls its argument with (offset, piece).
+using Pieces = std::function<void(const std::function<void(std::uint64_t, std::span<const std::byte>)>&)>;
+
+struct Loaded {
+  Bank bank;
+  FileForm form;
+};
+
+/// Gives the arrays the sizes that the seal tells. The seal bounds their sum by the length of the file.
+void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
+  Bank& bank = loaded.bank;
+  const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", name);
+  // Every extent is compared before memory is taken: rows times three could exceed the file where a declared shape did not.
+  FileForm& form = loaded.form;
+  const Extent& provenance = get_extent(seal, "provenance", name);
+  if (!provenance.dtype.starts_with("|S")) throw InputError(name + ": arrays disagree: provenance is not text; write the bank again");
+  const auto check = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape) {
+    check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
+  };
+  const std::uint64_t vertices = get_rows(seal, "mesh/vertices", name);
+  const std::uint64_t triangles = get_rows(seal, "mesh/triangles", name);
+  check("mesh/vertices", "<f8", {vertices, 3});
+  check("mesh/triangles", "<i4", {triangles, 3});
+  for (const char* field :
+       {"modes/eigenvalue", "modes/frequency_hz", "modes/decay", "modes/residual", "modes/radiation_gain", "modes/shape_scale"}) {
+    check(field, "<f8", {modes});
+  }
+  check("modes/shape", "<i2", {vertices, modes, 3});
+
+  bank.vertices_m.resize(vertices);
+  bank.triangles.resize(triangles);
+  for (auto* array :
+       {&bank.eigenvalue_rad2_s2, &bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale, &form.freq_hz}) {
+    array->resize(modes);
+  }
+  bank.shape.resize(vertices * modes * 3);
+  form.provenance.resize(provenance.bytes);
+}
+
+std::string trim(std::string_view text) {
+  const std::size_t last = text.find_last_not_of('\0');
+  return std::string(text.substr(0, last == std::string_view::npos ? 0 : last + 1));
+}
+
+/// Copies the arrays out of the pieces and compares the digest.
+Loaded load(const Seal& seal, const std::string& name, const Pieces& for_each_piece) {
+  Loaded loaded;
+  allocate(seal, name, loaded);
+  struct Target {
+    std::uint64_t offset, bytes;
+    std::byte* data;
+  };
+  std::vector<Target> targets;
+  for (const Field& field : list_fields(loaded.bank, loaded.form)) {
+    const Extent& extent = get_extent(seal, field.name, name);
+    check_extent(field, extent, name);
+    // The table points to const for the writer's sake; what it points to is `loaded`, which is ours to fill.
+    if (extent.bytes > 0) targets.push_back({extent.offset, extent.bytes, static_cast<std::byte*>(const_cast<void*>(field.data))});
+  }
+  Digest digest;
+  for_each_piece([&](std::uint64_t offset, std::span<const std::byte> piece) {
+    digest.update(offset == 0 ? piece.first(kTextBytes) : piece);
+    if (offset == 0) digest.update(piece.subspan(kSealBytes));
+    for (const Target& target : targets) {
+      const std::uint64_t begin = std::max(offset, target.offset);
+      const std::uint64_t end = std::min(offset + piece.size(), target.offset + target.bytes);
+      if (begin < end) std::memcpy(target.data + (begin - target.offset), piece.data() + (begin - offset), end - begin);
+    }
+  });
+  if (digest.finish() != seal.digest) {
+    throw InputError(name +
+                     ": checksum differs: bytes were changed since the bank was sealed; copy or write the bank again (or, if you changed "
+                     "them, seal it again: docs/bank-format.md)");
+  }
+  return loaded;
+}
+
+/// Turns the file's form of things into the bank's.
+Bank finish(Loaded&& loaded, const std::string& name) {
+  Bank& bank = loaded.bank;
+  const FileForm& form = loaded.form;
+  if (form.complete > 1)
+    throw InputError(fmt::format("{}: solve/complete is {}, neither 0 nor 1; write the bank again", name, form.complete));
+  bank.complete = form.complete == 1;
+  bank.element = trim({form.element.data(), form.element.size()});
+  bank.mass = trim({form.mass.data(), form.mass.size()});
+  bank.provenance = trim(form.provenance);
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);
+    const bool agrees = std::abs(form.freq_hz[i] - freq_hz) <= 1e-9 * std::abs(freq_hz);
+    // An eigenvalue that has no frequency is a fault of its own, told in better words by calc_checks().
+    if (!agrees && std::isfinite(freq_hz)) {
+      throw InputError(fmt::format("{}: modes/frequency_hz[{}] is {} Hz, and its eigenvalue says {} Hz; write the bank again", name, i,
+                                   form.freq_hz[i], freq_hz));
+    }
+  }
+  return std::move(bank);
+}
+
+void require_sane(const Bank& bank, const std::string& name) {
+  const auto faults = find_faults(bank);
+  if (faults.empty()) return;
+  const std::string more = faults.size() > 1 ? fmt::format(" (and {} more: carillon-bank check lists them)", faults.size() - 1) : "";
+  throw InputError(fmt::format("{}: not a sane bank: {}{}; compute the bank again", name, faults[0], more));
+}
+
+}  // namespace
+
+Bank read_bank_unchecked(const std::filesystem::path& path) {
+  const File file(path);
+  const Seal seal = file.read_seal();
+  Loaded loaded = load(seal, file.name(), [&](const auto& take) {
+    std::vector<std::byte> buffer(std::min<std::uint64_t>(file.length(), 1 << 20));
+    for (std::uint64_t offset = 0; offset < file.length();) {
+      const std::span piece = std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), file.length() - offset));
+      file.read(offset, piece);
+      take(offset, piece);
+      offset += piece.size();
+    }
+  });
+  return finish(std::move(loaded), file.name());
+}
+
+Bank read_bank(const std::filesystem::path& path) {
+  Bank bank = read_bank_unchecked(path);
+  require_sane(bank, path.string());
+  return bank;
+}
+
+Bank parse_bank(std::span<const std::byte> bytes, const std::string& name) {
+  const auto head = bytes.first(std::min(bytes.size(), kSealBytes));
+  const Seal seal = parse_seal({reinterpret_cast<const char*>(head.data()), head.size()}, bytes.size(), name);
+  Bank bank = finish(load(seal, name, [&](const auto& take) { take(0, bytes); }), name);
+  require_sane(bank, name);
+  return bank;
+}
+
+std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t vertex) {
+  const File file(path);
+  const Seal seal = file.read_seal();
+  const std::uint64_t vertices = get_rows(seal, "mesh/vertices", file.name());
+  const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", file.name());
+  const Extent& shape = get_extent(seal, "modes/shape", file.name());
+  const Extent& scale = get_extent(seal, "modes/shape_scale", file.name());
+  check_extent({"modes/shape", "<i2", {vertices, modes, 3}, "", "", nullptr}, shape, file.name());
+  check_extent({"modes/shape_scale", "<f8", {modes}, "", "", nullptr}, scale, file.name());
+  if (vertex >= vertices)
+    throw InputError(fmt::format("{}: no vertex {}; the bank has vertices 0 to {}", file.name(), vertex, vertices - 1));
+  std::vector<std::int16_t> steps(3 * modes);
+  std::vector<double> scales(modes);
+  const std::uint64_t row_bytes = 3 * modes * sizeof(std::int16_t);
+  file.read(shape.offset + vertex * row_bytes, std::as_writable_bytes(std::span(steps)));
+  file.read(scale.offset, std::as_writable_bytes(std::span(scales)));
+  std::vector<Vec3> row(modes);
+  for (std::size_t i = 0; i < modes; ++i) row[i] = {steps[3 * i] * scales[i], steps[3 * i + 1] * scales[i], steps[3 * i + 2] * scales[i]};
+  return row;
+}
+
+}  // namespace carillon::bank

@@ -1,0 +1,59 @@
+// The seal of a bank file: its first 4096 bytes, plain text that says what the file is, where each array lies, and the SHA-256 of all
+// other bytes. docs/bank-format.md describes it. Internal to carillon::bank.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+
+inline constexpr std::size_t kSealBytes = 4096;                       // the HDF5 user block of the file
+inline constexpr std::size_t kDigestBytes = 64;                       // hexadecimal SHA-256, the last bytes of the seal
+inline constexpr std::size_t kTextBytes = kSealBytes - kDigestBytes;  // the text, padded with line feeds
+
+/// Where one array lies.
+struct Extent {
+  std::string dtype;
+  std::uint64_t offset = 0;  // from the start of the file
+  std::vector<std::uint64_t> shape;
+  std::uint64_t bytes = 0;
+};
+
+/// A seal that was read: known major version, arrays inside the file and no longer together than the file.
+struct Seal {
+  int major = 0;
+  int minor = 0;
+  std::uint64_t length = 0;  // of the whole file
+  std::map<std::string, Extent> extents;
+  std::string digest;
+};
+
+/// Reads the seal from the first bytes of a file of `length` bytes (`head` holds the first 4096 of them, or fewer when the file is
+/// shorter). Checks, in this order: magic, version, length, table. Not the digest. Throws InputError; `name` is the file.
+Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& name);
+
+/// The text of a seal, kTextBytes long, for a file of `length` bytes. InputError when the table does not fit.
+std::string format_seal_text(std::uint64_t length, const std::map<std::string, Extent>& extents);
+
+/// SHA-256 over pieces (OpenSSL).
+class Digest {
+ public:
+  Digest();
+  ~Digest();
+  Digest(const Digest&) = delete;
+  Digest& operator=(const Digest&) = delete;
+  void update(std::span<const std::byte> bytes);
+  /// 64 lower-case hexadecimal digits. Once only.
+  std::string finish();
+
+ private:
+  void* context_ = nullptr;
+};
+
+}  // namespace carillon::bank

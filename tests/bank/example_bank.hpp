@@ -1,0 +1,97 @@
+// A bank that no solver made: a box of n x n squares a side, with closed-form rigid data and smooth made-up shapes.
+#pragma once
+
+#include <cmath>
+#include <map>
+#include <string>
+#include <tuple>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank::example {
+
+inline constexpr Vec3 kSidesM{0.3, 0.02, 0.01};
+inline constexpr Vec3 kCornerM{0.05, -0.1, 0.2};
+
+/// The surface of the box, outward: n x n squares of two triangles on each of its six sides, vertices shared.
+inline void add_box(Bank& bank, int n) {
+  std::map<std::tuple<int, int, int>, std::int32_t> numbers;
+  const auto vertex = [&](std::array<int, 3> at) {
+    const auto [entry, added] = numbers.try_emplace({at[0], at[1], at[2]}, static_cast<std::int32_t>(bank.vertices_m.size()));
+    if (added) {
+      Vec3 x;
+      for (int k = 0; k < 3; ++k) x[k] = kCornerM[k] + kSidesM[k] * at[k] / n;
+      bank.vertices_m.push_back(x);
+    }
+    return entry->second;
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (const int side : {0, n}) {
+      for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < n; ++j) {
+          const auto corner = [&](int a, int b) {
+            std::array<int, 3> at{};
+            at[axis] = side;
+            at[u] = i + a;
+            at[v] = j + b;
+            return vertex(at);
+          };
+          const std::int32_t a = corner(0, 0), b = corner(1, 0), c = corner(1, 1), d = corner(0, 1);
+          if (side == n) {
+            bank.triangles.push_back({a, b, c});
+            bank.triangles.push_back({a, c, d});
+          } else {
+            bank.triangles.push_back({a, c, b});
+            bank.triangles.push_back({a, d, c});
+          }
+        }
+      }
+    }
+  }
+}
+
+/// phi of mode k at x: a plane wave whose direction turns with k [kg^-1/2].
+inline Vec3 calc_shape(std::size_t mode, const Vec3& x) {
+  const double k = static_cast<double>(mode + 1);
+  const double phase = 20.0 * k * x[0] + 7.0 * x[1] * k * k + 3.0 * x[2];
+  return {2.0 * std::sin(phase), 3.0 * std::cos(1.3 * phase), 0.01 * k * std::sin(0.7 * phase + 1.0)};
+}
+
+inline std::vector<double> calc_shapes(const Bank& bank) {
+  std::vector<double> shapes;
+  for (const Vec3& x : bank.vertices_m) {
+    for (std::size_t mode = 0; mode < bank.mode_count(); ++mode) {
+      for (const double value : calc_shape(mode, x)) shapes.push_back(value);
+    }
+  }
+  return shapes;
+}
+
+inline Bank make_bank(int n = 2, std::size_t modes = 5) {
+  Bank bank;
+  add_box(bank, n);
+  bank.material = {200e9, 0.3, 7800.0, 1e-7, 5.0};
+  const auto [a, b, c] = kSidesM;
+  bank.rigid.volume_m3 = a * b * c;
+  const double mass = bank.rigid.mass_kg = 7800.0 * a * b * c;
+  for (int k = 0; k < 3; ++k) bank.rigid.centre_m[k] = kCornerM[k] + kSidesM[k] / 2.0;
+  bank.rigid.inertia_kg_m2 = {mass * (b * b + c * c) / 12.0, 0, 0, 0, mass * (a * a + c * c) / 12.0, 0, 0, 0,
+                              mass * (a * a + b * b) / 12.0};
+  for (std::size_t i = 0; i < modes; ++i) {
+    const double omega = 2.0 * 3.14159265358979323846 * (574.44 + 19000.0 * static_cast<double>(i) / static_cast<double>(modes));
+    bank.eigenvalue_rad2_s2.push_back(omega * omega);
+    bank.decay_per_s.push_back((bank.material.alpha1_s * omega * omega + bank.material.alpha2_per_s) / 2.0);
+    bank.residual.push_back(1e-10 * static_cast<double>(i + 1));
+    bank.radiation_gain.push_back(0.5 + static_cast<double>(i));
+  }
+  bank.counts = {static_cast<std::int64_t>(bank.vertex_count()) + 1, 6 * n * n * n, 1, 6};
+  bank.element = "T10";
+  bank.mass = "consistent";
+  bank.provenance =
+      R"({"program": "example", "ranks": 2, "stations": {"mesh": {"seconds": 0.5, "peak_mib": 80}, "solve": {"seconds": 12.25, "peak_mib": 900}}})";
+  quantise_shapes(bank, calc_shapes(bank));
+  return bank;
+}
+
+}  // namespace carillon::bank::example
