@@ -24,12 +24,6 @@ struct Lattice {
 mesh::TetMesh make_lattice(const Lattice& lattice, const std::function<Vec3(int, int, int)>& place,
                            std::vector<std::array<int, 3>>* indices = nullptr);
 
-/// A triangulated surface; triangles are counter-clockwise seen from outside.
-struct Surface {
-  std::vector<Vec3> points;
-  std::vector<std::array<std::int32_t, 3>> triangles;
-};
-
 /// Appends to `mesh` the three tetrahedra of the prism between the triangle `bottom` and the triangle `top`, where `top` lies outward of
 /// `bottom`. The quadrilaterals are cut by the order of bottom's indices, so neighbouring prisms agree.
 void append_prism(mesh::TetMesh& mesh, std::array<std::int32_t, 3> bottom, std::array<std::int32_t, 3> top);

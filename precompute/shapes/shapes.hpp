@@ -52,7 +52,7 @@ const Shape& find_shape(std::string_view name);
 
 /// Makes the mesh of a body. Elements are positively oriented, conforming and about as long as wide; walls get at least one layer of
 /// quadratic or two layers of linear elements. The node count is the one next to `target_nodes` that the body's lattice can give, within
-/// 10 % from about 500 nodes per order on. Mid-side nodes of curved faces lie on the true surface.
+/// 10 % from 700 nodes on. Mid-side nodes of curved faces lie on the true surface.
 /// Throws InputError: unknown shape or dimension (naming the nearest), a dimension that is not positive or finite, a wall that does not
 /// fit, an order other than 1 or 2, a target that is out of reach.
 mesh::TetMesh make_shape(const ShapeOptions& options);

@@ -1,0 +1,50 @@
+// How many cells a body's lattice gets (private to carillon::shapes).
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "precompute/mesh/tet_mesh.hpp"
+
+namespace carillon::shapes {
+
+/// The simplices of a linear tetrahedral mesh.
+struct Counts {
+  long long vertices = 0;
+  long long tets = 0;
+  long long boundary_triangles = 0;
+  long long euler = 1;  // Euler characteristic of the body: ball 1, ring 0, closed shell 2
+};
+
+/// Nodes of the mesh at an order: vertices, and for order 2 the edges, by Euler's formula E = V + T + F_boundary / 2 - euler.
+long long calc_node_count(const Counts& counts, int order);
+
+/// Cells along up to four independent directions of a body; unused directions stay at 1.
+using Divisions = std::array<int, 4>;
+
+/// A body before its lattice is chosen.
+struct Body {
+  std::array<double, 4> lengths{};  // [m] along each direction; 0 for an unused direction
+  Divisions least{1, 1, 1, 1};      // the fewest cells that make a valid mesh
+  Divisions wanted{1, 1, 1, 1};     // the fewest cells that make a good one, where the count permits
+  std::function<Counts(const Divisions&)> calc_counts;
+  std::function<mesh::TetMesh(const Divisions&)> make;  // the mesh, of the wanted order
+  double reluctance = 0.0;  // what this construction costs beside others of the same body; 0.1 weighs as a node count 1 % further off
+};
+
+/// Chooses among constructions of one body and their divisions for a wanted edge length (the first construction) or node count (one of
+/// the two is given) and makes the mesh. Throws InputError when they are out of reach.
+mesh::TetMesh make_best(const std::vector<Body>& bodies, int order, std::optional<long long> target_nodes, std::optional<double> edge_m);
+
+// The bodies. Dimensions are valid already; order 1 or 2.
+Body plan_box(const std::array<double, 3>& edges_m, int order);
+Body plan_hollow_box(const std::array<double, 3>& edges_m, double wall_m, int order);
+Body plan_tube(double length_m, double outer_radius_m, double wall_m, int order);
+/// Constructions on several polyhedra, the icosahedron first: its symmetry keeps the five-fold modes of a ball together.
+std::vector<Body> plan_ball(double radius_m, int order);
+/// The part of a spherical shell within `half_angle_rad` of the lower pole; pi makes it closed.
+Body plan_shell(double outer_radius_m, double wall_m, double half_angle_rad, int order);
+
+}  // namespace carillon::shapes
