@@ -104,6 +104,9 @@ Bank parse_bank(std::span<const std::byte> bytes, const std::string& name = "ban
 /// The same as read_bank, but an insane content is no error: for programs that report on it with calc_checks(). Array sizes agree.
 Bank read_bank_unchecked(const std::filesystem::path& file);
 
+/// Major and minor version of the layout of a bank file; looks at its seal only. InputError as read_bank.
+std::array<int, 2> read_version(const std::filesystem::path& file);
+
 /// The shapes of all modes at one vertex, (m) [kg^-1/2], without reading the rest of the file: version and length are checked, the
 /// checksum is not (that would read it all). Throws InputError as read_bank does, and when there is no such vertex.
 std::vector<Vec3> read_shape_row(const std::filesystem::path& file, std::size_t vertex);

@@ -238,6 +238,11 @@ Bank parse_bank(std::span<const std::byte> bytes, const std::string& name) {
   return bank;
 }
 
+std::array<int, 2> read_version(const std::filesystem::path& path) {
+  const Seal seal = File(path).read_seal();
+  return {seal.major, seal.minor};
+}
+
 std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t vertex) {
   const File file(path);
   const Seal seal = file.read_seal();
@@ -248,7 +253,7 @@ std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t 
   check_extent({"modes/shape", "<i2", {vertices, modes, 3}, "", "", nullptr}, shape, file.name());
   check_extent({"modes/shape_scale", "<f8", {modes}, "", "", nullptr}, scale, file.name());
   if (vertex >= vertices)
-    throw InputError(fmt::format("{}: no vertex {}; the bank has vertices 0 to {}", file.name(), vertex, vertices - 1));
+    throw InputError(fmt::format("{}: no vertex {}; the bank has {}, numbered from 0", file.name(), vertex, vertices));
   std::vector<std::int16_t> steps(3 * modes);
   std::vector<double> scales(modes);
   const std::uint64_t row_bytes = 3 * modes * sizeof(std::int16_t);

@@ -1,0 +1,219 @@
+#include "runtime/bank/report.hpp"
+
+#include <fmt/format.h>
+#include <json/json.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+namespace carillon::bank {
+namespace {
+
+/// The provenance as JSON; nothing when it is none (it is free text as far as a reader of banks is concerned).
+std::optional<Json::Value> parse_provenance(const std::string& text) {
+  Json::CharReaderBuilder builder;
+  builder["stackLimit"] = 64;
+  std::istringstream stream(text);
+  Json::Value value;
+  std::string errors;
+  try {
+    if (!Json::parseFromStream(builder, stream, &value, &errors)) return std::nullopt;
+  } catch (const Json::Exception&) {  // jsoncpp throws where it is nested too deep
+    return std::nullopt;
+  }
+  return value;
+}
+
+/// Text of a file on a terminal: control characters (escape sequences among them) become question marks.
+std::string calc_printable(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  }
+  return text;
+}
+
+/// "under", "critical" or "over": d against omega. Critical is what doubles cannot tell apart from d = omega.
+const char* find_regime(double decay, double omega) {
+  if (std::abs(decay - omega) <= 1e-9 * omega) return "critical";
+  return decay < omega ? "under" : "over";
+}
+
+/// ln(1000) / d; infinite without damping.
+double calc_t60_s(double decay) { return std::log(1000.0) / decay; }
+
+std::string format_bytes(std::uintmax_t bytes) {
+  return bytes < 1'000'000 ? fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3)
+                           : fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
+}
+
+std::string format_scalar(const Json::Value& value) {
+  if (value.isDouble()) return fmt::format("{:.6g}", value.asDouble());
+  if (value.isString()) return calc_printable(value.asString());
+  std::string text = value.toStyledString();
+  text.erase(std::remove(text.begin(), text.end(), '\n'), text.end());
+  return text.size() > 100 ? text.substr(0, 97) + "..." : text;
+}
+
+bool is_flat(const Json::Value& value) {
+  return std::none_of(value.begin(), value.end(), [](const Json::Value& member) { return member.isObject() || member.isArray(); });
+}
+
+/// One line per scalar and per flat object ("solve: seconds 12.25, peak_mib 900"), nested ones indented. The resolved job is left to
+/// --json.
+void append_tree(const Json::Value& value, int depth, std::string& text) {
+  const std::string indent(static_cast<std::size_t>(2 * depth), ' ');
+  std::size_t index = 0;
+  for (auto it = value.begin(); it != value.end() && depth < 6; ++it, ++index) {
+    const std::string key = value.isObject() ? calc_printable(it.name()) : fmt::format("{}", index);
+    if (!it->isObject() && !it->isArray()) {
+      text += fmt::format("{}{}: {}\n", indent, key, format_scalar(*it));
+    } else if (depth == 1 && (key == "job" || key == "resolved_job")) {
+      text += fmt::format("{}{}: (see --json)\n", indent, key);
+    } else if (it->isArray() && is_flat(*it)) {
+      text += fmt::format("{}{}: {}\n", indent, key, format_scalar(*it));
+    } else if (it->isObject() && is_flat(*it) && it->size() <= 5) {
+      std::string line;
+      for (auto member = it->begin(); member != it->end(); ++member) {
+        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", calc_printable(member.name()), format_scalar(*member));
+      }
+      text += fmt::format("{}{}: {}\n", indent, key, line);
+    } else {
+      text += fmt::format("{}{}:\n", indent, key);
+      append_tree(*it, depth + 1, text);
+    }
+  }
+}
+
+std::string format_modes(const Bank& bank, std::size_t limit) {
+  std::string text = fmt::format("\n{:>5} {:>11} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "freq [Hz]", "decay [1/s]", "T60 [s]",
+                                 "d/omega", "regime", "residual", "gain [Pa...]");
+  const std::size_t shown = std::min(limit, bank.mode_count());
+  for (std::size_t i = 0; i < shown; ++i) {
+    const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
+    text += fmt::format("{:>5} {:>11.2f} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1, bank.freq_hz(i), decay,
+                        calc_t60_s(decay), decay / omega, find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i]);
+  }
+  if (shown < bank.mode_count())
+    text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
+  return text;
+}
+
+template <class Range>
+Json::Value make_list(const Range& values) {
+  Json::Value list(Json::arrayValue);
+  for (const double value : values) list.append(value);
+  return list;
+}
+
+Json::Value make_mode(const Bank& bank, std::size_t i) {
+  const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
+  Json::Value mode;
+  mode["frequency_hz"] = bank.freq_hz(i);
+  mode["eigenvalue_rad2_s2"] = bank.eigenvalue_rad2_s2[i];
+  mode["decay_per_s"] = decay;
+  // JSON has no infinity: an undamped mode has no T60.
+  mode["t60_s"] = std::isfinite(calc_t60_s(decay)) ? Json::Value(calc_t60_s(decay)) : Json::Value();
+  mode["damping_ratio"] = decay / omega;
+  mode["regime"] = find_regime(decay, omega);
+  mode["residual"] = bank.residual[i];
+  mode["radiation_gain"] = bank.radiation_gain[i];
+  mode["shape_scale"] = bank.shape_scale[i];
+  return mode;
+}
+
+}  // namespace
+
+std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit) {
+  const auto [major, minor] = read_version(file);
+  const RigidBody& rigid = bank.rigid;
+  const Material& m = bank.material;
+  const auto& inertia = rigid.inertia_kg_m2;
+  double worst = 0.0;
+  for (const double residual : bank.residual) worst = std::max(worst, residual);
+  std::string text =
+      fmt::format("{}\n  Carillon bank, format {}.{}, {}\n", file.string(), major, minor, format_bytes(std::filesystem::file_size(file)));
+  text += fmt::format("modes     {} of {:g} to {:g} Hz ({}), worst residual {:.1e}\n", bank.mode_count(), bank.band_hz[0], bank.band_hz[1],
+                      bank.complete ? "complete" : "cut by max_modes", worst);
+  text += fmt::format("surface   {} vertices, {} triangles\n", bank.vertex_count(), bank.triangles.size());
+  text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,
+                      bank.mass, bank.counts.nodes, bank.counts.tets, bank.counts.components, bank.counts.components == 1 ? "" : "s",
+                      bank.counts.rigid_modes);
+  text += fmt::format("material  E {:.5g} Pa, nu {:.4g}, rho {:.5g} kg/m^3; alpha1 {:.4g} s, alpha2 {:.4g} 1/s\n", m.young_modulus_pa,
+                      m.poisson_ratio, m.density_kg_m3, m.alpha1_s, m.alpha2_per_s);
+  text += fmt::format("rigid     {:.6g} kg, {:.6g} m^3, centre ({:.5g}, {:.5g}, {:.5g}) m\n", rigid.mass_kg, rigid.volume_m3,
+                      rigid.centre_m[0], rigid.centre_m[1], rigid.centre_m[2]);
+  text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
+                      inertia[8], inertia[1], inertia[2], inertia[5]);
+  if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, mode_limit);
+  const auto provenance = parse_provenance(bank.provenance);
+  if (provenance && provenance->isObject()) {
+    text += "\nprovenance\n";
+    append_tree(*provenance, 1, text);
+  }
+  return text;
+}
+
+std::string format_info_json(const Bank& bank, const std::filesystem::path& file) {
+  const auto [major, minor] = read_version(file);
+  Json::Value root;
+  root["file"] = file.string();
+  root["format_version"] = fmt::format("{}.{}", major, minor);
+  root["bytes"] = Json::UInt64(std::filesystem::file_size(file));
+  root["mode_count"] = Json::UInt64(bank.mode_count());
+  root["vertex_count"] = Json::UInt64(bank.vertex_count());
+  root["triangle_count"] = Json::UInt64(bank.triangles.size());
+  root["band_hz"] = make_list(bank.band_hz);
+  root["complete"] = bank.complete;
+  root["element"] = bank.element;
+  root["mass"] = bank.mass;
+  Json::Value& counts = root["counts"];
+  counts["nodes"] = Json::Int64(bank.counts.nodes);
+  counts["tets"] = Json::Int64(bank.counts.tets);
+  counts["components"] = Json::Int64(bank.counts.components);
+  counts["rigid_modes"] = Json::Int64(bank.counts.rigid_modes);
+  Json::Value& rigid = root["rigid"];
+  rigid["mass_kg"] = bank.rigid.mass_kg;
+  rigid["volume_m3"] = bank.rigid.volume_m3;
+  rigid["centre_m"] = make_list(bank.rigid.centre_m);
+  for (std::size_t i = 0; i < 3; ++i) rigid["inertia_kg_m2"].append(make_list(std::span(bank.rigid.inertia_kg_m2).subspan(3 * i, 3)));
+  Json::Value& material = root["material"];
+  material["young_modulus_pa"] = bank.material.young_modulus_pa;
+  material["poisson_ratio"] = bank.material.poisson_ratio;
+  material["density_kg_m3"] = bank.material.density_kg_m3;
+  material["damping"]["rayleigh"]["alpha1_s"] = bank.material.alpha1_s;
+  material["damping"]["rayleigh"]["alpha2_per_s"] = bank.material.alpha2_per_s;
+  root["frequencies_hz"] = Json::Value(Json::arrayValue);
+  root["modes"] = Json::Value(Json::arrayValue);
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    root["frequencies_hz"].append(bank.freq_hz(i));
+    root["modes"].append(make_mode(bank, i));
+  }
+  const auto provenance = parse_provenance(bank.provenance);
+  root["provenance"] = provenance ? *provenance : Json::Value(bank.provenance);
+
+  Json::StreamWriterBuilder builder;
+  builder["indentation"] = "  ";
+  builder["precision"] = 17;
+  return Json::writeString(builder, root) + "\n";
+}
+
+Check calc_provenance_check(const Bank& bank) {
+  Check check{"provenance", fmt::format("{} bytes of JSON", bank.provenance.size()), {}};
+  if (bank.provenance.empty()) {
+    check.figure = "none given";
+  } else if (!parse_provenance(bank.provenance)) {
+    check.faults.push_back("provenance is not JSON text");
+  }
+  return check;
+}
+
+std::string format_check(const Check& check) {
+  if (check.faults.empty()) return fmt::format("ok      {:<12} {}\n", check.property, calc_printable(check.figure));
+  std::string text;
+  for (const std::string& fault : check.faults) text += fmt::format("FAULT   {:<12} {}\n", check.property, calc_printable(fault));
+  return text;
+}
+
+}  // namespace carillon::bank

@@ -1,0 +1,23 @@
+// What carillon-bank prints. Internal to the program.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+
+/// A page for people; at most `mode_limit` rows of modes.
+std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit);
+
+/// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
+std::string format_info_json(const Bank& bank, const std::filesystem::path& file);
+
+/// The one property that the library, which knows no JSON, does not look at.
+Check calc_provenance_check(const Bank& bank);
+
+/// One line per check.
+std::string format_check(const Check& check);
+
+}  // namespace carillon::bank
