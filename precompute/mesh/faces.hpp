@@ -1,0 +1,52 @@
+// The faces of all elements, brought together. Inner header of check and boundary extraction.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/mesh/tet_mesh.hpp"
+
+namespace carillon::mesh {
+
+struct Face {
+  std::int32_t a, b, c;  // corners, ascending
+  std::int32_t tet;
+  std::int8_t local;     // 0..3, see kFaces
+  bool odd;              // seen from outside the element, a b c run clockwise
+};
+
+inline bool same_corners(const Face& x, const Face& y) { return x.a == y.a && x.b == y.b && x.c == y.c; }
+
+/// All 4 E faces, equal ones next to each other. `node_of`: what stands for a node (identity when empty).
+std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t>& node_of = {});
+
+/// The edge between the local corners i and j, as an index into kEdges.
+int find_edge(int i, int j);
+
+/// Nodes joined to parts; find() is cheap through path halving.
+class Parts {
+ public:
+  explicit Parts(std::size_t count) : parent_(count) {
+    for (std::size_t i = 0; i < count; ++i) parent_[i] = static_cast<std::int32_t>(i);
+  }
+  std::int32_t find(std::int32_t i) {
+    while (parent_[static_cast<std::size_t>(i)] != i) {
+      auto& up = parent_[static_cast<std::size_t>(i)];
+      up = parent_[static_cast<std::size_t>(up)];
+      i = up;
+    }
+    return i;
+  }
+  /// The smaller number stands for both.
+  void join(std::int32_t i, std::int32_t j) {
+    i = find(i);
+    j = find(j);
+    if (i < j) parent_[static_cast<std::size_t>(j)] = i;
+    if (j < i) parent_[static_cast<std::size_t>(i)] = j;
+  }
+
+ private:
+  std::vector<std::int32_t> parent_;
+};
+
+}  // namespace carillon::mesh

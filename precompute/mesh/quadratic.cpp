@@ -1,0 +1,88 @@
+// Method: edges are dropped into buckets by their smaller corner; each gets one mid node, numbered after the corners in the order of the edges.
+
+#include <algorithm>
+
+#include "precompute/mesh/check.hpp"
+
+namespace carillon::mesh {
+
+TetMesh to_quadratic(const TetMesh& mesh) {
+  if (mesh.order == 2) return mesh;
+  TetMesh fine;
+  fine.order = 2;
+  fine.nodes = mesh.nodes;
+  fine.regions = mesh.regions;
+  fine.node_sets = mesh.node_sets;
+  const std::size_t count = static_cast<std::size_t>(mesh.tet_count());
+  fine.tets.resize(10 * count);
+  struct Edge {
+    std::int32_t high;
+    std::int64_t slot;  // where in fine.tets its mid node belongs
+  };
+  std::vector<std::size_t> begin(mesh.nodes.size() + 1, 0);
+  const auto corners = [&](std::size_t e, std::size_t k) {
+    const auto tet = mesh.tet(static_cast<std::int64_t>(e));
+    return std::minmax(tet[static_cast<std::size_t>(kEdges[k][0])], tet[static_cast<std::size_t>(kEdges[k][1])]);
+  };
+  for (std::size_t e = 0; e < count; ++e)
+    for (std::size_t k = 0; k < 6; ++k) ++begin[static_cast<std::size_t>(corners(e, k).first) + 1];
+  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<Edge> edges(6 * count);
+  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
+  for (std::size_t e = 0; e < count; ++e) {
+    std::copy_n(mesh.tet(static_cast<std::int64_t>(e)).begin(), 4, fine.tets.begin() + static_cast<std::ptrdiff_t>(10 * e));
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto [low, high] = corners(e, k);
+      edges[next[static_cast<std::size_t>(low)]++] = {high, static_cast<std::int64_t>(10 * e + 4 + k)};
+    }
+  }
+  std::vector<std::array<std::int32_t, 2>> ends;  // of each mid node
+  for (std::size_t low = 0; low + 1 < begin.size(); ++low) {
+    const auto first = edges.begin() + static_cast<std::ptrdiff_t>(begin[low]);
+    const auto last = edges.begin() + static_cast<std::ptrdiff_t>(begin[low + 1]);
+    std::sort(first, last, [](const Edge& x, const Edge& y) { return x.high < y.high || (x.high == y.high && x.slot < y.slot); });
+    for (auto edge = first; edge != last; ++edge) {
+      if (edge == first || edge->high != (edge - 1)->high) {
+        const Vec3 a = mesh.nodes[low], b = mesh.nodes[static_cast<std::size_t>(edge->high)];
+        fine.nodes.push_back({0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])});
+        ends.push_back({static_cast<std::int32_t>(low), edge->high});
+      }
+      fine.tets[static_cast<std::size_t>(edge->slot)] = static_cast<std::int32_t>(fine.nodes.size()) - 1;
+    }
+  }
+  std::vector<char> inside(mesh.nodes.size());
+  for (auto& [name, set] : fine.node_sets) {
+    std::fill(inside.begin(), inside.end(), 0);
+    for (const auto node : mesh.node_sets.at(name)) inside[static_cast<std::size_t>(node)] = 1;
+    for (std::size_t m = 0; m < ends.size(); ++m)
+      if (inside[static_cast<std::size_t>(ends[m][0])] != 0 && inside[static_cast<std::size_t>(ends[m][1])] != 0)
+        set.push_back(static_cast<std::int32_t>(mesh.nodes.size() + m));
+  }
+  return fine;
+}
+
+TetMesh to_linear(const TetMesh& mesh) {
+  if (mesh.order == 1) return mesh;
+  TetMesh coarse;
+  coarse.order = 1;
+  coarse.regions = mesh.regions;
+  std::vector<std::int32_t> number(mesh.nodes.size(), -1);
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (std::size_t k = 0; k < 4; ++k) number[static_cast<std::size_t>(mesh.tet(e)[k])] = 0;
+  for (std::size_t i = 0; i < number.size(); ++i)
+    if (number[i] == 0) {
+      number[i] = static_cast<std::int32_t>(coarse.nodes.size());
+      coarse.nodes.push_back(mesh.nodes[i]);
+    }
+  coarse.tets.reserve(static_cast<std::size_t>(4 * mesh.tet_count()));
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (std::size_t k = 0; k < 4; ++k) coarse.tets.push_back(number[static_cast<std::size_t>(mesh.tet(e)[k])]);
+  for (const auto& [name, set] : mesh.node_sets) {
+    auto& kept = coarse.node_sets[name];
+    for (const auto node : set)
+      if (number[static_cast<std::size_t>(node)] >= 0) kept.push_back(number[static_cast<std::size_t>(node)]);
+  }
+  return coarse;
+}
+
+}  // namespace carillon::mesh

@@ -1,0 +1,83 @@
+#include "precompute/mesh/read.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <new>
+
+#include "precompute/mesh/assemble.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::mesh {
+
+namespace {
+
+/// No mesh that could be solved here is larger; what is, is no mesh.
+constexpr std::uint64_t kMostBytes = 32ULL << 30;
+
+std::string read_bytes(const std::filesystem::path& file) {
+  std::string bytes = config::read_file(file, "mesh file", kMostBytes);
+  if (bytes.empty()) throw InputError(fmt::format("{}: the file is empty; write the mesh again", file.string()));
+  return bytes;
+}
+
+/// The format by the first word of the content.
+MeshFormat find_format(std::string_view bytes, const std::string& name, const std::string& extension) {
+  constexpr const char* kReadable = "carillon reads Gmsh .msh (2.2, 4.1), VTU, Medit .mesh and TetGen .node/.ele";
+  std::string_view head = bytes.substr(0, 4096);
+  if (head.starts_with("\xEF\xBB\xBF")) head.remove_prefix(3);
+  const auto begin = head.find_first_not_of(" \t\r\n");
+  if (begin == std::string_view::npos) throw InputError(fmt::format("{}:1: the file holds only blanks; write the mesh again", name));
+  head.remove_prefix(begin);
+  if (head.front() == '$') return MeshFormat::kGmsh;
+  if (head.front() == '<') return MeshFormat::kVtu;
+  if (head.starts_with("MeshVersionFormatted") || (head.front() == '#' && extension == ".mesh")) return MeshFormat::kMedit;
+  if (head.starts_with("MFEM mesh")) throw InputError(fmt::format("{}:1: an MFEM mesh; {}: convert it", name, kReadable));
+  if (extension == ".meshb") throw InputError(fmt::format("{}: binary Medit is not read; save as ASCII .mesh", name));
+  if (head.starts_with("# vtk DataFile")) throw InputError(fmt::format("{}:1: a legacy VTK file; {}: save as .vtu", name, kReadable));
+  if (extension == ".mesh") return MeshFormat::kMedit;
+  if (extension == ".msh") return MeshFormat::kGmsh;
+  if (extension == ".stl" || extension == ".obj" || extension == ".ply" || extension == ".off")
+    throw InputError(fmt::format("{}: a surface ({}), not a volume mesh; make one with carillon-mesh {} -o OUT.msh", name, extension, name));
+  throw InputError(fmt::format("{}:1: not a mesh file that is known (it begins with {}); {}", name, quote_excerpt(head.substr(0, head.find('\n'))), kReadable));
+}
+
+std::string lower_extension(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension;
+}
+
+std::string_view view_of(std::span<const std::byte> bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
+
+}  // namespace
+
+TetMesh parse_mesh(std::span<const std::byte> bytes, const std::string& name, MeshFormat format) {
+  std::string_view text = view_of(bytes);
+  if (format == MeshFormat::kTetgen) {
+    const auto split = text.find('\0');
+    return parse_tetgen(text.substr(0, split), name + ".node", split == std::string_view::npos ? std::string_view{} : text.substr(split + 1),
+                        name + ".ele");
+  }
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a byte-order mark of UTF-8
+  if (format == MeshFormat::kGmsh) return parse_gmsh(text, name);
+  if (format == MeshFormat::kVtu) return parse_vtu(text, name);
+  return parse_medit(text, name);
+}
+
+TetMesh read_mesh(const std::filesystem::path& file) {
+  try {
+    const std::string extension = lower_extension(file);
+    if (extension == ".node" || extension == ".ele") {
+      const auto partner = [&](const char* wanted) { return extension == wanted ? file : std::filesystem::path(file).replace_extension(wanted); };
+      const std::string node = read_bytes(partner(".node"));
+      const std::string ele = read_bytes(partner(".ele"));
+      return parse_tetgen(node, partner(".node").string(), ele, partner(".ele").string());
+    }
+    const std::string bytes = read_bytes(file);
+    return parse_mesh(std::as_bytes(std::span(bytes)), file.string(), find_format(bytes, file.string(), extension));
+  } catch (const std::bad_alloc&) {
+    throw SystemError(fmt::format("{}: not enough memory to read the mesh; use a machine with more, or a coarser mesh", file.string()));
+  }
+}
+
+}  // namespace carillon::mesh

@@ -1,0 +1,410 @@
+// Method: one pass over the sections of a .msh file, versions 2.0-2.2 and 4.1, text and binary in either byte order; sections that are not
+//   about the mesh are skipped. Tags become indices at the end (assemble_mesh), so the order of the sections is free.
+// Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Gmsh's quadratic tetrahedron swaps the last two
+//   mid nodes against VTK's.
+// Deviations: $Periodic, $GhostElements, post-processing data and parametric coordinates are not used.
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <unordered_map>
+
+#include "precompute/mesh/assemble.hpp"
+
+namespace carillon::mesh {
+
+namespace {
+
+struct GmshType {
+  int nodes;
+  int dimension;
+  const char* name;  // plural
+};
+
+const std::unordered_map<int, GmshType>& gmsh_types() {
+  static const std::unordered_map<int, GmshType> types{
+      {1, {2, 1, "lines"}},        {2, {3, 2, "triangles"}},    {3, {4, 2, "quadrangles"}},  {4, {4, 3, "tetrahedra"}},   {5, {8, 3, "hexahedra"}},
+      {6, {6, 3, "prisms"}},       {7, {5, 3, "pyramids"}},     {8, {3, 1, "lines"}},        {9, {6, 2, "triangles"}},    {10, {9, 2, "quadrangles"}},
+      {11, {10, 3, "tetrahedra"}}, {12, {27, 3, "hexahedra"}},  {13, {18, 3, "prisms"}},     {14, {14, 3, "pyramids"}},   {15, {1, 0, "points"}},
+      {16, {8, 2, "quadrangles"}}, {17, {20, 3, "hexahedra"}},  {18, {15, 3, "prisms"}},     {19, {13, 3, "pyramids"}},   {20, {9, 2, "triangles"}},
+      {21, {10, 2, "triangles"}},  {22, {12, 2, "triangles"}},  {23, {15, 2, "triangles"}},  {26, {4, 1, "lines"}},       {27, {5, 1, "lines"}},
+      {28, {6, 1, "lines"}},       {29, {20, 3, "tetrahedra"}}, {30, {35, 3, "tetrahedra"}}, {31, {56, 3, "tetrahedra"}}};
+  return types;
+}
+
+using Group = std::pair<int, std::int32_t>;  // dimension, physical tag
+
+class GmshReader {
+ public:
+  GmshReader(std::string_view bytes, const std::string& name) : cursor_(bytes, name), group_budget_(4 * bytes.size() + 1024) {}
+  TetMesh read();
+
+ private:
+  void read_format();
+  void read_names();
+  void read_entities(bool partitioned);
+  void read_nodes_2();
+  void read_nodes_4();
+  void read_elements_2();
+  void read_elements_4();
+  void skip_section(std::string_view name, std::size_t place);
+  const GmshType& find_type(int type, std::size_t place) const;
+  void add_element(std::int64_t tag, int number, const GmshType& type, const std::vector<std::int32_t>& physicals, std::size_t place);
+  void name_groups();
+  void merge_repeated();
+  Vec3 read_point() {
+    Vec3 x{};
+    for (double& value : x) value = cursor_.real("a coordinate");
+    return x;
+  }
+
+  Cursor cursor_;
+  std::size_t group_budget_;
+  bool binary_ = false;
+  bool swap_ = false;
+  int version_ = 0;  // 2 or 4; 0 before $MeshFormat
+  RawMesh raw_;
+  std::map<Group, std::string> names_;
+  std::map<Group, std::vector<std::int32_t>> entity_physicals_;
+  std::map<Group, std::vector<RawMesh::Reference>> node_groups_;
+  std::map<Group, std::vector<std::int64_t>> tet_groups_;
+  std::array<std::int64_t, 64> tags_{};  // the nodes of the element being read
+};
+
+void GmshReader::read_format() {
+  const std::size_t place = cursor_.place();
+  const double version = cursor_.text_real("the version of the format");
+  const auto type = cursor_.text_int("the file type (0 text, 1 binary)", 0, 1);
+  const auto size = cursor_.text_int("the size of a real number", 1, 64);
+  if (version >= 2.0 && version < 2.3) {
+    version_ = 2;
+  } else if (version > 4.05 && version < 4.2) {
+    version_ = 4;
+  } else {
+    cursor_.fail(place, "Gmsh format {} is not read, only 2.2 and 4.1; convert it: gmsh FILE -save -format msh41 -o NEW.msh", version);
+  }
+  if (size != 8) cursor_.fail(place, "numbers of {} bytes are not read, only of 8; write the mesh with a 64-bit Gmsh", size);
+  cursor_.line();
+  binary_ = type == 1;
+  if (!binary_) return;
+  const std::size_t mark = cursor_.place();
+  cursor_.set_binary(false);
+  const auto one = cursor_.raw<std::uint32_t>("the byte-order mark");
+  if (one != 1 && one != 0x01000000U)
+    cursor_.fail(mark, "the byte-order mark of the binary file is {} and not 1; the file was damaged (copied as text?): copy it again", one);
+  swap_ = one != 1;
+  cursor_.set_binary(swap_);
+}
+
+void GmshReader::read_names() {
+  const std::size_t place = cursor_.place();
+  const auto count = cursor_.checked_count(cursor_.text_int("the number of physical names", INT64_MIN, INT64_MAX), 7, "physical names", place);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto dimension = static_cast<int>(cursor_.text_int("the dimension of a physical group", 0, 3));
+    const auto tag = static_cast<std::int32_t>(cursor_.text_int("the tag of a physical group", INT32_MIN, INT32_MAX));
+    const std::size_t at = cursor_.place();
+    const std::string_view text = cursor_.line();
+    const auto open = text.find('"');
+    const auto close = text.rfind('"');
+    if (open == std::string_view::npos || close <= open) cursor_.fail(at, "the name of physical group {} is not in double quotes; write it again", tag);
+    names_[{dimension, tag}] = std::string(text.substr(open + 1, close - open - 1));
+  }
+}
+
+void GmshReader::read_entities(bool partitioned) {
+  if (partitioned) {
+    cursor_.int64("the number of partitions");
+    const std::size_t place = cursor_.place();
+    const auto ghosts = cursor_.checked_count(cursor_.int64("the number of ghost entities"), binary_ ? 8 : 4, "ghost entities", place);
+    for (std::size_t i = 0; i < 2 * ghosts; ++i) cursor_.int32("a ghost entity");
+  }
+  std::array<std::size_t, 4> counts{};
+  for (auto& count : counts) {
+    const std::size_t place = cursor_.place();
+    count = cursor_.checked_count(cursor_.int64("the number of entities"), binary_ ? 28 : 8, "entities", place);
+  }
+  const auto read_list = [&](const char* what, auto&& use) {
+    const std::size_t place = cursor_.place();
+    const auto count = cursor_.checked_count(cursor_.int64(what), binary_ ? 4 : 2, what, place);
+    for (std::size_t i = 0; i < count; ++i) use(cursor_.int32(what));
+  };
+  for (int dimension = 0; dimension < 4; ++dimension) {
+    for (std::size_t i = 0; i < counts[static_cast<std::size_t>(dimension)]; ++i) {
+      const auto tag = cursor_.int32("the tag of an entity");
+      if (partitioned) {
+        cursor_.int32("the dimension of the parent entity");
+        cursor_.int32("the tag of the parent entity");
+        read_list("the partitions of an entity", [](std::int32_t) {});
+      }
+      for (int k = 0; k < (dimension == 0 ? 3 : 6); ++k) cursor_.real("the box of an entity");
+      auto& physicals = entity_physicals_[{dimension, tag}];
+      physicals.clear();
+      read_list("physical tags", [&](std::int32_t physical) { physicals.push_back(physical); });
+      if (dimension > 0) read_list("bounding entities", [](std::int32_t) {});
+    }
+  }
+}
+
+void GmshReader::read_nodes_2() {
+  const std::size_t at = cursor_.place();
+  const auto count = cursor_.checked_count(cursor_.text_int("the number of nodes", INT64_MIN, INT64_MAX), binary_ ? 28 : 8, "nodes", at);
+  cursor_.line();
+  raw_.nodes.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!binary_) cursor_.skip_space();
+    const std::size_t place = cursor_.place();
+    const auto tag = cursor_.int32("the number of a node");
+    raw_.add_node(cursor_, tag, read_point(), place);
+  }
+}
+
+void GmshReader::read_nodes_4() {
+  const std::size_t at = cursor_.place();
+  const auto blocks = cursor_.checked_count(cursor_.int64("the number of node blocks"), binary_ ? 20 : 8, "node blocks", at);
+  const auto count = cursor_.checked_count(cursor_.int64("the number of nodes"), binary_ ? 32 : 8, "nodes", at);
+  cursor_.int64("the smallest node number");
+  cursor_.int64("the greatest node number");
+  raw_.nodes.reserve(count);
+  std::vector<std::pair<std::int64_t, std::size_t>> tags;
+  std::size_t total = 0;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    const auto dimension = cursor_.int32("the dimension of a node block");
+    cursor_.int32("the entity of a node block");
+    const auto parametric = cursor_.int32("the parametric flag of a node block");
+    const std::size_t place = cursor_.place();
+    const auto size = cursor_.checked_count(cursor_.int64("the number of nodes of a block"), binary_ ? 32 : 8, "nodes in a block", place);
+    if (dimension < 0 || dimension > 3) cursor_.fail(place, "a node block has dimension {}; write the mesh again", dimension);
+    tags.clear();
+    for (std::size_t i = 0; i < size; ++i) {
+      if (!binary_) cursor_.skip_space();
+      const std::size_t here = cursor_.place();
+      tags.emplace_back(cursor_.int64("the number of a node"), here);
+    }
+    for (const auto& [tag, tag_place] : tags) {
+      raw_.add_node(cursor_, tag, read_point(), tag_place);
+      for (int k = 0; parametric != 0 && k < dimension; ++k) cursor_.real("a parametric coordinate");
+    }
+    total += size;
+  }
+  if (total != count)
+    cursor_.fail(at, "$Nodes announces {} nodes, but its blocks hold {}; the file was damaged: write the mesh again", count, total);
+}
+
+const GmshType& GmshReader::find_type(int type, std::size_t place) const {
+  const auto found = gmsh_types().find(type);
+  if (found == gmsh_types().end())
+    cursor_.fail(place, "element type {} is not known; only tetrahedra of 4 or 10 nodes make the body: mesh it again with Mesh.ElementOrder 1 or 2", type);
+  const GmshType& entry = found->second;
+  if (entry.dimension == 3 && type != 4 && type != 11)
+    cursor_.fail(place, "the mesh holds {} of {} nodes (element type {}); only tetrahedra of 4 or 10 nodes are read: mesh the volume with those",
+                 entry.name, entry.nodes, type);
+  return entry;
+}
+
+void GmshReader::add_element(std::int64_t tag, int number, const GmshType& type, const std::vector<std::int32_t>& physicals, std::size_t place) {
+  // An entity may claim thousands of groups; what they take together stays in proportion to the file.
+  const std::size_t entries = physicals.size() * static_cast<std::size_t>(type.nodes);
+  if (entries > group_budget_)
+    cursor_.fail(place, "the elements belong to more physical groups than a file of {} bytes explains; use fewer groups", cursor_.bytes().size());
+  group_budget_ -= entries;
+  if (type.dimension == 3) {
+    const auto position = static_cast<std::int64_t>(raw_.tet_tags.size());
+    raw_.add_tet(cursor_, tag, tags_.data(), type.nodes, number == 4 ? kVtkOrder : kGmshOrder, physicals.empty() ? 0 : physicals[0], place);
+    for (const auto physical : physicals) tet_groups_[{3, physical}].push_back(position);
+    return;
+  }
+  ++raw_.others[type.name];
+  for (const auto physical : physicals) {
+    auto& group = node_groups_[{type.dimension, physical}];
+    for (int i = 0; i < type.nodes; ++i) group.push_back({tags_[static_cast<std::size_t>(i)], place});
+  }
+}
+
+void GmshReader::read_elements_2() {
+  const std::size_t at = cursor_.place();
+  const auto count = cursor_.checked_count(cursor_.text_int("the number of elements", INT64_MIN, INT64_MAX), 8, "elements", at);
+  cursor_.line();
+  std::vector<std::int32_t> physicals;
+  std::size_t done = 0;
+  while (done < count) {
+    std::int32_t number = 0;
+    std::int32_t tag_count = 0;
+    std::size_t size = 1;
+    if (!binary_) cursor_.skip_space();
+    std::size_t place = cursor_.place();
+    std::int32_t tag = 0;
+    if (binary_) {
+      number = cursor_.int32("the type of a block of elements");
+      size = cursor_.checked_count(cursor_.int32("the number of elements of a block"), 8, "elements in a block", place);
+      tag_count = cursor_.int32("the number of tags");
+      if (size == 0 || size > count - done)
+        cursor_.fail(place, "a block of {} elements where {} are left of those announced; write the mesh again", size, count - done);
+    } else {
+      tag = cursor_.int32("the number of an element");
+      number = cursor_.int32("the type of an element");
+      tag_count = cursor_.int32("the number of tags");
+    }
+    const GmshType& type = find_type(number, place);
+    cursor_.checked_count(tag_count, binary_ ? 4 : 2, "tags of an element", place);
+    for (std::size_t i = 0; i < size; ++i) {
+      if (binary_) {
+        place = cursor_.place();
+        tag = cursor_.int32("the number of an element");
+      }
+      physicals.clear();
+      for (std::int32_t k = 0; k < tag_count; ++k) {
+        const auto value = cursor_.int32("a tag");
+        // A negative tag marks an element of the opposite orientation.
+        if (k == 0 && value != 0) physicals.push_back(type.dimension < 3 && value != INT32_MIN ? std::abs(value) : value);
+      }
+      for (int k = 0; k < type.nodes; ++k) tags_[static_cast<std::size_t>(k)] = cursor_.int32("a node of an element");
+      add_element(tag, number, type, physicals, place);
+    }
+    done += size;
+  }
+}
+
+void GmshReader::read_elements_4() {
+  const std::size_t at = cursor_.place();
+  const auto blocks = cursor_.checked_count(cursor_.int64("the number of element blocks"), binary_ ? 20 : 8, "element blocks", at);
+  const auto count = cursor_.checked_count(cursor_.int64("the number of elements"), binary_ ? 16 : 4, "elements", at);
+  cursor_.int64("the smallest element number");
+  cursor_.int64("the greatest element number");
+  const std::vector<std::int32_t> none;
+  std::size_t total = 0;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    if (!binary_) cursor_.skip_space();
+    const std::size_t block = cursor_.place();
+    const auto dimension = cursor_.int32("the dimension of an element block");
+    const auto entity = cursor_.int32("the entity of an element block");
+    const auto number = cursor_.int32("the type of an element block");
+    const auto size = cursor_.checked_count(cursor_.int64("the number of elements of a block"), binary_ ? 16 : 4, "elements in a block", block);
+    const GmshType& type = find_type(number, block);
+    if (dimension != type.dimension)
+      cursor_.fail(block, "a block of {} is said to have dimension {}; the file was damaged: write the mesh again", type.name, dimension);
+    const auto found = entity_physicals_.find({dimension, entity});
+    const auto& physicals = found == entity_physicals_.end() ? none : found->second;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (!binary_) cursor_.skip_space();
+      const std::size_t place = cursor_.place();
+      const auto tag = cursor_.int64("the number of an element");
+      for (int k = 0; k < type.nodes; ++k) tags_[static_cast<std::size_t>(k)] = cursor_.int64("a node of an element");
+      add_element(tag, number, type, physicals, place);
+    }
+    total += size;
+  }
+  if (total != count)
+    cursor_.fail(at, "$Elements announces {} elements, but its blocks hold {}; the file was damaged: write the mesh again", count, total);
+}
+
+void GmshReader::skip_section(std::string_view name, std::size_t place) {
+  const std::string end = fmt::format("\n$End{}", name);
+  const auto found = cursor_.bytes().find(end, cursor_.place() == 0 ? 0 : cursor_.place() - 1);
+  if (found == std::string_view::npos)
+    cursor_.fail(place, "section ${} has no $End{}; the file was cut short: write or copy it again", name, name);
+  cursor_.seek(found + 1);
+}
+
+void GmshReader::name_groups() {
+  const auto name_of = [&](const Group& group) {
+    const auto found = names_.find(group);
+    return found == names_.end() ? fmt::format("physical:{}", group.second) : found->second;
+  };
+  for (const auto& [group, name] : names_) raw_.node_sets[name];
+  for (auto& [group, references] : node_groups_) {
+    auto& set = raw_.node_sets[name_of(group)];
+    set.insert(set.end(), references.begin(), references.end());
+  }
+  for (auto& [group, positions] : tet_groups_) {
+    auto& set = raw_.tet_sets[name_of(group)];
+    set.insert(set.end(), positions.begin(), positions.end());
+  }
+}
+
+/// Version 2.2 writes an element of several physical groups once for each: the copies become one element of the first group.
+void GmshReader::merge_repeated() {
+  if (version_ != 2 || tet_groups_.size() < 2) return;
+  const std::size_t width = raw_.order == 1 ? 4 : 10;
+  const auto less = [&](std::size_t a, std::size_t b) {
+    const auto* x = raw_.tets.data() + a * width;
+    const auto* y = raw_.tets.data() + b * width;
+    return std::lexicographical_compare(x, x + width, y, y + width) || (std::equal(x, x + width, y) && a < b);
+  };
+  std::vector<std::size_t> order(raw_.tet_tags.size());
+  for (std::size_t e = 0; e < order.size(); ++e) order[e] = e;
+  std::sort(order.begin(), order.end(), less);
+  std::vector<std::int64_t> kept_at(order.size(), -1);
+  std::vector<char> dropped(order.size(), 0);
+  std::vector<std::size_t> first(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const auto* x = raw_.tets.data() + order[i] * width;
+    const bool same = i > 0 && std::equal(x, x + width, raw_.tets.data() + order[i - 1] * width);
+    first[order[i]] = same ? first[order[i - 1]] : order[i];
+    dropped[order[i]] = same && raw_.regions[order[i]] != raw_.regions[first[order[i]]];
+  }
+  std::size_t kept = 0;
+  for (std::size_t e = 0; e < order.size(); ++e) {
+    if (dropped[e]) continue;
+    kept_at[e] = static_cast<std::int64_t>(kept);
+    std::copy_n(raw_.tets.begin() + static_cast<std::ptrdiff_t>(e * width), width, raw_.tets.begin() + static_cast<std::ptrdiff_t>(kept * width));
+    raw_.tet_tags[kept] = raw_.tet_tags[e];
+    raw_.tet_places[kept] = raw_.tet_places[e];
+    raw_.regions[kept] = raw_.regions[e];
+    ++kept;
+  }
+  raw_.tets.resize(kept * width);
+  raw_.tet_tags.resize(kept);
+  raw_.tet_places.resize(kept);
+  raw_.regions.resize(kept);
+  for (auto& [group, positions] : tet_groups_)
+    for (auto& position : positions) position = kept_at[dropped[static_cast<std::size_t>(position)] ? first[static_cast<std::size_t>(position)]
+                                                                                                   : static_cast<std::size_t>(position)];
+}
+
+TetMesh GmshReader::read() {
+  std::set<std::string, std::less<>> seen;
+  while (cursor_.skip_space()) {
+    const std::size_t place = cursor_.place();
+    const std::string_view head = cursor_.line();
+    if (head.front() != '$' || head.size() < 2)
+      cursor_.fail(place, "expected a section such as $Nodes, found {}; the count of the section before it may be wrong: write the mesh again",
+                   quote_excerpt(head));
+    const std::string name(head.substr(1));
+    if (name == "NOD" || name == "ELM")
+      cursor_.fail(place, "Gmsh format 1 is not read, only 2.2 and 4.1; convert it: gmsh FILE -save -format msh41 -o NEW.msh");
+    const bool ours = name == "Nodes" || name == "Elements" || name == "Entities" || name == "MeshFormat" || name == "PartitionedEntities";
+    if (ours && !seen.insert(name).second) cursor_.fail(place, "a second section ${}; keep one mesh in a file", name);
+    if (ours && name != "MeshFormat" && version_ == 0) cursor_.fail(place, "${} comes before $MeshFormat; write the mesh again", name);
+    if (name == "MeshFormat") {
+      read_format();
+    } else if (name == "PhysicalNames") {
+      read_names();
+    } else if ((name == "Entities" || name == "PartitionedEntities") && version_ == 4) {
+      read_entities(name != "Entities");
+    } else if (name == "Nodes") {
+      version_ == 2 ? read_nodes_2() : read_nodes_4();
+    } else if (name == "Elements") {
+      version_ == 2 ? read_elements_2() : read_elements_4();
+    } else {
+      skip_section(name, place);
+    }
+    cursor_.skip_space();
+    const std::size_t end = cursor_.place();
+    const std::string_view tail = cursor_.line();
+    if (tail != "$End" + name)
+      cursor_.fail(end, "expected $End{}, found {}; the file was cut short or a count is wrong: write the mesh again", name,
+                   tail.empty() ? "the end of the file" : quote_excerpt(tail));
+  }
+  for (const char* needed : {"MeshFormat", "Nodes", "Elements"})
+    if (!seen.contains(needed))
+      cursor_.fail(cursor_.place(), "the file ends without a section ${}; it was cut short: write or copy it again", needed);
+  merge_repeated();
+  name_groups();
+  return assemble_mesh(std::move(raw_), cursor_, cursor_);
+}
+
+}  // namespace
+
+TetMesh parse_gmsh(std::string_view bytes, const std::string& name) { return GmshReader(bytes, name).read(); }
+
+}  // namespace carillon::mesh

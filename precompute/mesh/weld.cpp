@@ -1,0 +1,212 @@
+// Method: nodes are sorted into cells of a grid a thousand times coarser than the tolerance; twins are joined transitively. Twins are welded
+//   only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart.
+// Source: own.
+// Deviations: the tolerance is 1e-9 of the diagonal of the box of the nodes in use.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/mesh/check_parts.hpp"
+#include "precompute/mesh/faces.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::mesh {
+
+namespace {
+
+/// Joins the nodes in use that lie within `tolerance` of each other; true when there are any.
+bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& low, double tolerance, Parts& twins) {
+  const double cell = 1000.0 * tolerance;
+  struct Entry {
+    std::uint64_t key;
+    std::int32_t node;
+  };
+  const auto key_of = [](const std::array<std::int64_t, 3>& at) {
+    return static_cast<std::uint64_t>(at[0]) << 42 | static_cast<std::uint64_t>(at[1]) << 21 | static_cast<std::uint64_t>(at[2]);
+  };
+  const auto cell_of = [&](double x, double origin) { return 1 + static_cast<std::int64_t>(std::floor((x - origin) / cell)); };
+  std::vector<Entry> entries;
+  for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
+    if (used[i] == 0) continue;
+    const Vec3& x = mesh.nodes[i];
+    entries.push_back({key_of({cell_of(x[0], low[0]), cell_of(x[1], low[1]), cell_of(x[2], low[2])}), static_cast<std::int32_t>(i)});
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.key < b.key || (a.key == b.key && a.node < b.node); });
+  bool any = false;
+  const auto compare = [&](std::int32_t i, std::int32_t j) {
+    const Vec3& x = mesh.nodes[static_cast<std::size_t>(i)];
+    const Vec3& y = mesh.nodes[static_cast<std::size_t>(j)];
+    if (i == j || std::hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]) > tolerance) return;
+    twins.join(i, j);
+    any = true;
+  };
+  for (std::size_t n = 0; n < entries.size(); ++n) {
+    for (std::size_t m = n + 1; m < entries.size() && entries[m].key == entries[n].key; ++m) compare(entries[n].node, entries[m].node);
+    const Vec3& x = mesh.nodes[static_cast<std::size_t>(entries[n].node)];
+    std::array<std::int64_t, 3> from{}, to{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      from[k] = cell_of(x[k] - tolerance, low[k]);
+      to[k] = cell_of(x[k] + tolerance, low[k]);
+    }
+    if (from == to) continue;  // nearly always: the node keeps away from the borders of its cell
+    for (std::int64_t i = from[0]; i <= to[0]; ++i)
+      for (std::int64_t j = from[1]; j <= to[1]; ++j)
+        for (std::int64_t k = from[2]; k <= to[2]; ++k) {
+          const std::uint64_t key = key_of({i, j, k});
+          auto other = std::lower_bound(entries.begin(), entries.end(), key, [](const Entry& a, std::uint64_t b) { return a.key < b; });
+          for (; other != entries.end() && other->key == key; ++other) compare(entries[n].node, other->node);
+        }
+  }
+  return any;
+}
+
+/// Marks the corners and mid nodes of the pairs of boundary faces that would be one face if twins were one node.
+void mark_cracks(const TetMesh& mesh, const std::vector<std::int32_t>& twin_of, std::vector<char>& marked) {
+  // Faces by the nodes themselves first: what is shared already is no crack.
+  std::vector<char> single(static_cast<std::size_t>(4 * mesh.tet_count()), 0);
+  const auto slot = [](const Face& face) { return static_cast<std::size_t>(4 * static_cast<std::int64_t>(face.tet) + face.local); };
+  {
+    const auto faces = sort_faces(mesh);
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const bool before = i > 0 && same_corners(faces[i - 1], faces[i]);
+      const bool after = i + 1 < faces.size() && same_corners(faces[i], faces[i + 1]);
+      single[slot(faces[i])] = !before && !after;
+    }
+  }
+  const auto faces = sort_faces(mesh, twin_of);
+  for (std::size_t i = 1; i < faces.size(); ++i) {
+    if (!same_corners(faces[i - 1], faces[i]) || single[slot(faces[i - 1])] == 0 || single[slot(faces[i])] == 0) continue;
+    for (const Face& face : {faces[i - 1], faces[i]}) {
+      const auto tet = mesh.tet(face.tet);
+      const auto corners = kFaces[static_cast<std::size_t>(face.local)];
+      for (std::size_t k = 0; k < 3; ++k) {
+        marked[static_cast<std::size_t>(tet[static_cast<std::size_t>(corners[k])])] = 1;
+        if (mesh.order == 2)
+          marked[static_cast<std::size_t>(tet[static_cast<std::size_t>(4 + find_edge(corners[k], corners[(k + 1) % 3]))])] = 1;
+      }
+    }
+  }
+}
+
+struct MidNode {
+  std::int32_t high;  // the greater corner of the edge
+  std::int32_t mid;
+  std::int32_t tet;
+};
+
+/// Every edge of a quadratic mesh has one mid node: twins are marked for welding, different places are refused.
+void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::vector<std::int32_t>& twin_of,
+                     const std::vector<std::int32_t>& corner_of, std::vector<char>& marked) {
+  std::vector<std::size_t> begin(mesh.nodes.size() + 1, 0);
+  const auto ends = [&](std::int64_t e, std::size_t k) {
+    const auto tet = mesh.tet(e);
+    const auto a = corner_of[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[k][0])])];
+    const auto b = corner_of[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[k][1])])];
+    return std::pair{std::min(a, b), std::max(a, b)};
+  };
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (std::size_t k = 0; k < 6; ++k) ++begin[static_cast<std::size_t>(ends(e, k).first) + 1];
+  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<MidNode> edges(static_cast<std::size_t>(6 * mesh.tet_count()));
+  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
+  std::vector<std::array<std::int32_t, 2>> edge_of(mesh.nodes.size(), {-1, -1});
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto [low, high] = ends(e, k);
+      const auto mid = mesh.tet(e)[4 + k];
+      edges[next[static_cast<std::size_t>(low)]++] = {high, mid, static_cast<std::int32_t>(e)};
+      auto& known = edge_of[static_cast<std::size_t>(mid)];
+      if (known[0] >= 0 && known != std::array{low, high})
+        throw InputError(fmt::format("{}: node {} is the mid node of two different edges (one of them in element {}); write the quadratic mesh again, in the "
+                                     "node order of its format",
+                                     name, mid + 1, e + 1));
+      known = {low, high};
+    }
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (std::size_t k = 0; k < 4; ++k)
+      if (edge_of[static_cast<std::size_t>(mesh.tet(e)[k])][0] >= 0)
+        throw InputError(fmt::format("{}: node {} is a corner of element {} and the mid node of another; write the quadratic mesh again, in the node order of "
+                                     "its format",
+                                     name, mesh.tet(e)[k] + 1, e + 1));
+  for (std::size_t low = 0; low + 1 < begin.size(); ++low) {
+    const auto first = edges.begin() + static_cast<std::ptrdiff_t>(begin[low]);
+    const auto last = edges.begin() + static_cast<std::ptrdiff_t>(begin[low + 1]);
+    std::sort(first, last, [](const MidNode& x, const MidNode& y) { return x.high < y.high || (x.high == y.high && x.tet < y.tet); });
+    for (auto edge = first; edge != last; ++edge) {
+      if (edge == first || edge->high != (edge - 1)->high || edge->mid == (edge - 1)->mid) continue;
+      const auto before = edge - 1;
+      if (twin_of[static_cast<std::size_t>(edge->mid)] != twin_of[static_cast<std::size_t>(before->mid)])
+        throw InputError(fmt::format("{}: elements {} and {} share the edge of nodes {} and {}, but have different mid nodes ({} and {}) on it; write the "
+                                     "quadratic mesh again with one node per edge",
+                                     name, before->tet + 1, edge->tet + 1, low + 1, edge->high + 1, before->mid + 1, edge->mid + 1));
+      marked[static_cast<std::size_t>(edge->mid)] = marked[static_cast<std::size_t>(before->mid)] = 1;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, CheckReport& report) {
+  const std::size_t count = mesh.nodes.size();
+  std::vector<char> used(count, 0);
+  for (const auto node : mesh.tets) used[static_cast<std::size_t>(node)] = 1;
+  Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = 0; used[i] != 0 && k < 3; ++k) {
+      low[k] = std::min(low[k], mesh.nodes[i][k]);
+      high[k] = std::max(high[k], mesh.nodes[i][k]);
+    }
+  const double tolerance = 1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  if (!std::isfinite(tolerance)) throw InputError(fmt::format("{}: the coordinates are too large to compute with; give them in metres", name));
+  Parts twins(count);
+  const bool any = tolerance > 0.0 && join_twins(mesh, used, low, tolerance, twins);
+  std::vector<std::int32_t> identity(count), twin_of(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    identity[i] = static_cast<std::int32_t>(i);
+    twin_of[i] = twins.find(identity[i]);
+  }
+  if (!any) {
+    std::vector<char> marked(count, 0);
+    if (mesh.order == 2) match_mid_nodes(mesh, name, twin_of, identity, marked);
+    return identity;
+  }
+  // Twins within one element are not a crack: that element has no volume and is refused for it.
+  std::vector<char> barred(count, 0);
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+    const auto tet = mesh.tet(e);
+    for (std::size_t i = 0; i < tet.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        if (twin_of[static_cast<std::size_t>(tet[i])] == twin_of[static_cast<std::size_t>(tet[j])])
+          barred[static_cast<std::size_t>(twin_of[static_cast<std::size_t>(tet[i])])] = 1;
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    if (barred[static_cast<std::size_t>(twins.find(identity[i]))] != 0) twin_of[i] = identity[i];
+  std::vector<char> marked(count, 0);
+  mark_cracks(mesh, twin_of, marked);
+  // The first marked twin stands for the others.
+  const auto choose = [&] {
+    std::vector<std::int32_t> first(count, -1), stand(identity);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (marked[i] == 0) continue;
+      auto& chosen = first[static_cast<std::size_t>(twin_of[i])];
+      if (chosen < 0) chosen = identity[i];
+      stand[i] = chosen;
+    }
+    return stand;
+  };
+  std::vector<std::int32_t> stand = choose();
+  if (mesh.order == 2) {
+    match_mid_nodes(mesh, name, twin_of, stand, marked);
+    stand = choose();
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    report.welded += stand[i] != identity[i];
+    report.touching_nodes += used[i] != 0 && stand[i] == identity[i] && twin_of[i] != identity[i] && stand[static_cast<std::size_t>(twin_of[i])] != stand[i];
+  }
+  for (auto& node : mesh.tets) node = stand[static_cast<std::size_t>(node)];
+  return stand;
+}
+
+}  // namespace carillon::mesh

@@ -1,0 +1,159 @@
+// Method: one point entity for each node set, one volume entity for each region; nodes belong to the first volume.
+// Source: Gmsh reference manual, "MSH file format", version 4.1.
+// Deviations: entities are discrete (no geometry); the boxes of the volumes are that of the mesh.
+
+#include "precompute/mesh/write.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <iterator>
+
+#include "precompute/mesh/assemble.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::mesh {
+
+namespace {
+
+/// Numbers in the mode of the file; `end_line` is silent in binary.
+class Output {
+ public:
+  explicit Output(bool binary) : binary_(binary) {}
+  void text(const std::string& line) { bytes_ += line; }
+  void int32(std::int32_t value) { put(value); }
+  void size(std::size_t value) { put(static_cast<std::uint64_t>(value)); }
+  void real(double value) { put(value); }
+  void end_line() {
+    if (!binary_) bytes_ += '\n';
+  }
+  std::string take() { return std::move(bytes_); }
+
+ private:
+  template <class T>
+  void put(T value) {
+    if (binary_) {
+      const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+      bytes_.append(raw.data(), raw.size());
+    } else {
+      fmt::format_to(std::back_inserter(bytes_), "{} ", value);  // the shortest digits that read back the same
+    }
+  }
+  bool binary_;
+  std::string bytes_;
+};
+
+/// Quotes and line ends would break the list of names.
+std::string clean_name(std::string name) {
+  for (char& c : name)
+    if (c == '"' || c == '\n' || c == '\r') c = '_';
+  return name;
+}
+
+}  // namespace
+
+void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEncoding encoding) {
+  const bool binary = encoding == GmshEncoding::kBinary;
+  std::vector<std::int32_t> region_of(mesh.regions);
+  region_of.resize(static_cast<std::size_t>(mesh.tet_count()), 0);
+  std::vector<std::int32_t> regions(region_of);
+  std::sort(regions.begin(), regions.end());
+  regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
+  std::vector<std::pair<std::string, const std::vector<std::int32_t>*>> sets;
+  for (const auto& [name, nodes] : mesh.node_sets) {
+    const bool of_region = std::any_of(regions.begin(), regions.end(), [&](std::int32_t r) { return r != 0 && name == fmt::format("physical:{}", r); });
+    if (!of_region) sets.emplace_back(clean_name(name), &nodes);
+  }
+  Output out(binary);
+  out.text(fmt::format("$MeshFormat\n4.1 {} 8\n", binary ? 1 : 0));
+  if (binary) {
+    out.int32(1);
+    out.text("\n");
+  }
+  out.text("$EndMeshFormat\n");
+  if (!sets.empty()) {
+    out.text(fmt::format("$PhysicalNames\n{}\n", sets.size()));
+    for (std::size_t s = 0; s < sets.size(); ++s) out.text(fmt::format("0 {} \"{}\"\n", s + 1, sets[s].first));
+    out.text("$EndPhysicalNames\n");
+  }
+  std::vector<std::size_t> filled;  // sets that have nodes
+  for (std::size_t s = 0; s < sets.size(); ++s)
+    if (!sets[s].second->empty()) filled.push_back(s);
+  Vec3 low = mesh.nodes.empty() ? Vec3{} : mesh.nodes.front(), high = low;
+  for (const Vec3& x : mesh.nodes)
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], x[k]);
+      high[k] = std::max(high[k], x[k]);
+    }
+  out.text("$Entities\n");
+  for (const std::size_t count : {filled.size(), std::size_t{0}, std::size_t{0}, regions.size()}) out.size(count);
+  out.end_line();
+  for (const std::size_t s : filled) {
+    out.int32(static_cast<std::int32_t>(s + 1));
+    for (const double value : mesh.nodes[static_cast<std::size_t>(sets[s].second->front())]) out.real(value);
+    out.size(1);
+    out.int32(static_cast<std::int32_t>(s + 1));
+    out.end_line();
+  }
+  for (std::size_t r = 0; r < regions.size(); ++r) {
+    out.int32(static_cast<std::int32_t>(r + 1));
+    for (const Vec3& corner : {low, high})
+      for (const double value : corner) out.real(value);
+    out.size(regions[r] != 0);
+    if (regions[r] != 0) out.int32(regions[r]);
+    out.size(0);
+    out.end_line();
+  }
+  out.text(binary ? "\n$EndEntities\n$Nodes\n" : "$EndEntities\n$Nodes\n");
+  for (const std::size_t value : {std::size_t{1}, mesh.nodes.size(), std::size_t{1}, mesh.nodes.size()}) out.size(value);
+  out.end_line();
+  for (const std::int32_t value : {3, 1, 0}) out.int32(value);
+  out.size(mesh.nodes.size());
+  out.end_line();
+  for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
+    out.size(i + 1);
+    out.end_line();
+  }
+  for (const Vec3& x : mesh.nodes) {
+    for (const double value : x) out.real(value);
+    out.end_line();
+  }
+  std::size_t elements = static_cast<std::size_t>(mesh.tet_count());
+  for (const std::size_t s : filled) elements += sets[s].second->size();
+  out.text(binary ? "\n$EndNodes\n$Elements\n" : "$EndNodes\n$Elements\n");
+  std::size_t tag = 0;
+  // Elements of one region keep their order; runs of a region become one block each, so that the order of the whole is kept as well.
+  std::vector<std::size_t> run_begin;
+  for (std::size_t e = 0; e < region_of.size(); ++e)
+    if (e == 0 || region_of[e] != region_of[e - 1]) run_begin.push_back(e);
+  for (const std::size_t value : {run_begin.size() + filled.size(), elements, std::size_t{1}, elements}) out.size(value);
+  out.end_line();
+  run_begin.push_back(region_of.size());
+  for (std::size_t b = 0; b + 1 < run_begin.size(); ++b) {
+    const auto region = std::lower_bound(regions.begin(), regions.end(), region_of[run_begin[b]]) - regions.begin();
+    for (const std::int32_t value : {3, static_cast<std::int32_t>(region + 1), mesh.order == 1 ? 4 : 11}) out.int32(value);
+    out.size(run_begin[b + 1] - run_begin[b]);
+    out.end_line();
+    for (std::size_t e = run_begin[b]; e < run_begin[b + 1]; ++e) {
+      out.size(++tag);
+      const auto tet = mesh.tet(static_cast<std::int64_t>(e));
+      for (std::size_t k = 0; k < tet.size(); ++k) out.size(static_cast<std::size_t>(tet[static_cast<std::size_t>(kGmshOrder[k])]) + 1);
+      out.end_line();
+    }
+  }
+  for (const std::size_t s : filled) {
+    for (const std::int32_t value : {0, static_cast<std::int32_t>(s + 1), 15}) out.int32(value);
+    out.size(sets[s].second->size());
+    out.end_line();
+    for (const auto node : *sets[s].second) {
+      out.size(++tag);
+      out.size(static_cast<std::size_t>(node) + 1);
+      out.end_line();
+    }
+  }
+  out.text(binary ? "\n$EndElements\n" : "$EndElements\n");
+  config::write_file(file, out.take());
+}
+
+}  // namespace carillon::mesh
