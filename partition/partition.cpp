@@ -188,4 +188,6 @@ std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
   return position;
 }
 
+std::string metis_version() { return fmt::format("{}.{}.{}", METIS_VER_MAJOR, METIS_VER_MINOR, METIS_VER_SUBMINOR); }
+
 }  // namespace carillon::partition

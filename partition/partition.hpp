@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "runtime/config/error.hpp"
@@ -47,5 +48,8 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts);
 /// Fill-reducing order of a graph by METIS nested dissection: result[v] is the position of vertex v in the elimination order (zero-based),
 /// a permutation. This is MUMPS' PERM_IN less one. Throws SystemError when METIS runs out of memory.
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph);
+
+/// "5.1.0": the METIS that this was built with.
+std::string metis_version();
 
 }  // namespace carillon::partition

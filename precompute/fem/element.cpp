@@ -144,11 +144,9 @@ void add_stiffness(std::span<const Vec3> b, double lambda, double mu, double vol
 }
 
 void mirror_stiffness(ElementMatrices& out) {
-  const int n = out.nodes, width = 3 * n;
-  for (int i = 0; i < n; ++i)
-    for (int j = i + 1; j < n; ++j)
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) out.stiffness[(3 * j + c) * width + 3 * i + r] = out.stiffness[(3 * i + r) * width + 3 * j + c];
+  const int width = 3 * out.nodes;
+  for (int row = 0; row < width; ++row)
+    for (int column = row + 1; column < width; ++column) out.stiffness[column * width + row] = out.stiffness[row * width + column];
 }
 
 /// Gradients of the barycentric coordinates and the volume of a straight tetrahedron.

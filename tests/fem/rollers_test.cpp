@@ -1,10 +1,11 @@
 // A box on rollers (normal displacement and tangential traction zero on all six faces) has closed-form modes that are smooth, so it
 // measures the order of convergence: f = c/2 sqrt((i/a)^2 + (j/b)^2 + (k/c)^2), c = c_L with any index, c = c_T with two or three
 // (Demarest 1971; reproduced by direct substitution). The conditions hold single directions, which jobs cannot ask for, so the free K and M
-// are reduced here and solved by dense LAPACK-free Eigen.
+// are reduced here and solved with Eigen.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <Eigen/Sparse>
 #include <cmath>
 
 #include "precompute/fem/assemble.hpp"
@@ -17,28 +18,52 @@ namespace {
 constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
 const spec::Material kAluminium{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
 
-Eigen::MatrixXd reduce(const Mat matrix, const std::vector<PetscInt>& keep) {
-  const auto n = static_cast<PetscInt>(keep.size());
-  Eigen::Matrix<double, -1, -1, Eigen::RowMajor> dense(n, n);
-  petsc::check(MatGetValues(matrix, n, keep.data(), n, keep.data(), dense.data()));
-  return dense;
+using SparseMatrix = Eigen::SparseMatrix<double>;
+
+/// The rows and columns of one rank's matrix for which `number` is not negative.
+SparseMatrix reduce(const Mat matrix, const std::vector<int>& number, int size) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (PetscInt row = 0; row < static_cast<PetscInt>(number.size()); ++row) {
+    PetscInt count = 0;
+    const PetscInt* columns = nullptr;
+    const double* values = nullptr;
+    petsc::check(MatGetRow(matrix, row, &count, &columns, &values));
+    for (PetscInt i = 0; i < count; ++i)
+      if (number[row] >= 0 && number[columns[i]] >= 0) entries.emplace_back(number[row], number[columns[i]], values[i]);
+    petsc::check(MatRestoreRow(matrix, row, &count, &columns, &values));
+  }
+  SparseMatrix reduced(size, size);
+  reduced.setFromTriplets(entries.begin(), entries.end());
+  return reduced;
+}
+
+/// The lowest eigenfrequencies by subspace iteration with K^-1 M and Rayleigh-Ritz.
+std::vector<double> iterate_subspace(const SparseMatrix& k, const SparseMatrix& m) {
+  const Eigen::SimplicialLLT<SparseMatrix> factor(k);
+  Eigen::MatrixXd basis = Eigen::MatrixXd::Random(k.rows(), 16);
+  Eigen::VectorXd lambda;
+  for (int pass = 0; pass < 25; ++pass) {
+    basis = factor.solve(m * basis).eval();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(basis.transpose() * (k * basis), basis.transpose() * (m * basis));
+    basis = (basis * ritz.eigenvectors()).eval();
+    lambda = ritz.eigenvalues();
+  }
+  std::vector<double> frequencies;
+  for (int i = 0; i < 6; ++i) frequencies.push_back(std::sqrt(lambda[i]) / (2 * M_PI));
+  return frequencies;
 }
 
 std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, spec::Mass mass) {
   const Distribution pieces = distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {}, false);
   const System system = assemble(PETSC_COMM_WORLD, pieces.local, kAluminium, mass);
-  std::vector<PetscInt> keep;
+  std::vector<int> number;
+  int size = 0;
   for (int i = 0; i < pieces.local.free_nodes; ++i)
     for (int d = 0; d < 3; ++d) {
       const double x = pieces.local.nodes_m[i][d];
-      if (x > 1e-12 && x < kSize[d] - 1e-12) keep.push_back(3 * i + d);
+      number.push_back(x > 1e-12 && x < kSize[d] - 1e-12 ? size++ : -1);
     }
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(reduce(system.stiffness, keep), reduce(system.mass, keep),
-                                                                        Eigen::EigenvaluesOnly);
-  std::vector<double> frequencies;
-  for (int i = 0; i < std::min<int>(6, solver.eigenvalues().size()); ++i)
-    frequencies.push_back(std::sqrt(solver.eigenvalues()[i]) / (2 * M_PI));
-  return frequencies;
+  return iterate_subspace(reduce(system.stiffness, number, size), reduce(system.mass, number, size));
 }
 
 constexpr double kS110 = 9380.300465361, kP100 = 10329.70716337, kS210 = 13008.13627197;
@@ -52,7 +77,7 @@ double order_of_convergence(std::array<int, 3> coarse, int order, double exact, 
 }
 
 TEST(BoxOnRollers, has_its_first_modes_with_T10_to_a_thousandth) {
-  const auto f = calc_frequencies({6, 4, 2}, 2, spec::Mass::consistent);
+  const auto f = calc_frequencies({9, 6, 3}, 2, spec::Mass::consistent);
   EXPECT_NEAR(f[0] / kS110, 1, 1e-3);
   EXPECT_NEAR(f[1] / kP100, 1, 1e-3);
   EXPECT_NEAR(f[2] / kS210, 1, 2e-3);
@@ -60,7 +85,7 @@ TEST(BoxOnRollers, has_its_first_modes_with_T10_to_a_thousandth) {
 
 TEST(BoxOnRollers, converges_with_the_second_order_for_T4) { EXPECT_NEAR(order_of_convergence({6, 4, 2}, 1, kS110, 0), 2, 0.15); }
 
-TEST(BoxOnRollers, converges_with_the_fourth_order_for_T10) { EXPECT_NEAR(order_of_convergence({3, 2, 1}, 2, kS110, 0), 4, 0.35); }
+TEST(BoxOnRollers, converges_with_the_fourth_order_for_T10) { EXPECT_NEAR(order_of_convergence({6, 4, 2}, 2, kS110, 0), 4, 0.3); }
 
 TEST(BoxOnRollers, converges_from_below_with_lumped_T10) {
   const auto f = calc_frequencies({6, 4, 2}, 2, spec::Mass::lumped);
