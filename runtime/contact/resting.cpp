@@ -1,0 +1,51 @@
+// Method: at each point a spring and a damper that only push, f = max(0, k d + c d' g(d)), with g rising to 1 within kFullDepth so that the force
+//   begins without a jump; friction -mu f u / max(|u|, kCreep), so that a body on a slope creeps by less than kCreep.
+// Source: K. Hunt, E. Crossley (1975) for a damping that grows with depth; regularised Coulomb friction as in Simbody's own contacts.
+// Deviations: the points are found by the caller once a step, not at every evaluation.
+#include "runtime/contact/resting.hpp"
+
+#include <algorithm>
+
+namespace carillon::contact {
+namespace {
+
+constexpr double kFullDepth = 4e-6;  // m; a fifth of the depth under the body's own weight
+constexpr double kCreep = 2e-3;      // m/s
+
+}  // namespace
+
+void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::SpatialVec>& body_forces, SimTK::Vector_<SimTK::Vec3>&,
+                             SimTK::Vector&) const {
+  using SimTK::dot;
+  using SimTK::Vec3;
+  for (const RestingPoint& p : points_) {
+    const SimTK::MobilizedBody& a = matter_.getMobilizedBody(p.body_a);
+    const SimTK::MobilizedBody& b = matter_.getMobilizedBody(p.body_b);
+    const SimTK::Transform X_a = a.getBodyTransform(state) * p.frame_a, X_b = b.getBodyTransform(state) * p.frame_b;
+    TouchPoint t = p.touch;
+    place_touch(t, X_a, X_b);
+    if (t.depth_m <= 0.0) continue;
+    const Vec3 in_a = ~a.getBodyTransform(state) * t.where, in_b = ~b.getBodyTransform(state) * t.where;
+    const Vec3 u = a.findStationVelocityInGround(state, in_a) - b.findStationVelocityInGround(state, in_b);
+    const double un = dot(u, t.normal);
+    const double push = p.stiffness_n_m * t.depth_m - p.damping_n_s_m * un * std::min(1.0, t.depth_m / kFullDepth);
+    if (push <= 0.0) continue;
+    const Vec3 slide = u - un * t.normal;
+    const Vec3 force = push * t.normal - (p.friction * push / std::max(slide.norm(), kCreep)) * slide;
+    a.applyForceToBodyPoint(state, in_a, force, body_forces);
+    b.applyForceToBodyPoint(state, in_b, -force, body_forces);
+  }
+}
+
+SimTK::Real RestingForce::calcPotentialEnergy(const SimTK::State& state) const {
+  double energy = 0.0;
+  for (const RestingPoint& p : points_) {
+    TouchPoint t = p.touch;
+    place_touch(t, matter_.getMobilizedBody(p.body_a).getBodyTransform(state) * p.frame_a,
+                matter_.getMobilizedBody(p.body_b).getBodyTransform(state) * p.frame_b);
+    if (t.depth_m > 0.0) energy += 0.5 * p.stiffness_n_m * t.depth_m * t.depth_m;
+  }
+  return energy;
+}
+
+}  // namespace carillon::contact

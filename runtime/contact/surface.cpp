@@ -1,0 +1,191 @@
+// Method: the bank's triangles are checked to be a closed oriented manifold, split into components by shared edges, and the components with
+//   positive signed volume (outer walls) become one Simbody TriangleMesh. Curvature by a least-squares paraboloid.
+// Source: M. Sherman, A. Seth, S. Delp, "Simbody: multibody dynamics for biomedical research" (2011), mesh contact geometry.
+// Deviations: none.
+#include "runtime/contact/surface.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::contact {
+namespace {
+
+using SimTK::Vec3;
+
+struct Selection {
+  SimTK::Array_<Vec3> vertices;
+  SimTK::Array_<int> indices;
+  std::vector<std::int32_t> bank_triangle;
+};
+
+using EdgeMap = std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t>;  // directed edge to its triangle
+
+/// Checks that every edge has exactly two triangles that run along it in opposite directions.
+EdgeMap make_directed_edges(const Vertices& vertices, const Triangles& triangles, const std::string& body) {
+  const auto count = static_cast<std::int32_t>(vertices.size());
+  if (triangles.empty()) {
+    throw InputError(fmt::format("body '{}': its bank has no surface triangles; make the bank again", body));
+  }
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    for (const double x : vertices[v]) {
+      if (!std::isfinite(x)) throw InputError(fmt::format("body '{}': surface vertex {} is not a finite point; make the bank again", body, v));
+    }
+  }
+  EdgeMap edges;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const auto& corners = triangles[t];
+    for (int k = 0; k < 3; ++k) {
+      if (corners[k] < 0 || corners[k] >= count) {
+        throw InputError(
+            fmt::format("body '{}': surface triangle {} names vertex {}, but there are {} vertices; make the bank again", body, t, corners[k], count));
+      }
+    }
+    for (int k = 0; k < 3; ++k) {
+      const auto edge = std::make_pair(corners[k], corners[(k + 1) % 3]);
+      if (edge.first == edge.second || !edges.emplace(edge, static_cast<std::int32_t>(t)).second) {
+        throw InputError(fmt::format(
+            "body '{}': the surface is not a manifold at edge {}-{} (triangle {}): more than two triangles meet there or two disagree about "
+            "which side is outside; mend the mesh and make the bank again",
+            body, edge.first, edge.second, t));
+      }
+    }
+  }
+  for (const auto& [edge, triangle] : edges) {
+    if (!edges.count({edge.second, edge.first})) {
+      throw InputError(fmt::format("body '{}': the surface is open at edge {}-{} (triangle {}); close the mesh and make the bank again", body,
+                                   edge.first, edge.second, triangle));
+    }
+  }
+  return edges;
+}
+
+std::vector<std::int32_t> find_components(const Triangles& triangles, const EdgeMap& edges) {
+  std::vector<std::int32_t> parent(triangles.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](std::int32_t t) {
+    while (parent[t] != t) t = parent[t] = parent[parent[t]];
+    return t;
+  };
+  for (const auto& [edge, triangle] : edges) {
+    const auto a = root(triangle);
+    const auto b = root(edges.at({edge.second, edge.first}));
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = root(static_cast<std::int32_t>(t));
+  return parent;
+}
+
+Vec3 corner(const Vertices& vertices, const Triangles& triangles, std::int32_t triangle, int k) {
+  const auto& x = vertices[triangles[triangle][k]];
+  return {x[0], x[1], x[2]};
+}
+
+Selection select_outer(const Vertices& vertices, const Triangles& triangles, const std::string& body) {
+  const auto component = find_components(triangles, make_directed_edges(vertices, triangles, body));
+  Vec3 origin = corner(vertices, triangles, 0, 0);
+  std::map<std::int32_t, double> volume;  // six times
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const auto i = static_cast<std::int32_t>(t);
+    const Vec3 a = corner(vertices, triangles, i, 0) - origin, b = corner(vertices, triangles, i, 1) - origin, c = corner(vertices, triangles, i, 2) - origin;
+    volume[component[t]] += SimTK::dot(a, SimTK::cross(b, c));
+    const Vec3 twice_area = SimTK::cross(b - a, c - a);
+    if (!(twice_area.norm() > 1e-14 * (b - a).normSqr())) {
+      throw InputError(fmt::format("body '{}': surface triangle {} has no area; mend the mesh and make the bank again", body, t));
+    }
+  }
+  Selection s;
+  std::vector<int> renumbered(vertices.size(), -1);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    if (volume[component[t]] <= 0.0) continue;
+    s.bank_triangle.push_back(static_cast<std::int32_t>(t));
+    for (const auto v : triangles[t]) {
+      if (renumbered[v] < 0) {
+        renumbered[v] = static_cast<int>(s.vertices.size());
+        const auto& x = vertices[v];
+        s.vertices.push_back(Vec3(x[0], x[1], x[2]));
+      }
+      s.indices.push_back(renumbered[v]);
+    }
+  }
+  if (s.indices.empty()) {
+    throw InputError(fmt::format("body '{}': the surface is inside out (its signed volume is negative); turn the triangles and make the bank again", body));
+  }
+  return s;
+}
+
+SimTK::ContactGeometry::TriangleMesh make_mesh(const Vertices& vertices, const Triangles& triangles, const std::string& body,
+                                               std::vector<std::int32_t>& bank_triangle) {
+  const Selection s = select_outer(vertices, triangles, body);
+  bank_triangle = s.bank_triangle;
+  try {
+    return {s.vertices, s.indices, false};
+  } catch (const SimTK::Exception::Base& e) {
+    throw InputError(fmt::format("body '{}': Simbody refuses the surface as contact geometry ({}); mend the mesh", body, e.what()));
+  }
+}
+
+}  // namespace
+
+Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std::string& body)
+    : mesh_(make_mesh(vertices, triangles, body, bank_triangle_)) {
+  neighbours_.resize(mesh_.getNumVertices());
+  face_ridges_.resize(mesh_.getNumFaces());
+  std::vector<double> lengths;
+  for (int e = 0; e < mesh_.getNumEdges(); ++e) {
+    const int a = mesh_.getEdgeVertex(e, 0), b = mesh_.getEdgeVertex(e, 1);
+    neighbours_[a].push_back(b);
+    neighbours_[b].push_back(a);
+    const Vec3 along = vertex(b) - vertex(a);
+    lengths.push_back(along.norm());
+    RidgeEdge ridge;
+    ridge.vertices = {a, b};
+    for (int k = 0; k < 2; ++k) {
+      const int f = mesh_.getEdgeFace(e, k);
+      Vec3 in = mesh_.findCentroid(f) - vertex(a);
+      in -= along * (SimTK::dot(in, along) / along.normSqr());
+      ridge.into_face[k] = in / in.norm();
+    }
+    // A flat or hollow edge can never be the one that touches first.
+    const Vec3 n0 = Vec3(mesh_.getFaceNormal(mesh_.getEdgeFace(e, 0)));
+    if (SimTK::dot(n0, ridge.into_face[1]) > -1e-3) continue;
+    for (int k = 0; k < 2; ++k) face_ridges_[mesh_.getEdgeFace(e, k)].push_back(static_cast<int>(ridges_.size()));
+    ridges_.push_back(ridge);
+  }
+  std::nth_element(lengths.begin(), lengths.begin() + lengths.size() / 2, lengths.end());
+  edge_m_ = lengths[lengths.size() / 2];
+  Vec3 low(SimTK::Infinity), high(-SimTK::Infinity);
+  for (int v = 0; v < mesh_.getNumVertices(); ++v) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], vertex(v)[k]);
+      high[k] = std::max(high[k], vertex(v)[k]);
+    }
+  }
+  middle_m_ = (low + high) / 2;
+  size_m_ = (high - low).norm();
+  thickness_m_ = SimTK::min(high - low);
+}
+
+double Surface::calc_curvature(const Vec3& point, const Vec3& normal) const {
+  const double reach = std::max(2.5 * edge_m_, 0.04 * size_m_);
+  double numerator = 0.0, denominator = 0.0;
+  for (int v = 0; v < mesh_.getNumVertices(); ++v) {
+    const Vec3 d = vertex(v) - point;
+    const double dist2 = d.normSqr();
+    if (dist2 > reach * reach || dist2 == 0.0) continue;
+    const double drop = -SimTK::dot(d, normal);
+    const double half_r2 = 0.5 * std::max(dist2 - drop * drop, 1e-12 * dist2);
+    numerator += drop * half_r2;
+    denominator += half_r2 * half_r2;
+  }
+  return denominator > 0.0 ? numerator / denominator : 0.0;
+}
+
+}  // namespace carillon::contact

@@ -1,0 +1,58 @@
+// The outer surface of a body as Simbody's mesh contact geometry, with the neighbourhoods that tell which features can touch.
+#pragma once
+
+#include <SimTKmath.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace carillon::contact {
+
+using Vertices = std::vector<std::array<double, 3>>;
+using Triangles = std::vector<std::array<std::int32_t, 3>>;
+
+/// An edge that two other faces could rest on: convex, with its two faces.
+struct RidgeEdge {
+  std::array<int, 2> vertices{};
+  std::array<SimTK::Vec3, 2> into_face{};  // unit, in the plane of each face, at right angles to the edge, pointing into the face
+};
+
+/// The closed outer surface of a bank, in the frame of its mesh. Inner walls (components of negative volume) are left out: nothing gets there.
+class Surface {
+ public:
+  /// Throws InputError when the surface is empty, open, not a manifold, degenerate or inside out; the message names `body` and the place.
+  Surface(const Vertices& vertices_m, const Triangles& triangles, const std::string& body);
+
+  const SimTK::ContactGeometry::TriangleMesh& mesh() const { return mesh_; }
+  const SimTK::Vec3& vertex(int v) const { return mesh_.getVertexPosition(v); }
+  const std::vector<int>& neighbours(int v) const { return neighbours_[v]; }
+  /// Ridges of a face, as indices into ridges().
+  const std::vector<int>& face_ridges(int face) const { return face_ridges_[face]; }
+  const RidgeEdge& ridge(int r) const { return ridges_[r]; }
+
+  /// The bank's triangle of a face of mesh(); its corners are in the same order.
+  std::int32_t bank_triangle(int face) const { return bank_triangle_[face]; }
+
+  double size_m() const { return size_m_; }            // diagonal of the bounding box
+  double thickness_m() const { return thickness_m_; }  // shortest side of the bounding box
+  const SimTK::Vec3& middle_m() const { return middle_m_; }
+  double radius_m() const { return size_m_ / 2; }  // of a ball about the middle that holds everything
+
+  /// Curvature [1/m] of the surface about a point whose outward normal is `normal`: the paraboloid that fits the vertices nearby best.
+  double calc_curvature(const SimTK::Vec3& point, const SimTK::Vec3& normal) const;
+
+ private:
+  std::vector<std::int32_t> bank_triangle_;  // before mesh_, whose making fills it
+  SimTK::ContactGeometry::TriangleMesh mesh_;
+  std::vector<std::vector<int>> neighbours_;
+  std::vector<std::vector<int>> face_ridges_;
+  std::vector<RidgeEdge> ridges_;
+  SimTK::Vec3 middle_m_{0};
+  double size_m_ = 0.0;
+  double thickness_m_ = 0.0;
+  double edge_m_ = 0.0;  // median length of an edge
+};
+
+}  // namespace carillon::contact
