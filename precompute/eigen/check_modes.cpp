@@ -1,0 +1,161 @@
+// Method:     Residuals and Gram matrix with matrix-matrix products over blocks of columns.
+// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 15.9 (a residual bounds the error of its eigenvalue).
+// Deviations: none.
+#include "precompute/eigen/check_modes.hpp"
+
+#include <petscblaslapack.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+
+constexpr double kTieTolerance = 1e-6;
+
+// A dense matrix's own rows, column-major.
+struct LocalColumns {
+  explicit LocalColumns(Mat dense) : mat(dense) {
+    PetscInt first = 0;
+    PetscInt last = 0;
+    check(MatGetOwnershipRange(dense, &first, &last));
+    check(MatGetSize(dense, nullptr, &columns));
+    check(MatDenseGetLDA(dense, &stride));
+    rows = last - first;
+    check(MatDenseGetArray(dense, &values));
+  }
+  ~LocalColumns() { (void)MatDenseRestoreArray(mat, &values); }
+  LocalColumns(const LocalColumns&) = delete;
+  LocalColumns& operator=(const LocalColumns&) = delete;
+  double* column(PetscInt j) const { return values + static_cast<std::size_t>(j) * static_cast<std::size_t>(stride); }
+
+  Mat mat = nullptr;
+  PetscScalar* values = nullptr;
+  PetscInt rows = 0;
+  PetscInt columns = 0;
+  PetscInt stride = 0;
+};
+
+// C = A^T B over all ranks, (a.columns, b.columns) column-major.
+std::vector<double> calc_gram(MPI_Comm comm, const LocalColumns& a, const LocalColumns& b) {
+  std::vector<double> gram(static_cast<std::size_t>(a.columns) * static_cast<std::size_t>(b.columns), 0.0);
+  PetscBLASInt m = a.columns;
+  PetscBLASInt n = b.columns;
+  PetscBLASInt k = a.rows;
+  PetscBLASInt lda = std::max(a.stride, 1);
+  PetscBLASInt ldb = std::max(b.stride, 1);
+  double one = 1;
+  double zero = 0;
+  if (k > 0) BLASgemm_("T", "N", &m, &n, &k, &one, a.values, &lda, b.values, &ldb, &zero, gram.data(), &m);
+  MPI_Allreduce(MPI_IN_PLACE, gram.data(), static_cast<int>(gram.size()), MPI_DOUBLE, MPI_SUM, comm);
+  return gram;
+}
+
+}  // namespace
+
+ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<double>& lambda, Mat shapes) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
+  const std::size_t modes = lambda.size();
+  ModeErrors errors;
+  if (modes == 0) return errors;
+  petsc::MatHandle m_shapes;
+  check(MatMatMult(mass, shapes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, m_shapes.out()));
+  {
+    const LocalColumns phi(shapes);
+    const LocalColumns m_phi(m_shapes);
+    std::vector<double> squares(modes, 0.0);
+    for (std::size_t j = 0; j < modes; ++j) {
+      const auto c = static_cast<PetscInt>(j);
+      for (PetscInt i = 0; i < phi.rows; ++i) squares[j] += phi.column(c)[i] * m_phi.column(c)[i];
+    }
+    MPI_Allreduce(MPI_IN_PLACE, squares.data(), static_cast<int>(modes), MPI_DOUBLE, MPI_SUM, comm);
+    for (std::size_t j = 0; j < modes; ++j) {
+      const double factor = 1 / std::sqrt(squares[j]);
+      const auto c = static_cast<PetscInt>(j);
+      for (PetscInt i = 0; i < phi.rows; ++i) {
+        phi.column(c)[i] *= factor;
+        m_phi.column(c)[i] *= factor;
+      }
+    }
+    const std::vector<double> gram = calc_gram(comm, phi, m_phi);
+    for (std::size_t j = 0; j < modes; ++j) {
+      for (std::size_t i = 0; i < modes; ++i) {
+        errors.orthonormality = std::max(errors.orthonormality, std::abs(gram[j * modes + i] - (i == j ? 1.0 : 0.0)));
+      }
+    }
+  }
+  petsc::MatHandle k_shapes;
+  check(MatMatMult(stiffness, shapes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, k_shapes.out()));
+  const LocalColumns k_phi(k_shapes);
+  const LocalColumns m_phi(m_shapes);
+  std::vector<double> squares(2 * modes, 0.0);
+  for (std::size_t j = 0; j < modes; ++j) {
+    const double* k = k_phi.column(static_cast<PetscInt>(j));
+    const double* m = m_phi.column(static_cast<PetscInt>(j));
+    for (PetscInt i = 0; i < k_phi.rows; ++i) {
+      const double rest = k[i] - lambda[j] * m[i];
+      squares[2 * j] += rest * rest;
+      squares[2 * j + 1] += m[i] * m[i];
+    }
+  }
+  MPI_Allreduce(MPI_IN_PLACE, squares.data(), static_cast<int>(squares.size()), MPI_DOUBLE, MPI_SUM, comm);
+  for (std::size_t j = 0; j < modes; ++j) {
+    errors.residual.push_back(std::sqrt(squares[2 * j]) / (lambda[j] * std::sqrt(squares[2 * j + 1])));
+  }
+  return errors;
+}
+
+void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(shapes), &comm));
+  int rank = 0;
+  int size = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
+  const LocalColumns phi(shapes);
+  const auto modes = static_cast<std::size_t>(phi.columns);
+  std::vector<double> largest(modes, 0.0);
+  for (std::size_t j = 0; j < modes; ++j) {
+    const double* column = phi.column(static_cast<PetscInt>(j));
+    for (PetscInt i = 0; i < phi.rows; ++i) largest[j] = std::max(largest[j], std::abs(column[i]));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, largest.data(), static_cast<int>(modes), MPI_DOUBLE, MPI_MAX, comm);
+
+  // Each rank's first candidate by (x, y, z, axis); all ranks' candidates meet everywhere.
+  using Candidate = std::array<double, 5>;  // x, y, z, axis, entry; entry 0: none
+  std::vector<Candidate> mine(modes, Candidate{0, 0, 0, 0, 0});
+  const auto comes_first = [](const Candidate& a, const Candidate& b) {
+    if ((a[4] != 0) != (b[4] != 0)) return a[4] != 0;
+    return std::tie(a[0], a[1], a[2], a[3]) < std::tie(b[0], b[1], b[2], b[3]);
+  };
+  for (std::size_t j = 0; j < modes; ++j) {
+    const double* column = phi.column(static_cast<PetscInt>(j));
+    for (PetscInt i = 0; i < phi.rows; ++i) {
+      if (std::abs(column[i]) < (1 - kTieTolerance) * largest[j]) continue;
+      const Vec3& x = positions[static_cast<std::size_t>(i / 3)];
+      const Candidate candidate{x[0], x[1], x[2], static_cast<double>(i % 3), column[i]};
+      if (comes_first(candidate, mine[j])) mine[j] = candidate;
+    }
+  }
+  std::vector<Candidate> all(modes * static_cast<std::size_t>(size));
+  const int count = static_cast<int>(5 * modes);
+  MPI_Allgather(mine.data(), count, MPI_DOUBLE, all.data(), count, MPI_DOUBLE, comm);
+  for (std::size_t j = 0; j < modes; ++j) {
+    Candidate first = all[j];
+    for (std::size_t r = 1; r < static_cast<std::size_t>(size); ++r) {
+      if (comes_first(all[r * modes + j], first)) first = all[r * modes + j];
+    }
+    if (first[4] >= 0) continue;
+    double* column = phi.column(static_cast<PetscInt>(j));
+    for (PetscInt i = 0; i < phi.rows; ++i) column[i] = -column[i];
+  }
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,24 @@
+// What a set of modes is worth, measured from K and M alone.
+#pragma once
+
+#include <petscmat.h>
+
+#include <vector>
+
+#include "precompute/eigen/solve_modes.hpp"
+
+namespace carillon::eigen {
+
+struct ModeErrors {
+  std::vector<double> residual;  // (modes) ||K phi - lambda M phi||_2 / (lambda ||M phi||_2)
+  double orthonormality = 0;     // max |phi_i^T M phi_j - delta_ij|
+};
+
+/// Normalises each column to phi^T M phi = 1 and measures residuals and orthonormality. shapes: (3n, modes) dense. Collective.
+ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<double>& lambda, Mat shapes);
+
+/// Turns each column so that its entry of largest magnitude is positive; among entries as large to 1e-6 the one whose node comes first by
+/// x, y, z decides, so that the partition has no say. Collective.
+void orient_shapes(Mat shapes, const std::vector<Vec3>& positions);
+
+}  // namespace carillon::eigen

@@ -1,0 +1,78 @@
+// Method:     Cholesky of M, tridiagonal QR of L^-1 K L^-T. Every rank solves the same gathered matrices and keeps its rows.
+// Source:     Golub, Van Loan, Matrix Computations, section 8.7; LAPACK's dsygvd.
+// Deviations: none.
+#include "precompute/eigen/dense_modes.hpp"
+
+#include <fmt/core.h>
+#include <petscblaslapack.h>
+
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+
+// The whole matrix, column-major, on every rank. Rank 0's sum is broadcast so that all work on the same bits.
+std::vector<double> gather_dense(Mat matrix, PetscInt n) {
+  std::vector<double> dense(static_cast<std::size_t>(n) * static_cast<std::size_t>(n), 0.0);
+  PetscInt first = 0;
+  PetscInt last = 0;
+  check(MatGetOwnershipRange(matrix, &first, &last));
+  for (PetscInt row = first; row < last; ++row) {
+    PetscInt count = 0;
+    const PetscInt* columns = nullptr;
+    const PetscScalar* values = nullptr;
+    check(MatGetRow(matrix, row, &count, &columns, &values));
+    for (PetscInt k = 0; k < count; ++k) dense[static_cast<std::size_t>(columns[k]) * static_cast<std::size_t>(n) + static_cast<std::size_t>(row)] = values[k];
+    check(MatRestoreRow(matrix, row, &count, &columns, &values));
+  }
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(matrix), &comm));
+  MPI_Allreduce(MPI_IN_PLACE, dense.data(), static_cast<int>(dense.size()), MPI_DOUBLE, MPI_SUM, comm);
+  return dense;
+}
+
+}  // namespace
+
+DensePairs solve_dense(Mat stiffness, Mat mass) {
+  PetscInt n = 0;
+  check(MatGetSize(stiffness, &n, nullptr));
+  std::vector<double> k = gather_dense(stiffness, n);
+  std::vector<double> m = gather_dense(mass, n);
+  DensePairs pairs;
+  pairs.lambda.resize(static_cast<std::size_t>(n));
+  PetscBLASInt type = 1;
+  PetscBLASInt size = n;
+  PetscBLASInt info = 0;
+  PetscBLASInt work_size = 64 * std::max(size, 1) + 3 * size;
+  std::vector<double> work(static_cast<std::size_t>(work_size));
+  LAPACKsygv_(&type, "V", "L", &size, k.data(), &size, m.data(), &size, pairs.lambda.data(), work.data(), &work_size, &info);
+  if (info != 0) {
+    throw SolveError(fmt::format("The dense eigensolver failed (LAPACK dsygv: {}){}", info,
+                                 info > n ? ": the mass matrix is not positive definite. Look for elements without volume." : "."));
+  }
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
+  PetscInt first = 0;
+  PetscInt last = 0;
+  check(MatGetOwnershipRange(stiffness, &first, &last));
+  check(MatCreateDense(comm, last - first, PETSC_DECIDE, n, n, nullptr, pairs.vectors.out()));
+  PetscScalar* own = nullptr;
+  PetscInt stride = 0;
+  check(MatDenseGetLDA(pairs.vectors, &stride));
+  check(MatDenseGetArrayWrite(pairs.vectors, &own));
+  for (PetscInt j = 0; j < n; ++j) {
+    for (PetscInt row = first; row < last; ++row) {
+      own[static_cast<std::size_t>(j) * static_cast<std::size_t>(stride) + static_cast<std::size_t>(row - first)] =
+          k[static_cast<std::size_t>(j) * static_cast<std::size_t>(n) + static_cast<std::size_t>(row)];
+    }
+  }
+  check(MatDenseRestoreArrayWrite(pairs.vectors, &own));
+  check(MatAssemblyBegin(pairs.vectors, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(pairs.vectors, MAT_FINAL_ASSEMBLY));
+  return pairs;
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,271 @@
+// Method:     Multifrontal L D L^T of K - sigma M with 1x1 and 2x2 pivots; the entries stay on the ranks that assembled them, the analysis
+//             is sequential under a METIS order handed in, right-hand sides and solutions are distributed.
+// Source:     MUMPS 5.5.1 users' guide, sections 3, 5 and 6. The inertia: Parlett, The symmetric eigenvalue problem, 1998, section 3.3.
+// Deviations: PETSc's own interface to MUMPS is not used, for it cannot hand an order to a distributed matrix, and Debian's MUMPS is built
+//             without METIS.
+#include <dmumps_c.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+
+#include "precompute/eigen/shifted_factor.hpp"
+#include "precompute/petsc/handle.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+constexpr int kJobInit = -1;
+constexpr int kJobEnd = -2;
+constexpr int kJobAnalyse = 1;
+constexpr int kJobFactorise = 2;
+constexpr int kJobSolve = 3;
+
+using petsc::check;
+
+// Calls visit(row, column, k, m) for every entry of the lower triangle of the union of both patterns, own rows in order.
+template <typename Visit>
+void visit_lower_entries(Mat stiffness, Mat mass, Visit&& visit) {
+  PetscInt first = 0;
+  PetscInt last = 0;
+  check(MatGetOwnershipRange(stiffness, &first, &last));
+  for (PetscInt row = first; row < last; ++row) {
+    PetscInt k_count = 0;
+    PetscInt m_count = 0;
+    const PetscInt* k_columns = nullptr;
+    const PetscInt* m_columns = nullptr;
+    const PetscScalar* k_values = nullptr;
+    const PetscScalar* m_values = nullptr;
+    check(MatGetRow(stiffness, row, &k_count, &k_columns, &k_values));
+    check(MatGetRow(mass, row, &m_count, &m_columns, &m_values));
+    PetscInt k = 0;
+    PetscInt m = 0;
+    while (true) {
+      const PetscInt k_column = k < k_count ? k_columns[k] : PETSC_MAX_INT;
+      const PetscInt m_column = m < m_count ? m_columns[m] : PETSC_MAX_INT;
+      const PetscInt column = std::min(k_column, m_column);
+      if (column > row) break;
+      visit(row, column, k_column == column ? k_values[k] : 0.0, m_column == column ? m_values[m] : 0.0);
+      if (k_column == column) ++k;
+      if (m_column == column) ++m;
+    }
+    check(MatRestoreRow(mass, row, &m_count, &m_columns, &m_values));
+    check(MatRestoreRow(stiffness, row, &k_count, &k_columns, &k_values));
+  }
+}
+
+const char* find_ordering_name(int infog7) {
+  switch (infog7) {
+    case 0:
+      return "AMD";
+    case 1:
+      return "METIS nested dissection (given)";
+    case 2:
+      return "AMF";
+    case 3:
+      return "SCOTCH";
+    case 4:
+      return "PORD";
+    case 5:
+      return "METIS";
+    case 6:
+      return "QAMD";
+    default:
+      return "unknown";
+  }
+}
+
+bool lacks_workspace(int code) { return code == -8 || code == -9 || code == -14 || code == -15 || code == -17 || code == -20; }
+bool lacks_memory(int code) { return code == -5 || code == -7 || code == -13 || code == -19; }
+
+}  // namespace
+
+struct MumpsFactor::State {
+  Mat stiffness = nullptr;
+  Mat mass = nullptr;
+  MPI_Comm comm = MPI_COMM_NULL;
+  int rank = 0;
+  int size = 1;
+  bool is_alive = false;
+  DMUMPS_STRUC_C mumps{};
+  std::vector<MUMPS_INT> rows;
+  std::vector<MUMPS_INT> columns;
+  std::vector<double> values;
+  std::vector<MUMPS_INT> permutation;
+  std::vector<MUMPS_INT> own_rows;
+  // The solution comes back where the pivots live; the scatter brings it to the rows' owners.
+  std::vector<MUMPS_INT> solution_rows;
+  std::vector<double> solution;
+  petsc::VecHandle solution_vec;
+  petsc::ScatterHandle scatter;
+
+  int& icntl(int i) { return mumps.icntl[i - 1]; }
+  int infog(int i) const { return mumps.infog[i - 1]; }
+  int call(int job) {
+    mumps.job = job;
+    dmumps_c(&mumps);
+    return infog(1);
+  }
+  void set_controls();
+  void prepare_solution();
+};
+
+void MumpsFactor::State::set_controls() {
+  icntl(1) = icntl(2) = icntl(3) = -1;  // Silent: errors come back as codes.
+  icntl(4) = 0;
+  icntl(5) = 0;    // Assembled entries ...
+  icntl(18) = 3;   // ... distributed over the ranks.
+  icntl(6) = 0;    // No column permutation: the diagonal is good.
+  icntl(12) = 1;   // The order is used as it is given, not compressed around 2x2 pivots.
+  icntl(13) = 1;   // No ScaLAPACK at the root: it would not count negative pivots.
+  icntl(14) = 30;  // Per cent of workspace beyond the estimate, for delayed pivots.
+  icntl(28) = 1;   // Sequential analysis.
+  icntl(10) = 0;   // No iterative refinement.
+  icntl(20) = size > 1 ? 10 : 0;
+  icntl(21) = size > 1 ? 1 : 0;
+}
+
+MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position)
+    : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.stiffness = stiffness;
+  s.mass = mass;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &s.comm));
+  MPI_Comm_rank(s.comm, &s.rank);
+  MPI_Comm_size(s.comm, &s.size);
+  PetscInt n = 0;
+  check(MatGetSize(stiffness, &n, nullptr));
+
+  s.mumps.comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(s.comm));
+  s.mumps.par = 1;
+  s.mumps.sym = 2;
+  if (s.call(kJobInit) != 0) throw SystemError(fmt::format("MUMPS does not start (code {}).", s.infog(1)));
+  s.is_alive = true;
+  s.set_controls();
+
+  visit_lower_entries(stiffness, mass, [&](PetscInt row, PetscInt column, double, double) {
+    s.rows.push_back(row + 1);
+    s.columns.push_back(column + 1);
+  });
+  s.values.resize(s.rows.size());
+  s.mumps.n = n;
+  s.mumps.nnz_loc = static_cast<MUMPS_INT8>(s.rows.size());
+  s.mumps.irn_loc = s.rows.data();
+  s.mumps.jcn_loc = s.columns.data();
+  s.mumps.a_loc = s.values.data();
+
+  int is_given = elimination_position.empty() ? 0 : 1;
+  MPI_Bcast(&is_given, 1, MPI_INT, 0, s.comm);
+  s.icntl(7) = is_given == 1 ? 1 : 7;
+  if (is_given == 1 && s.rank == 0) {
+    s.permutation.resize(static_cast<std::size_t>(n));
+    for (std::size_t node = 0; node < elimination_position.size(); ++node) {
+      for (std::size_t d = 0; d < 3; ++d) s.permutation[3 * node + d] = static_cast<MUMPS_INT>(3 * elimination_position[node] + d + 1);
+    }
+    s.mumps.perm_in = s.permutation.data();
+  }
+  const int code = s.call(kJobAnalyse);
+  if (lacks_memory(code)) throw SystemError("Out of memory in the analysis of K - sigma M. Take a coarser mesh or more ranks on more machines.");
+  if (code < 0) throw SolveError(fmt::format("MUMPS cannot analyse K - sigma M: code {}, {}.", code, s.infog(2)));
+
+  PetscInt first = 0;
+  PetscInt last = 0;
+  check(MatGetOwnershipRange(stiffness, &first, &last));
+  for (PetscInt row = first; row < last; ++row) s.own_rows.push_back(row + 1);
+}
+
+MumpsFactor::~MumpsFactor() {
+  if (state_ != nullptr && state_->is_alive) (void)state_->call(kJobEnd);
+}
+
+bool MumpsFactor::factorise(double sigma) {
+  State& s = *state_;
+  std::size_t entry = 0;
+  visit_lower_entries(s.stiffness, s.mass, [&](PetscInt, PetscInt, double k, double m) { s.values[entry++] = k - sigma * m; });
+  constexpr int kAttempts = 8;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const int code = s.call(kJobFactorise);
+    if (code >= 0) {
+      if (s.size > 1) s.prepare_solution();
+      return true;
+    }
+    if (code == -10) return false;
+    if (lacks_workspace(code)) {
+      s.icntl(14) *= 2;
+      continue;
+    }
+    if (lacks_memory(code)) {
+      throw SystemError("Out of memory in the factorisation of K - sigma M. Take a coarser mesh or more ranks on more machines.");
+    }
+    throw SolveError(fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: code {}, {}.", sigma, code, s.infog(2)));
+  }
+  throw SolveError(fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: its workspace never sufficed (code {}).", sigma,
+                               s.infog(1)));
+}
+
+void MumpsFactor::State::prepare_solution() {
+  const int local = mumps.info[22];  // INFO(23): the pivots on this rank.
+  solution.assign(static_cast<std::size_t>(std::max(local, 1)), 0.0);
+  solution_rows.assign(static_cast<std::size_t>(std::max(local, 1)), 0);
+  mumps.sol_loc = solution.data();
+  mumps.isol_loc = solution_rows.data();
+  mumps.lsol_loc = std::max(local, 1);
+  check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, local, solution.data(), solution_vec.out()));
+  scatter.reset();  // The rows are known only after the first solve.
+}
+
+void MumpsFactor::solve(Vec b, Vec x) {
+  State& s = *state_;
+  s.mumps.nrhs = 1;
+  if (s.size == 1) {
+    check(VecCopy(b, x));
+    PetscScalar* array = nullptr;
+    check(VecGetArray(x, &array));
+    s.mumps.rhs = array;
+    s.mumps.lrhs = s.mumps.n;
+    const int code = s.call(kJobSolve);
+    check(VecRestoreArray(x, &array));
+    if (code < 0) throw SolveError(fmt::format("MUMPS cannot solve with its factor: code {}, {}.", code, s.infog(2)));
+    return;
+  }
+  const PetscScalar* right = nullptr;
+  check(VecGetArrayRead(b, &right));
+  s.mumps.rhs_loc = const_cast<PetscScalar*>(right);  // MUMPS only reads it.
+  s.mumps.irhs_loc = s.own_rows.data();
+  s.mumps.nloc_rhs = static_cast<MUMPS_INT>(s.own_rows.size());
+  s.mumps.lrhs_loc = std::max(s.mumps.nloc_rhs, 1);
+  const int code = s.call(kJobSolve);
+  check(VecRestoreArrayRead(b, &right));
+  if (code < 0) throw SolveError(fmt::format("MUMPS cannot solve with its factor: code {}, {}.", code, s.infog(2)));
+  if (s.scatter.get() == nullptr) {
+    PetscInt local = 0;
+    check(VecGetLocalSize(s.solution_vec, &local));
+    std::vector<PetscInt> rows(static_cast<std::size_t>(local));
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = s.solution_rows[i] - 1;
+    petsc::IsHandle to;
+    check(ISCreateGeneral(s.comm, local, rows.data(), PETSC_COPY_VALUES, to.out()));
+    petsc::IsHandle from;
+    check(ISCreateStride(PETSC_COMM_SELF, local, 0, 1, from.out()));
+    check(VecScatterCreate(s.solution_vec, from, x, to, s.scatter.out()));
+  }
+  PetscScalar* written = nullptr;  // MUMPS wrote behind the vector's back; this tells it.
+  check(VecGetArray(s.solution_vec, &written));
+  check(VecRestoreArray(s.solution_vec, &written));
+  check(VecScatterBegin(s.scatter, s.solution_vec, x, INSERT_VALUES, SCATTER_FORWARD));
+  check(VecScatterEnd(s.scatter, s.solution_vec, x, INSERT_VALUES, SCATTER_FORWARD));
+}
+
+std::int64_t MumpsFactor::get_negative_pivots() const { return state_->infog(12); }
+std::string MumpsFactor::get_solver() const { return fmt::format("MUMPS {} L D L^T", state_->mumps.version_number); }
+std::string MumpsFactor::get_ordering() const { return find_ordering_name(state_->infog(7)); }
+
+std::int64_t MumpsFactor::get_entries() const {
+  const std::int64_t entries = state_->infog(29);
+  return entries < 0 ? -entries * 1'000'000 : entries;  // Large counts come in millions, negated.
+}
+
+double MumpsFactor::get_flops() const { return state_->mumps.rinfog[2]; }
+
+}  // namespace carillon::eigen

@@ -1,0 +1,186 @@
+// Method:     A rigid motion of component c is u(x) = sum_j a_j b_j(x), with three translations b = e_i and three rotations
+//             b = p_i x (x - x_c) / R about the centre x_c, along the principal axes p_i of its nodes. Held nodes demand H a = 0 (H: 3 rows per
+//             held node, 6 columns); the null space of H comes from its singular value decomposition. The motions are then made
+//             M-orthonormal by Gram-Schmidt, twice.
+// Source:     Geradin, Rixen, Mechanical Vibrations, 3rd ed. 2015, section 2.2 (rigid body modes); Golub, Van Loan, section 2.4 (null space).
+// Deviations: none.
+#include "precompute/eigen/rigid_modes.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+using Matrix3 = Eigen::Matrix3d;
+using Vector3 = Eigen::Vector3d;
+using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+// Singular values and lengths below these parts of the largest count as zero.
+constexpr double kRankTolerance = 1e-9;
+constexpr double kLineTolerance = 1e-10;
+
+Vector3 to_vector(const Vec3& x) { return {x[0], x[1], x[2]}; }
+
+// Centre, principal axes and size of one component, held nodes included, the same on every rank.
+struct Body {
+  Vector3 centre = Vector3::Zero();
+  Matrix3 axes = Matrix3::Identity();  // columns
+  double radius = 1;                   // [m] root mean square distance from the centre
+  Motions motions;                     // columns: admissible combinations of the six basis motions
+};
+
+// The basis motions' displacement at x (3 x 6).
+Eigen::Matrix<double, 3, 6> calc_basis(const Body& body, const Vector3& x) {
+  Eigen::Matrix<double, 3, 6> basis;
+  basis.leftCols<3>().setIdentity();
+  const Vector3 arm = (x - body.centre) / body.radius;
+  for (int i = 0; i < 3; ++i) basis.col(3 + i) = body.axes.col(i).cross(arm);
+  return basis;
+}
+
+// Sums over the nodes of every component: count, position, and after the centres are known the second moments.
+std::vector<Body> calc_bodies(MPI_Comm comm, const NodeLayout& nodes) {
+  const auto count = static_cast<std::size_t>(nodes.component_count);
+  std::vector<double> sums(4 * count, 0.0);
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  const auto for_each_node = [&](auto&& visit) {
+    for (std::size_t i = 0; i < nodes.position.size(); ++i) visit(static_cast<std::size_t>(nodes.component[i]), to_vector(nodes.position[i]));
+    if (rank != 0) return;  // Every rank knows the held nodes; one of them counts them.
+    for (std::size_t c = 0; c < std::min(count, nodes.held.size()); ++c) {
+      for (const Vec3& x : nodes.held[c]) visit(c, to_vector(x));
+    }
+  };
+  for_each_node([&](std::size_t c, const Vector3& x) {
+    sums[4 * c] += 1;
+    for (int d = 0; d < 3; ++d) sums[4 * c + 1 + static_cast<std::size_t>(d)] += x[d];
+  });
+  MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, comm);
+  std::vector<Body> bodies(count);
+  for (std::size_t c = 0; c < count; ++c) {
+    if (sums[4 * c] > 0) bodies[c].centre = Vector3(sums[4 * c + 1], sums[4 * c + 2], sums[4 * c + 3]) / sums[4 * c];
+  }
+  std::vector<double> moments(9 * count, 0.0);
+  for_each_node([&](std::size_t c, const Vector3& x) {
+    Eigen::Map<Matrix3> moment(moments.data() + 9 * c);
+    moment += (x - bodies[c].centre) * (x - bodies[c].centre).transpose();
+  });
+  MPI_Allreduce(MPI_IN_PLACE, moments.data(), static_cast<int>(moments.size()), MPI_DOUBLE, MPI_SUM, comm);
+  for (std::size_t c = 0; c < count; ++c) {
+    const Matrix3 moment = Eigen::Map<Matrix3>(moments.data() + 9 * c);
+    const double square = moment.trace() / std::max(sums[4 * c], 1.0);
+    if (square <= 0) continue;
+    bodies[c].radius = std::sqrt(square);
+    bodies[c].axes = Eigen::SelfAdjointEigenSolver<Matrix3>(moment).eigenvectors();
+  }
+  return bodies;
+}
+
+// The combinations of basis motions that leave the held nodes where they are.
+Motions calc_admissible_motions(const Body& body, const std::vector<Vec3>& held) {
+  if (held.empty()) return Motions::Identity(6, 6);
+  // H^T H would square the condition; H R with H = Q R is as small and keeps it.
+  Eigen::MatrixXd constraints(3 * static_cast<Eigen::Index>(held.size()), 6);
+  for (std::size_t i = 0; i < held.size(); ++i) constraints.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = calc_basis(body, to_vector(held[i]));
+  Eigen::Matrix<double, Eigen::Dynamic, 6> small = constraints;
+  if (constraints.rows() > 6) {
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints);
+    small = qr.matrixQR().topRows(6).triangularView<Eigen::Upper>();
+  }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(small, Eigen::ComputeFullV);
+  Eigen::Index rank = 0;
+  const auto& singular = svd.singularValues();
+  while (rank < singular.size() && singular[rank] > kRankTolerance * singular[0]) ++rank;
+  return svd.matrixV().rightCols(6 - rank);
+}
+
+double calc_dot(Vec a, Vec b) {
+  PetscScalar dot = 0;
+  check(VecDot(a, b, &dot));
+  return dot;
+}
+
+// M-orthonormalises `candidate` against `basis`, the motions of the same component; false if nothing is left of it.
+bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& basis) {
+  check(MatMult(mass, candidate, work));
+  const double before = std::sqrt(std::max(calc_dot(candidate, work), 0.0));
+  if (!(before > 0)) return false;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (Vec other : basis) {
+      check(MatMult(mass, candidate, work));
+      check(VecAXPY(candidate, -calc_dot(other, work), other));
+    }
+  }
+  check(MatMult(mass, candidate, work));
+  const double after = std::sqrt(std::max(calc_dot(candidate, work), 0.0));
+  if (!(after > kLineTolerance * before)) return false;
+  check(VecScale(candidate, 1 / after));
+  return true;
+}
+
+// ||K r|| must vanish beside what the entries of K alone would give, ||diag(K) r||.
+void check_stress_free(Mat stiffness, Vec motion, Vec work, Vec diagonal, std::int32_t component) {
+  check(MatMult(stiffness, motion, work));
+  PetscReal force = 0;
+  check(VecNorm(work, NORM_2, &force));
+  check(VecPointwiseMult(work, diagonal, motion));
+  PetscReal scale = 0;
+  check(VecNorm(work, NORM_2, &scale));
+  constexpr double kForceTolerance = 1e-6;
+  if (!(force <= kForceTolerance * scale)) {
+    throw SolveError(fmt::format("A rigid motion of component {} meets elastic forces ({:.2g} of the largest possible): the stiffness matrix and "
+                                 "the node layout are not of the same body, or held nodes are missing from the layout.",
+                                 component, force / scale));
+  }
+}
+
+}  // namespace
+
+std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const NodeLayout& nodes) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
+  std::vector<Body> bodies = calc_bodies(comm, nodes);
+  petsc::VecHandle work;
+  petsc::VecHandle diagonal;
+  petsc::VecHandle candidate;
+  check(MatCreateVecs(stiffness, candidate.out(), work.out()));
+  check(VecDuplicate(work, diagonal.out()));
+  check(MatGetDiagonal(stiffness, diagonal));
+  std::vector<petsc::VecHandle> modes;
+  static const std::vector<Vec3> none;
+  for (std::int32_t c = 0; c < nodes.component_count; ++c) {
+    Body& body = bodies[static_cast<std::size_t>(c)];
+    const auto& held = static_cast<std::size_t>(c) < nodes.held.size() ? nodes.held[static_cast<std::size_t>(c)] : none;
+    body.motions = calc_admissible_motions(body, held);
+    std::vector<Vec> of_component;
+    for (Eigen::Index j = 0; j < body.motions.cols(); ++j) {
+      PetscScalar* values = nullptr;
+      check(VecZeroEntries(candidate));
+      check(VecGetArray(candidate, &values));
+      for (std::size_t i = 0; i < nodes.position.size(); ++i) {
+        if (nodes.component[i] != c) continue;
+        Eigen::Map<Vector3>(values + 3 * i) = calc_basis(body, to_vector(nodes.position[i])) * body.motions.col(j);
+      }
+      check(VecRestoreArray(candidate, &values));
+      if (!orthonormalise(mass, candidate, work, of_component)) continue;
+      check_stress_free(stiffness, candidate, work, diagonal, c);
+      petsc::VecHandle kept;
+      check(VecDuplicate(candidate, kept.out()));
+      check(VecCopy(candidate, kept));
+      of_component.push_back(kept);
+      modes.push_back(std::move(kept));
+    }
+  }
+  return modes;
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,175 @@
+// Source:     PETSc users manual 3.18, "Error handling", "Runtime options"; MPI 3.1.
+#include "precompute/petsc/session.hpp"
+
+#include <fmt/core.h>
+#include <slepcsys.h>
+#include <sys/resource.h>
+
+#include <array>
+#include <cstdlib>
+#include <limits>
+#include <vector>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::petsc {
+namespace {
+
+// The first message since the last check(): PETSc reports the origin first and then every caller on the way up.
+thread_local std::string recorded_error;
+
+PetscErrorCode record_error(MPI_Comm, int line, const char* function, const char* file, PetscErrorCode code, PetscErrorType type,
+                            const char* message, void*) {
+  if (type == PETSC_ERROR_INITIAL || recorded_error.empty()) {
+    const char* general = nullptr;
+    (void)PetscErrorMessage(code, &general, nullptr);
+    recorded_error = fmt::format("{}: {} ({}, {}:{})", general != nullptr ? general : "PETSc error",
+                                 message != nullptr ? message : "", function != nullptr ? function : "?",
+                                 file != nullptr ? file : "?", line);
+  }
+  return code;
+}
+
+bool is_system_error(PetscErrorCode code) {
+  return code == PETSC_ERR_MEM || code == PETSC_ERR_SYS || code == PETSC_ERR_FILE_OPEN || code == PETSC_ERR_FILE_READ ||
+         code == PETSC_ERR_FILE_WRITE || code == PETSC_ERR_FILE_UNEXPECTED;
+}
+
+enum ErrorKind : int { kNone = 0, kInput = 1, kSolve = 2, kSystem = 3 };
+
+[[noreturn]] void throw_kind(int kind, const std::string& text) {
+  switch (kind) {
+    case kInput:
+      throw InputError(text);
+    case kSolve:
+      throw SolveError(text);
+    default:
+      throw SystemError(text);
+  }
+}
+
+// All ranks learn the lowest failing rank's kind and text.
+void agree_on(MPI_Comm comm, int kind, const std::string& text) {
+  int rank = 0;
+  int size = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
+  int mine = kind == kNone ? size : rank;
+  int first = size;
+  MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
+  if (first == size) return;
+  std::array<int, 2> header{kind, static_cast<int>(text.size())};
+  MPI_Bcast(header.data(), 2, MPI_INT, first, comm);
+  std::string shared = text;
+  shared.resize(static_cast<std::size_t>(header[1]));
+  MPI_Bcast(shared.data(), header[1], MPI_CHAR, first, comm);
+  throw_kind(header[0], shared);
+}
+
+}  // namespace
+
+Session::Session(int& argc, char**& argv) {
+  int is_initialized = 0;
+  MPI_Initialized(&is_initialized);
+  if (is_initialized == 0) {
+    if (MPI_Init(&argc, &argv) != MPI_SUCCESS) throw SystemError("MPI does not start. Start the program with mpirun, or alone.");
+    started_mpi_ = true;
+  }
+  // PETSc reads these even when it is told to skip its option files.
+  unsetenv("PETSC_OPTIONS");
+  unsetenv("PETSC_OPTIONS_YAML");
+  static std::array<std::string, 3> own{"carillon", "-skip_petscrc", "-no_signal_handler"};
+  static std::array<char*, 4> own_argv{own[0].data(), own[1].data(), own[2].data(), nullptr};
+  int own_argc = 3;
+  char** own_args = own_argv.data();
+  if (SlepcInitialize(&own_argc, &own_args, nullptr, nullptr) != 0) throw SystemError("PETSc and SLEPc do not start.");
+  (void)PetscPushErrorHandler(record_error, nullptr);
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
+  MPI_Comm_size(MPI_COMM_WORLD, &size_);
+}
+
+Session::~Session() {
+  (void)PetscPopErrorHandler();
+  (void)SlepcFinalize();
+  int is_finalized = 0;
+  MPI_Finalized(&is_finalized);
+  if (started_mpi_ && is_finalized == 0) MPI_Finalize();
+}
+
+void check(PetscErrorCode code) {
+  if (code == 0) return;
+  std::string text = recorded_error.empty() ? fmt::format("PETSc error {}", static_cast<int>(code)) : recorded_error;
+  recorded_error.clear();
+  if (is_system_error(code)) throw SystemError(text);
+  throw SolveError(text);
+}
+
+bool all_ok(MPI_Comm comm, bool ok) {
+  int mine = ok ? 1 : 0;
+  int every = 0;
+  MPI_Allreduce(&mine, &every, 1, MPI_INT, MPI_MIN, comm);
+  return every == 1;
+}
+
+void agree(MPI_Comm comm, const std::string& error_text) { agree_on(comm, error_text.empty() ? kNone : kInput, error_text); }
+
+void agree(MPI_Comm comm, std::exception_ptr error) {
+  int kind = kNone;
+  std::string text;
+  if (error) {
+    try {
+      std::rethrow_exception(error);
+    } catch (const InputError& e) {
+      kind = kInput;
+      text = e.what();
+    } catch (const SolveError& e) {
+      kind = kSolve;
+      text = e.what();
+    } catch (const std::bad_alloc&) {
+      kind = kSystem;
+      text = "Out of memory. Take a coarser mesh, a narrower band, or more ranks on more machines.";
+    } catch (const std::exception& e) {
+      kind = kSystem;
+      text = e.what();
+    } catch (...) {
+      kind = kSystem;
+      text = "An unknown exception was thrown.";
+    }
+  }
+  agree_on(comm, kind, text);
+}
+
+PetscInt to_petsc_int(std::int64_t value) {
+  if (value < std::numeric_limits<PetscInt>::min() || value > std::numeric_limits<PetscInt>::max()) {
+    throw SystemError(fmt::format("{} does not fit PETSc's index type of this build. Take a coarser mesh.", value));
+  }
+  return static_cast<PetscInt>(value);
+}
+
+std::int64_t get_peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes.
+}
+
+PeakMemory find_peak_memory(MPI_Comm comm) {
+  const std::int64_t mine = get_peak_memory_bytes();
+  PeakMemory peak;
+  MPI_Allreduce(&mine, &peak.sum_bytes, 1, MPI_INT64_T, MPI_SUM, comm);
+  MPI_Allreduce(&mine, &peak.max_bytes, 1, MPI_INT64_T, MPI_MAX, comm);
+  return peak;
+}
+
+std::string petsc_version() { return fmt::format("PETSc {}.{}.{}", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR); }
+
+std::string slepc_version() { return fmt::format("SLEPc {}.{}.{}", SLEPC_VERSION_MAJOR, SLEPC_VERSION_MINOR, SLEPC_VERSION_SUBMINOR); }
+
+std::string mpi_version() {
+  std::array<char, MPI_MAX_LIBRARY_VERSION_STRING> text{};
+  int length = 0;
+  MPI_Get_library_version(text.data(), &length);
+  const std::string all(text.data(), static_cast<std::size_t>(length));
+  return all.substr(0, all.find(','));
+}
+
+}  // namespace carillon::petsc
