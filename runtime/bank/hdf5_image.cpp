@@ -84,19 +84,27 @@ void write_text_attribute(hid_t object, const char* name, const std::string& tex
   require(H5Awrite(attribute, type, &characters), "write an attribute");
 }
 
-Id make_group(hid_t file, const char* path) { return {H5Gcreate2(file, path, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose, path}; }
+/// Creation properties without time stamps: the same bank gives the same bytes.
+Id make_properties(hid_t kind) {
+  const hid_t properties = H5Pcreate(kind);
+  H5Pset_obj_track_times(properties, false);
+  return {properties, H5Pclose, "a property list"};
+}
+
+Id make_group(hid_t file, const char* path) {
+  const Id properties = make_properties(H5P_GROUP_CREATE);
+  return {H5Gcreate2(file, path, H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose, path};
+}
 
 /// Writes one array of the seal and returns where it lies.
 Extent write_field(hid_t file, const Field& field) {
   const Id space = make_space(field.shape);
   const Id type = make_type(field.dtype);
-  const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, "a property list");
-  require(H5Pset_create_intermediate_group(links, 1), "make groups");
-  const Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "a property list");
+  const Id creation = make_properties(H5P_DATASET_CREATE);
   require(H5Pset_layout(creation, H5D_CONTIGUOUS), "choose a layout");
   require(H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY), "allocate early");
   require(H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER), "choose not to fill");
-  const Id dataset(H5Dcreate2(file, field.name.c_str(), type, space, links, creation, H5P_DEFAULT), H5Dclose, field.name.c_str());
+  const Id dataset(H5Dcreate2(file, field.name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, field.name.c_str());
   Extent extent{field.dtype, 0, field.shape, calc_bytes(field)};
   if (extent.bytes > 0) {
     require(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, field.data), "write an array");
@@ -112,7 +120,7 @@ Extent write_field(hid_t file, const Field& field) {
 /// A dataset of `shape` that shows the elements `source_space` has selected of the dataset `source` of this same file.
 void make_view(hid_t group, const char* name, hid_t type, const std::vector<std::uint64_t>& shape, const char* source, hid_t source_space) {
   const Id space = make_space(shape);
-  const Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "a property list");
+  const Id creation = make_properties(H5P_DATASET_CREATE);
   require(H5Pset_virtual(creation, space, ".", source, source_space), "map a view");
   const Id dataset(H5Dcreate2(group, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, name);
 }
@@ -120,7 +128,7 @@ void make_view(hid_t group, const char* name, hid_t type, const std::vector<std:
 /// A small real dataset, compressed when it is long.
 void write_list(hid_t group, const char* name, hid_t file_type, hid_t memory_type, std::uint64_t size, const void* data) {
   const Id space = make_space({size});
-  const Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "a property list");
+  const Id creation = make_properties(H5P_DATASET_CREATE);
   if (size > 4096 && H5Zfilter_avail(H5Z_FILTER_DEFLATE) > 0) {
     const hsize_t chunk = std::min<hsize_t>(size, 1 << 16);
     require(H5Pset_chunk(creation, 1, &chunk), "cut into chunks");
@@ -219,7 +227,7 @@ std::uint64_t get_end_of_file(const Keeper& kept) {
 
 Hdf5Image make_hdf5_image(const Bank& bank, const std::vector<Field>& fields) {
   const Silence silence;
-  const Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose, "a property list");
+  const Id creation = make_properties(H5P_FILE_CREATE);
   require(H5Pset_userblock(creation, kSealBytes), "reserve the seal");
   const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "a property list");
   // In the newest format HDF5's own metadata carry checksums too.
@@ -238,6 +246,7 @@ Hdf5Image make_hdf5_image(const Bank& bank, const std::vector<Field>& fields) {
   const hid_t file = H5Fcreate("bank", H5F_ACC_TRUNC, creation, access);
   if (file < 0) throw SystemError("HDF5 cannot make a file in memory");
   try {
+    for (const char* group : {"mesh", "modes", "rigid", "material", "solve"}) make_group(file, group);
     for (const Field& field : fields) image.extents.emplace(field.name, write_field(file, field));
     write_vtk_views(file, bank);
     const Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose, "the root");

@@ -10,6 +10,10 @@ static_assert(std::endian::native == std::endian::little,
               "Bank files are little-endian and so far only little-endian machines are served.");
 static_assert(sizeof(Vec3) == 24 && sizeof(std::array<std::int32_t, 3>) == 12, "Rows of three must lie without gaps.");
 
+namespace {
+std::string text_type(const std::string& text) { return "|S" + std::to_string(text.size()); }
+}  // namespace
+
 std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   const std::uint64_t vertices = bank.vertices_m.size();
   const std::uint64_t triangles = bank.triangles.size();
@@ -42,9 +46,9 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
       {"solve/rigid_modes", "<i8", {}, "1", "rigid modes that were deflated", &counts.rigid_modes},
       {"solve/band_hz", "<f8", {2}, "Hz", "modes were looked for from here to there", bank.band_hz.data()},
       {"solve/complete", "|u1", {}, "1", "1 when every mode of the band is here", &form.complete},
-      {"solve/element", "|S16", {}, "1", "T4 or T10", form.element.data()},
-      {"solve/mass", "|S16", {}, "1", "consistent or lumped", form.mass.data()},
-      {"provenance", "|S" + std::to_string(form.provenance.size()), {}, "1", "JSON text", form.provenance.data()},
+      {"solve/element", text_type(form.element), {}, "1", "T4 or T10", form.element.data()},
+      {"solve/mass", text_type(form.mass), {}, "1", "consistent or lumped", form.mass.data()},
+      {"provenance", text_type(form.provenance), {}, "1", "JSON text", form.provenance.data()},
   };
 }
 

@@ -1,7 +1,6 @@
 // Where everything lies in a bank file, as one table that the writer and the reader share. Internal to carillon::bank.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -13,7 +12,7 @@ namespace carillon::bank {
 /// An array of the file and the memory that holds it.
 struct Field {
   std::string name;                  // path inside the HDF5 file, "mesh/vertices"
-  std::string dtype;                 // as numpy writes it: "<f8", "<i8", "<i4", "<i2", "|u1", "|S16"
+  std::string dtype;                 // as numpy writes it: "<f8", "<i8", "<i4", "<i2", "|u1", "|S10" (text of 10 bytes)
   std::vector<std::uint64_t> shape;  // empty for a scalar
   std::string units;                 // "1" when dimensionless
   std::string meaning;
@@ -22,11 +21,12 @@ struct Field {
 
 /// What a file holds beside the members of Bank, or in another form.
 struct FileForm {
-  std::vector<double> freq_hz;     // (m), sqrt(lambda) / 2 pi: for readers who want no arithmetic
-  std::uint8_t complete = 1;       // Bank::complete
-  std::array<char, 16> element{};  // Bank::element, padded with NUL
-  std::array<char, 16> mass{};     // Bank::mass, padded with NUL
-  std::string provenance;          // Bank::provenance, at least one byte
+  std::vector<double> freq_hz;  // (m), sqrt(lambda) / 2 pi: for readers who want no arithmetic
+  std::uint8_t complete = 1;    // Bank::complete
+  // Texts of Bank, at least one byte long, perhaps padded with NUL.
+  std::string element;
+  std::string mass;
+  std::string provenance;
 };
 
 /// The arrays of `bank` and `form` in the order of docs/bank-format.md. The sizes are those of the members at the time of the call, and

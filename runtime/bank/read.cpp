@@ -115,8 +115,6 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", name);
   // Every extent is compared before memory is taken: rows times three could exceed the file where a declared shape did not.
   FileForm& form = loaded.form;
-  const Extent& provenance = get_extent(seal, "provenance", name);
-  if (!provenance.dtype.starts_with("|S")) throw InputError(name + ": arrays disagree: provenance is not text; write the bank again");
   const auto check = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape) {
     check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
   };
@@ -137,7 +135,15 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
     array->resize(modes);
   }
   bank.shape.resize(vertices * modes * 3);
-  form.provenance.resize(provenance.bytes);
+  const auto make_text = [&](const std::string& field, std::string& text) {
+    const Extent& extent = get_extent(seal, field, name);
+    if (!extent.dtype.starts_with("|S"))
+      throw InputError(fmt::format("{}: arrays disagree: {} is not text; write the bank again", name, field));
+    text.resize(extent.bytes);
+  };
+  make_text("solve/element", form.element);
+  make_text("solve/mass", form.mass);
+  make_text("provenance", form.provenance);
 }
 
 std::string trim(std::string_view text) {
@@ -185,8 +191,8 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   if (form.complete > 1)
     throw InputError(fmt::format("{}: solve/complete is {}, neither 0 nor 1; write the bank again", name, form.complete));
   bank.complete = form.complete == 1;
-  bank.element = trim({form.element.data(), form.element.size()});
-  bank.mass = trim({form.mass.data(), form.mass.size()});
+  bank.element = trim(form.element);
+  bank.mass = trim(form.mass);
   bank.provenance = trim(form.provenance);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);

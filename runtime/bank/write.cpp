@@ -2,7 +2,6 @@
 // Method: the bytes are made and sealed in memory; config::write_file gives them the name in one step.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstring>
 
 #include "runtime/bank/bank.hpp"
@@ -33,10 +32,8 @@ fs::path resolve_target(const fs::path& file) {
   return target;
 }
 
-template <std::size_t N>
-void copy_text(const std::string& text, std::array<char, N>& padded) {
-  std::copy_n(text.begin(), std::min(text.size(), N), padded.begin());
-}
+/// A text of the file has at least one byte.
+std::string pad_text(const std::string& text) { return text.empty() ? std::string(1, '\0') : text; }
 
 }  // namespace
 
@@ -51,9 +48,9 @@ void write_bank(const Bank& bank, const fs::path& file) {
   FileForm form;
   for (std::size_t i = 0; i < bank.mode_count(); ++i) form.freq_hz.push_back(bank.freq_hz(i));
   form.complete = bank.complete ? 1 : 0;
-  copy_text(bank.element, form.element);
-  copy_text(bank.mass, form.mass);
-  form.provenance = bank.provenance.empty() ? std::string(1, '\0') : bank.provenance;
+  form.element = pad_text(bank.element);
+  form.mass = pad_text(bank.mass);
+  form.provenance = pad_text(bank.provenance);
 
   const Hdf5Image image = make_hdf5_image(bank, list_fields(bank, form));
   const std::span<std::byte> bytes = image.bytes;

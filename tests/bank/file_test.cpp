@@ -1,0 +1,304 @@
+// Bank files: round trip, truncated and changed bytes, rows, and what becomes of a file when its writer is killed or the disk refuses.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include "tests/bank/example_bank.hpp"
+
+namespace carillon::bank {
+namespace {
+
+namespace fs = std::filesystem;
+
+class BankFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = testing::TempDir() + "bankXXXXXX";
+    folder_ = ::mkdtemp(pattern.data());
+    file_ = folder_ / "bank.hdf";
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string message_of(const fs::path& file) const {
+    try {
+      read_bank(file);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "(was read)";
+  }
+  void put(const std::string& bytes) const { std::ofstream(file_, std::ios::binary) << bytes; }
+  std::string get() const {
+    std::ifstream stream(file_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  std::size_t count_files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+
+  fs::path folder_, file_;
+};
+
+std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
+
+void expect_equal(const Bank& a, const Bank& b) {
+  EXPECT_EQ(a.vertices_m, b.vertices_m);
+  EXPECT_EQ(a.triangles, b.triangles);
+  EXPECT_EQ(a.eigenvalue_rad2_s2, b.eigenvalue_rad2_s2);
+  EXPECT_EQ(a.decay_per_s, b.decay_per_s);
+  EXPECT_EQ(a.residual, b.residual);
+  EXPECT_EQ(a.radiation_gain, b.radiation_gain);
+  EXPECT_EQ(a.shape_scale, b.shape_scale);
+  EXPECT_EQ(a.shape, b.shape);
+  EXPECT_EQ(a.rigid.mass_kg, b.rigid.mass_kg);
+  EXPECT_EQ(a.rigid.centre_m, b.rigid.centre_m);
+  EXPECT_EQ(a.rigid.inertia_kg_m2, b.rigid.inertia_kg_m2);
+  EXPECT_EQ(a.rigid.volume_m3, b.rigid.volume_m3);
+  EXPECT_EQ(a.material.young_modulus_pa, b.material.young_modulus_pa);
+  EXPECT_EQ(a.material.poisson_ratio, b.material.poisson_ratio);
+  EXPECT_EQ(a.material.density_kg_m3, b.material.density_kg_m3);
+  EXPECT_EQ(a.material.alpha1_s, b.material.alpha1_s);
+  EXPECT_EQ(a.material.alpha2_per_s, b.material.alpha2_per_s);
+  EXPECT_EQ(a.counts.nodes, b.counts.nodes);
+  EXPECT_EQ(a.counts.tets, b.counts.tets);
+  EXPECT_EQ(a.counts.components, b.counts.components);
+  EXPECT_EQ(a.counts.rigid_modes, b.counts.rigid_modes);
+  EXPECT_EQ(a.band_hz, b.band_hz);
+  EXPECT_EQ(a.complete, b.complete);
+  EXPECT_EQ(a.element, b.element);
+  EXPECT_EQ(a.mass, b.mass);
+  EXPECT_EQ(a.provenance, b.provenance);
+}
+
+TEST_F(BankFile, ComesBackExactly) {
+  Bank bank = example::make_bank(4, 17);
+  write_bank(bank, file_);
+  expect_equal(read_bank(file_), bank);
+  expect_equal(parse_bank(bytes_of(get())), bank);
+  EXPECT_EQ(count_files(), 1u);
+
+  bank = example::make_bank(3, 1);
+  bank.complete = false;
+  bank.element = "T4";
+  bank.mass = "lumped";
+  bank.provenance.clear();
+  bank.material.alpha1_s = bank.material.alpha2_per_s = bank.decay_per_s[0] = 0.0;
+  write_bank(bank, file_);  // over the other one
+  expect_equal(read_bank(file_), bank);
+  EXPECT_EQ(count_files(), 1u);
+}
+
+TEST_F(BankFile, MayHoldNoModes) {
+  const Bank bank = example::make_bank(2, 0);
+  write_bank(bank, file_);
+  expect_equal(read_bank(file_), bank);
+  EXPECT_TRUE(read_shape_row(file_, 0).empty());
+}
+
+TEST_F(BankFile, TheSameBankGivesTheSameBytes) {
+  write_bank(example::make_bank(), file_);
+  const std::string first = get();
+  ::sleep(1);  // a time stamp would have seconds
+  write_bank(example::make_bank(), file_);
+  EXPECT_TRUE(get() == first);
+}
+
+TEST_F(BankFile, AnyTruncationIsRefused) {
+  write_bank(example::make_bank(), file_);
+  const std::string whole = get();
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    EXPECT_THROW(parse_bank(bytes_of(whole).first(length)), InputError) << length;
+  }
+  for (std::size_t length = 0; length < whole.size(); length += 257) {
+    put(whole.substr(0, length));
+    const std::string message = message_of(file_);
+    EXPECT_NE(message.find(length == 0 ? "empty" : "truncated"), std::string::npos) << message;
+    EXPECT_THROW(read_shape_row(file_, 0), InputError);
+  }
+  put(whole + "x");
+  EXPECT_NE(message_of(file_).find("bytes were added"), std::string::npos);
+}
+
+TEST_F(BankFile, AnyChangedByteIsRefused) {
+  write_bank(example::make_bank(), file_);
+  std::string bytes = get();
+  std::mt19937 random(1);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const char kept = bytes[i];
+    bytes[i] = static_cast<char>(kept ^ (1 << (random() % 8)));
+    EXPECT_THROW(parse_bank(bytes_of(bytes)), InputError) << "byte " << i;
+    bytes[i] = kept;
+  }
+  EXPECT_NO_THROW(parse_bank(bytes_of(bytes)));
+}
+
+TEST_F(BankFile, AnyHeaderByteWithAnyValueIsRefused) {
+  write_bank(example::make_bank(), file_);
+  std::string bytes = get();
+  for (std::size_t i = 0; i < 128; ++i) {
+    const char kept = bytes[i];
+    for (int value = 0; value < 256; ++value) {
+      bytes[i] = static_cast<char>(value);
+      if (bytes[i] == kept) continue;
+      EXPECT_THROW(parse_bank(bytes_of(bytes)), InputError) << "byte " << i << " value " << value;
+    }
+    bytes[i] = kept;
+  }
+}
+
+TEST_F(BankFile, ARowIsReadWithoutTheRest) {
+  const Bank bank = example::make_bank(12, 100);
+  write_bank(bank, file_);
+  const auto read_so_far = [] {
+    std::ifstream stream("/proc/self/io");
+    std::string name;
+    std::uint64_t bytes = 0;
+    stream >> name >> bytes;  // "rchar: ", what read(2) and pread(2) delivered
+    return bytes;
+  };
+  const std::uint64_t before = read_so_far();
+  const std::vector<Vec3> row = read_shape_row(file_, 123);
+  const std::uint64_t taken = read_so_far() - before;
+  ASSERT_GT(before, 0u) << "/proc/self/io cannot be read";
+  EXPECT_LT(taken, 4096u + 100u * (6 + 8) + 1024u) << "of " << fs::file_size(file_);
+  EXPECT_GT(fs::file_size(file_), 500'000u);
+  ASSERT_EQ(row.size(), 100u);
+  for (std::size_t mode = 0; mode < row.size(); ++mode) EXPECT_EQ(row[mode], bank.shape_at(123, mode));
+  EXPECT_EQ(read_shape_row(file_, bank.vertex_count() - 1).back(), bank.shape_at(bank.vertex_count() - 1, 99));
+  EXPECT_THROW(read_shape_row(file_, bank.vertex_count()), InputError);
+}
+
+TEST_F(BankFile, WhatIsNoBankIsToldApart) {
+  EXPECT_NE(message_of(folder_ / "none.hdf").find("no such file"), std::string::npos);
+  EXPECT_NE(message_of(folder_).find("is a folder"), std::string::npos);
+  EXPECT_NE(message_of("/dev/zero").find("not a regular file"), std::string::npos);
+  const fs::path fifo = folder_ / "fifo";
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  EXPECT_NE(message_of(fifo).find("not a regular file"), std::string::npos);
+  put("");
+  EXPECT_NE(message_of(file_).find("empty"), std::string::npos);
+  put("{\"mesh\": \"bunny.msh\"}");
+  EXPECT_NE(message_of(file_).find("not a Carillon bank"), std::string::npos);
+  put("\x89HDF\r\n\x1a\n" + std::string(5000, '\0'));
+  EXPECT_NE(message_of(file_).find("an HDF5 file of another kind"), std::string::npos);
+}
+
+TEST_F(BankFile, CannotBeWrittenWhereThereIsNoPlace) {
+  const Bank bank = example::make_bank();
+  EXPECT_THROW(write_bank(bank, folder_), InputError);
+  EXPECT_THROW(write_bank(bank, ""), InputError);
+  EXPECT_THROW(write_bank(bank, folder_ / "no folder" / "bank.hdf"), InputError);
+  EXPECT_THROW(write_bank(bank, "/dev/null"), InputError);
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_THROW(write_bank(bank, "/proc/bank.hdf"), SystemError);
+  EXPECT_EQ(count_files(), 0u);
+}
+
+TEST_F(BankFile, IsWrittenThroughALink) {
+  write_bank(example::make_bank(1, 1), file_);
+  fs::create_symlink("bank.hdf", folder_ / "link.hdf");
+  write_bank(example::make_bank(2, 3), folder_ / "link.hdf");
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link.hdf"));
+  EXPECT_EQ(read_bank(file_).mode_count(), 3u);
+}
+
+/// Runs `work` in a process of its own; its exit code, or minus the signal that ended it.
+template <class Work>
+pid_t start(Work work) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    int code = 9;
+    try {
+      code = work();
+    } catch (...) {
+    }
+    ::_exit(code);
+  }
+  return child;
+}
+
+int finish(pid_t child) {
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+TEST_F(BankFile, AFullDiskLeavesTheOldBankAndNothingElse) {
+  const Bank old = example::make_bank(2, 3);
+  write_bank(old, file_);
+  const Bank larger = example::make_bank(12, 100);
+  for (const rlim_t room : {0, 1, 4095, 100'000, 500'000}) {
+    const int code = finish(start([&] {
+      // A limit on the length of files stands in for a full disk: write(2) fails part of the way.
+      ::signal(SIGXFSZ, SIG_IGN);
+      const rlimit limit{room, room};
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      try {
+        write_bank(larger, file_);
+      } catch (const SystemError&) {
+        return 0;
+      }
+      return 1;
+    }));
+    EXPECT_EQ(code, 0) << room;
+    expect_equal(read_bank(file_), old);
+    EXPECT_EQ(count_files(), 1u) << room;
+  }
+}
+
+TEST_F(BankFile, AKilledWriterLeavesAWholeBank) {
+  const Bank a = example::make_bank(8, 60), b = example::make_bank(9, 50);
+  write_bank(a, file_);
+  std::mt19937 random(7);
+  for (int round = 0; round < 25; ++round) {
+    const pid_t child = start([&] {
+      for (;;) {
+        write_bank(b, file_);
+        write_bank(a, file_);
+      }
+      return 0;
+    });
+    ::usleep(random() % 40'000);
+    ::kill(child, SIGKILL);
+    ASSERT_EQ(finish(child), -SIGKILL);
+    const Bank bank = read_bank(file_);
+    ASSERT_TRUE(bank.shape == a.shape || bank.shape == b.shape);
+  }
+  // What a killed writer leaves is a file of its own that nobody takes for the bank.
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    const std::string name = entry.path().filename();
+    EXPECT_TRUE(name == "bank.hdf" || name.find(".tmp") != std::string::npos) << name;
+  }
+}
+
+TEST_F(BankFile, TwoWritersAtOnceNeverMix) {
+  const Bank a = example::make_bank(8, 60), b = example::make_bank(9, 50);
+  write_bank(a, file_);
+  const auto write_often = [&](const Bank& bank) {
+    return start([&] {
+      for (int i = 0; i < 30; ++i) write_bank(bank, file_);
+      return 0;
+    });
+  };
+  const pid_t first = write_often(a), second = write_often(b);
+  for (int i = 0; i < 30; ++i) {
+    const Bank bank = read_bank(file_);
+    ASSERT_TRUE(bank.shape == a.shape || bank.shape == b.shape);
+  }
+  EXPECT_EQ(finish(first), 0);
+  EXPECT_EQ(finish(second), 0);
+  const Bank bank = read_bank(file_);
+  EXPECT_TRUE(bank.shape == a.shape || bank.shape == b.shape);
+  EXPECT_EQ(count_files(), 1u);
+}
+
+}  // namespace
+}  // namespace carillon::bank
