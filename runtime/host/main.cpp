@@ -1,0 +1,54 @@
+// carillon-render: a scene file to a stereo WAV file.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "runtime/config/error.hpp"
+#include "runtime/host/program.hpp"
+#include "runtime/host/scene.hpp"
+
+namespace {
+
+int fail(int code, const char* message) {
+  fmt::print(stderr, "carillon-render: {}\n", message);
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  carillon::host::ProgramOptions options;
+  CLI::App app("Simulates a scene of falling bodies and renders what two ears hear.", "carillon-render");
+  app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
+  app.add_option("-o,--output", options.wav, "Stereo WAV file to write")->required()->option_text("OUT.wav");
+  app.add_option("--spectrogram", options.spectrogram, "Picture of the sound: level over time and frequency")->option_text("OUT.png");
+  app.add_option("--trajectory", options.trajectory, "Paths of the bodies and their contacts")->option_text("OUT.json");
+  app.add_option("--report", options.report, "Figures of the run: counts, seconds, level, gain")->option_text("OUT.json");
+  app.add_option("--rate", options.rate_hz, "Sample rate instead of the scene's, 8000 to 192000")
+      ->check(CLI::Range(8000, 192000))
+      ->option_text("HZ");
+  app.add_option("--format", options.format, "pcm16, pcm24 (default) or float, instead of the scene's")
+      ->check(CLI::IsMember(carillon::host::kSampleFormatNames))
+      ->option_text("FORMAT");
+  app.add_flag("-q,--quiet", options.quiet, "No progress");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : carillon::kExitInput;
+  }
+  try {
+    carillon::host::run(options);
+  } catch (const carillon::InputError& error) {
+    return fail(carillon::kExitInput, error.what());
+  } catch (const carillon::SolveError& error) {
+    return fail(carillon::kExitSolve, error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(carillon::kExitSystem, "not enough memory; render a shorter scene or at a lower rate");
+  } catch (const std::exception& error) {
+    return fail(carillon::kExitSystem, error.what());
+  }
+  return 0;
+}

@@ -1,0 +1,23 @@
+// The program carillon-render: scene in, sound out.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace carillon::host {
+
+struct ProgramOptions {
+  std::filesystem::path scene;
+  std::filesystem::path wav;
+  std::optional<std::filesystem::path> spectrogram, trajectory, report;
+  std::optional<int> rate_hz;         // instead of the scene's
+  std::optional<std::string> format;  // instead of the scene's
+  bool quiet = false;                 // no progress
+};
+
+/// Reads everything, simulates, renders, writes everything; prints what it does on stdout, progress and warnings on stderr.
+/// Throws InputError before any work when an input is bad or an output cannot be written.
+void run(const ProgramOptions& options);
+
+}  // namespace carillon::host

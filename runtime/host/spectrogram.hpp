@@ -1,0 +1,37 @@
+// The picture of a sound: level over time and frequency.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "runtime/host/render.hpp"
+
+namespace carillon::host {
+
+/// Short-time spectrum. level_db is (frames, bins) row-major: the level re 20 uPa of a steady tone in that bin, mean square of both ears.
+struct ShortTimeSpectrum {
+  int window = 0;       // samples of a Hann window
+  double bin_hz = 0.0;  // width of a bin
+  double duration_s = 0.0;
+  std::size_t frames = 0;  // centred at (frame + 1/2) / frames * duration
+  std::size_t bins = 0;    // window / 2 + 1
+  std::vector<double> level_db;
+};
+inline constexpr double kFloorDb = -120.0;  // what silence counts as
+
+/// `frames` spectra spread evenly over the sound; where they lie further apart than half a window, the ones between are averaged in.
+ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frames);
+
+/// Where the picture of the spectrum lies in the image, in pixels; frequency runs linearly from 0 at the bottom to the Nyquist frequency at
+/// the top.
+struct SpectrogramLayout {
+  int width = 1400, height = 900;
+  int left = 100, top = 190, plot_width = 1150, plot_height = 620;
+};
+
+/// Draws the spectrogram with its axes (s, Hz), a colour bar (dB re 20 uPa) and the pressure over time above it; returns the bytes of a PNG
+/// file. Throws SystemError when there is no memory for it.
+std::string make_spectrogram_png(const Sound& sound, const std::string& title);
+
+}  // namespace carillon::host
