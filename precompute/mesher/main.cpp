@@ -1,0 +1,344 @@
+// carillon-mesh: a surface or a parametric body to tetrahedra.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <new>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "precompute/mesh/check.hpp"
+#include "precompute/mesh/write.hpp"
+#include "precompute/mesher/surface.hpp"
+#include "precompute/shapes/shapes.hpp"
+#include "runtime/config/document.hpp"
+#include "runtime/config/file.hpp"
+
+namespace {
+
+using namespace carillon;
+using Clock = std::chrono::steady_clock;
+
+/// The command line as it was given.
+struct Order {
+  std::string surface, shape, out, json;
+  std::map<std::string, double> lengths;  // --wall, --height and the dimensions of shapes, by name without dashes
+  std::optional<double> scale, edge;
+  std::optional<long long> nodes;
+  std::string up, method;
+  int order = 1;
+  bool quiet = false;
+};
+
+/// What came out, for both ways of making a mesh.
+struct Result {
+  mesh::TetMesh mesh;
+  std::vector<std::string> notes;
+  std::vector<std::pair<std::string, double>> seconds;
+  std::optional<mesher::SurfaceReport> surface;
+};
+
+double calc_seconds(Clock::time_point since) { return std::chrono::duration<double>(Clock::now() - since).count(); }
+
+std::vector<std::string> list_dimensions() {
+  std::vector<std::string> names{"wall", "height"};
+  for (const shapes::Shape& shape : shapes::get_shapes()) {
+    for (const shapes::Dimension& dimension : shape.dimensions) {
+      if (std::find(names.begin(), names.end(), dimension.name) == names.end()) names.push_back(dimension.name);
+    }
+  }
+  return names;
+}
+
+std::string describe_shapes() {
+  std::string text =
+      "Shapes, their dimensions (metres; in brackets what is taken when one is not given) and the named node sets of their meshes:\n";
+  for (const shapes::Shape& shape : shapes::get_shapes()) {
+    text += fmt::format("  {:<11} {}\n", shape.name, shape.summary);
+    for (const shapes::Dimension& dimension : shape.dimensions) {
+      const std::string fallback = dimension.fallback > 0.0 ? fmt::format("[{:g}]", dimension.fallback) : "[none]";
+      text += fmt::format("    --{:<15} {:<9} {}\n", dimension.name, fallback, dimension.meaning);
+    }
+    text += fmt::format("    node sets: {}\n", fmt::join(shape.node_sets, ", "));
+  }
+  return text +
+         "\nEvery body is centred on the origin, the bowl on the centre of its spheres.\n"
+         "Exit codes: 0 done, 2 the input cannot be used, 4 the machine refused (disk, memory).\n"
+         "Examples:\n"
+         "  carillon-mesh bunny.obj -o bunny.msh --height 0.13 --wall 0.005 --nodes 37000\n"
+         "  carillon-mesh --shape tube --length 0.4 --outer-radius 0.0125 --wall 0.001 --order 2 -o chime.msh\n";
+}
+
+/// A tube and a bowl have one radius to speak of, the outer one: --radius means that.
+void complete_radius(Order& order) {
+  if (order.shape != "tube" && order.shape != "bowl") return;
+  if (!order.lengths.contains("radius")) return;
+  if (order.lengths.contains("outer-radius")) throw InputError("--radius and --outer-radius are the same here; give one of them");
+  order.lengths["outer-radius"] = order.lengths["radius"];
+  order.lengths.erase("radius");
+}
+
+/// Throws InputError for the first option that does not belong to the way of meshing that was asked for.
+void check_options(const Order& order) {
+  if (order.surface.empty() && order.shape.empty()) {
+    throw InputError("nothing to mesh: give a SURFACE file or --shape S (see --help for the shapes)");
+  }
+  if (!order.surface.empty() && !order.shape.empty()) {
+    throw InputError(fmt::format("both a surface ({}) and --shape {} are given; give one of them", order.surface, order.shape));
+  }
+  if (order.nodes && order.edge) throw InputError("--nodes and --edge exclude each other; give one of them");
+  if (std::filesystem::path(order.out).extension() != ".msh") {
+    throw InputError(fmt::format("{}: the mesh is written in Gmsh's format; give the output a name that ends in .msh", order.out));
+  }
+  if (!order.shape.empty()) {
+    const shapes::Shape& shape = shapes::find_shape(order.shape);
+    std::vector<std::string> own;
+    for (const shapes::Dimension& dimension : shape.dimensions) own.push_back(dimension.name);
+    const std::string takes = fmt::format("--{}", fmt::join(own, ", --"));
+    for (const auto& [name, value] : order.lengths) {
+      if (std::find(own.begin(), own.end(), name) != own.end()) continue;
+      const std::string hint = name == "wall" && shape.name == "box" ? "; --shape hollow-box has a wall" : "";
+      throw InputError(fmt::format("--{} does not belong to --shape {}, which takes {}{}", name, shape.name, takes, hint));
+    }
+    const char* foreign = order.scale ? "--scale" : !order.up.empty() ? "--up" : !order.method.empty() ? "--method" : nullptr;
+    if (foreign) {
+      throw InputError(fmt::format("{} is for surfaces; --shape {} takes its dimensions in metres: {}", foreign, shape.name, takes));
+    }
+    return;
+  }
+  for (const auto& [name, value] : order.lengths) {
+    if (name != "wall" && name != "height") {
+      throw InputError(fmt::format("--{} is a dimension of a --shape; a surface takes --height or --scale for its size, and --wall", name));
+    }
+    if (!(value > 0.0) || !std::isfinite(value))
+      throw InputError(fmt::format("--{} is {:g}; give a positive length in metres", name, value));
+  }
+  if (order.scale && order.lengths.contains("height")) throw InputError("--height and --scale exclude each other; give one of them");
+  if (order.scale && (!(*order.scale > 0.0) || !std::isfinite(*order.scale))) {
+    throw InputError(fmt::format("--scale is {:g}; give a positive factor, metres per unit of the file", *order.scale));
+  }
+}
+
+Result make_from_surface(const Order& order, const mesher::Progress& progress) {
+  mesher::SurfaceOptions options;
+  options.surface = order.surface;
+  if (order.lengths.contains("wall")) options.wall_m = order.lengths.at("wall");
+  if (order.lengths.contains("height")) options.height_m = order.lengths.at("height");
+  if (!order.up.empty()) options.up = order.up == "x" ? mesher::Axis::kX : order.up == "y" ? mesher::Axis::kY : mesher::Axis::kZ;
+  options.scale = order.scale;
+  options.edge_m = order.edge;
+  options.nodes = order.nodes;
+  options.order = order.order;
+  if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
+  if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
+  Result result;
+  mesher::SurfaceReport report;
+  result.mesh = mesher::mesh_surface(options, report, progress);
+  result.notes = report.notes;
+  result.seconds = report.seconds;
+  result.surface = std::move(report);
+  return result;
+}
+
+Result make_from_shape(const Order& order, const mesher::Progress& progress) {
+  progress(fmt::format("making the {}", order.shape));
+  const auto start = Clock::now();
+  shapes::ShapeOptions options;
+  options.shape = order.shape;
+  options.dimensions = order.lengths;
+  options.order = order.order;
+  options.target_nodes = order.nodes;
+  options.edge_m = order.edge;
+  Result result;
+  result.mesh = shapes::make_shape(options);
+  result.seconds.emplace_back("mesh", calc_seconds(start));
+  return result;
+}
+
+/// What the count fell short of, or nothing.
+void note_count(const Order& order, Result& result) {
+  if (!order.nodes) return;
+  const double ratio = static_cast<double>(result.mesh.nodes.size()) / static_cast<double>(*order.nodes);
+  if (std::abs(ratio - 1.0) <= 0.1) return;
+  result.notes.push_back(fmt::format("{} nodes were asked for and {} made: the body has no lattice of that count nearer by; ask for more",
+                                     *order.nodes, result.mesh.nodes.size()));
+}
+
+std::string quote(const std::string& text) {
+  std::string quoted = "\"";
+  for (char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) {
+      quoted += fmt::format("\\u{:04x}", static_cast<int>(c));
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
+std::string format_json(const Order& order, const Result& result, const mesh::CheckReport& check, double total_s) {
+  std::vector<std::string> seconds, sets, notes;
+  for (const auto& [phase, value] : result.seconds) seconds.push_back(fmt::format("{}: {:.4f}", quote(phase), value));
+  for (const auto& [name, nodes] : result.mesh.node_sets) sets.push_back(fmt::format("{}: {}", quote(name), nodes.size()));
+  for (const std::string& note : result.notes) notes.push_back(quote(note));
+  std::string text = "{\n";
+  text += fmt::format("  \"output\": {},\n  \"source\": {},\n", quote(order.out), quote(order.shape.empty() ? order.surface : order.shape));
+  text += fmt::format("  \"order\": {},\n  \"nodes\": {},\n  \"tets\": {},\n", result.mesh.order, result.mesh.nodes.size(),
+                      result.mesh.tet_count());
+  if (order.nodes) text += fmt::format("  \"nodes_asked\": {},\n", *order.nodes);
+  text += fmt::format("  \"components\": {},\n  \"boundary_faces\": {},\n", check.components, check.boundary_faces);
+  text += fmt::format("  \"volume_m3\": {:.12g},\n  \"box_low_m\": [{:.12g}],\n  \"box_high_m\": [{:.12g}],\n", check.volume_m3,
+                      fmt::join(check.box_low, ", "), fmt::join(check.box_high, ", "));
+  text += fmt::format("  \"min_dihedral_deg\": {:.4f},\n  \"max_dihedral_deg\": {:.4f},\n", check.min_dihedral_deg, check.max_dihedral_deg);
+  text += fmt::format("  \"mean_ratio_min\": {:.5f},\n  \"mean_ratio_mean\": {:.5f},\n", check.mean_ratio_min, check.mean_ratio_mean);
+  if (result.surface) {
+    const mesher::SurfaceReport& s = *result.surface;
+    text +=
+        fmt::format("  \"method\": {},\n  \"input_triangles\": {},\n  \"scale\": {:.12g},\n  \"input_volume_m3\": {:.12g},\n",
+                    quote(s.method == mesher::Method::kStuffing ? "stuffing" : "delaunay"), s.input_triangles, s.scale, s.input_volume_m3);
+    text += fmt::format(
+        "  \"expected_volume_m3\": {:.12g},\n  \"wall_min_m\": {:.9g},\n  \"wall_mean_m\": {:.9g},\n  \"wall_max_m\": {:.9g},\n",
+        s.expected_volume_m3, s.wall_min_m, s.wall_mean_m, s.wall_max_m);
+  }
+  text += fmt::format("  \"node_sets\": {{{}}},\n  \"seconds\": {{{}}},\n  \"seconds_total\": {:.4f},\n  \"notes\": [{}]\n}}\n",
+                      fmt::join(sets, ", "), fmt::join(seconds, ", "), total_s, fmt::join(notes, ", "));
+  return text;
+}
+
+std::string format_report(const Order& order, const Result& result, const mesh::CheckReport& check, double total_s) {
+  std::string text;
+  if (result.surface) text += mesher::describe(*result.surface);
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  text += fmt::format("{}: {} nodes, {} tetrahedra of {} nodes\n", order.out, result.mesh.nodes.size(), result.mesh.tet_count(),
+                      result.mesh.nodes_per_tet());
+  text += fmt::format("  size      {:.6g} x {:.6g} x {:.6g} m, volume {:.6g} m3\n", check.box_high[0] - check.box_low[0],
+                      check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2], check.volume_m3);
+  text += fmt::format("  quality   dihedral angles {:.1f} to {:.1f} degrees, mean ratio {:.3f} on average, {:.3f} at worst\n",
+                      check.min_dihedral_deg, check.max_dihedral_deg, check.mean_ratio_mean, check.mean_ratio_min);
+  std::vector<std::string> sets, seconds;
+  for (const auto& [name, nodes] : result.mesh.node_sets) sets.push_back(fmt::format("{} ({})", name, nodes.size()));
+  if (!sets.empty()) text += fmt::format("  node sets {}\n", fmt::join(sets, ", "));
+  for (const auto& [phase, value] : result.seconds) seconds.push_back(fmt::format("{} {:.2f}", phase, value));
+  text += fmt::format("  seconds   {:.2f} in all: {}\n", total_s, fmt::join(seconds, ", "));
+  return text;
+}
+
+void make_mesh(const Order& order) {
+  const auto start = Clock::now();
+  const mesher::Progress progress = [&](std::string_view phase) {
+    if (order.quiet) return;
+    fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), phase);
+    std::fflush(stderr);
+  };
+  check_options(order);
+  config::check_writable(order.out, "mesh");
+  if (!order.json.empty()) config::check_writable(order.json, "report");
+
+  Result result = order.shape.empty() ? make_from_surface(order, progress) : make_from_shape(order, progress);
+  note_count(order, result);
+  progress("checking the mesh");
+  auto phase = Clock::now();
+  const mesh::CheckReport check = mesh::check_mesh(result.mesh, order.out);
+  result.notes.insert(result.notes.end(), check.warnings.begin(), check.warnings.end());
+  result.seconds.emplace_back("check", calc_seconds(phase));
+  progress(fmt::format("writing {}", order.out));
+  phase = Clock::now();
+  mesh::write_gmsh(result.mesh, order.out);
+  result.seconds.emplace_back("write", calc_seconds(phase));
+
+  const double total_s = calc_seconds(start);
+  if (!order.json.empty()) config::write_file(order.json, format_json(order, result, check, total_s));
+  fmt::print("{}", format_report(order, result, check, total_s));
+  std::set<std::string> told;
+  for (const std::string& note : result.notes) {
+    if (told.insert(note).second) fmt::print("  note      {}\n", note);
+  }
+  if (std::fflush(stdout) != 0) throw SystemError("the report cannot be written");
+}
+
+/// Adds the nearest known option to CLI11's complaint about an unknown one.
+[[noreturn]] void throw_unknown(const CLI::App& app, const std::string& complaint) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  std::string message = complaint;
+  for (const std::string& word : app.remaining()) {
+    const std::string name = word.substr(0, word.find('='));
+    const std::string nearest = name.starts_with("-") ? config::find_nearest(name, known) : "";
+    message = name.starts_with("-") ? fmt::format("unknown option {}", name) : fmt::format("unexpected argument '{}'", word);
+    message += nearest.empty() ? "; see --help" : fmt::format("; did you mean {}?", nearest);
+    break;
+  }
+  throw InputError(message);
+}
+
+int run(int argc, char** argv) {
+  Order order;
+  CLI::App app("Meshes a closed surface, or a parametric body, with tetrahedra.");
+  app.name("carillon-mesh");
+  app.footer(describe_shapes());
+  app.add_option("SURFACE", order.surface, "Closed surface: OBJ, STL, PLY or OFF");
+  app.add_option("--shape", order.shape, "A parametric body in place of a surface: bar, tube, plate, sphere, bowl, box or hollow-box");
+  app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh)")->required();
+  app.add_option("--scale", order.scale, "Surface: metres per unit of the file");
+  app.add_option("--up", order.up, "Surface: the axis along which --height is measured [y]")->check(CLI::IsMember({"x", "y", "z"}));
+  app.add_option("--method", order.method, "Surface: delaunay (keeps sharp edges) or stuffing (fast, takes raw scans, rounds edges) [auto]")
+      ->check(CLI::IsMember({"auto", "delaunay", "stuffing"}));
+  app.add_option("--nodes", order.nodes, "About how many nodes, mid-side nodes among them (within 10 %)");
+  app.add_option("--edge", order.edge, "Length of the edges in metres, in place of --nodes");
+  app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [1]")->check(CLI::IsMember({1, 2}));
+  app.add_option("--json", order.json, "Writes the report as JSON to this file too");
+  app.add_flag("--quiet", order.quiet, "No progress on the way");
+  std::map<std::string, std::string> help{
+      {"wall", "Surface: thickness of the hollow shell in metres, inward; solid without it. Also of tube, sphere, bowl and hollow-box"},
+      {"height", "Surface: scales it to this extent in metres along --up. Also an edge of box and hollow-box"},
+      {"radius", "Radius of a sphere in metres; for tube and bowl the same as --outer-radius"},
+      {"opening-angle", "Of a bowl, in degrees; see below"}};
+  for (const std::string& name : list_dimensions()) {
+    const std::string text = help.contains(name) ? help[name] : "Dimension of shapes in metres; see below";
+    app.add_option_function<double>(
+        "--" + name, [&order, name](double value) { order.lengths[name] = value; }, text);
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ExtrasError& error) {
+    throw_unknown(app, error.what());
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    throw InputError(fmt::format("{}; see carillon-mesh --help", error.what()));
+  }
+  complete_radius(order);
+  make_mesh(order);
+  return 0;
+}
+
+int fail(const char* what, int code) {
+  std::fflush(stdout);
+  fmt::print(stderr, "carillon-mesh: {}\n", what);
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const carillon::InputError& error) {
+    return fail(error.what(), carillon::kExitInput);
+  } catch (const carillon::SolveError& error) {
+    return fail(error.what(), carillon::kExitSolve);
+  } catch (const std::bad_alloc&) {
+    return fail("out of memory; ask for fewer nodes", carillon::kExitSystem);
+  } catch (const std::exception& error) {
+    return fail(error.what(), carillon::kExitSystem);
+  }
+}
