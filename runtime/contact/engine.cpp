@@ -54,6 +54,7 @@ Engine::Engine(const WorldModel& world) : world_(world), matter_(system_), force
     const Transform pose = make_pose(body.initial);
     const Point spin = to_vec(body.angular_velocity_rad_s);
     m.setQToFitTransform(initial_, pose);
+    system_.realize(initial_, SimTK::Stage::Position);
     m.setUToFitVelocity(initial_, SpatialVec(spin, to_vec(body.velocity_m_s) - spin % (pose.R() * to_vec(body.centre_m))));
   }
   check_overlaps();
@@ -136,12 +137,13 @@ Snapshot Engine::calc_snapshot(const State& state) const {
 }
 
 void Engine::set_velocities(State& state, const std::vector<Mobile>& mobiles) const {
-  system_.realize(state, SimTK::Stage::Position);
+  const Snapshot now = calc_snapshot(state);  // before the first change, which takes the caches away
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     if (world_.bodies[i].fixed) continue;
-    const MobilizedBody& m = matter_.getMobilizedBody(bodies_[i].mobilized);
-    const Point to_origin = m.getBodyTransform(state).p() - mobiles[i].centre;
-    m.setUToFitVelocity(state, SpatialVec(mobiles[i].spin, mobiles[i].velocity + mobiles[i].spin % to_origin));
+    const Point to_origin = now.poses[i].p() - mobiles[i].centre;
+    system_.realize(state, SimTK::Stage::Position);
+    matter_.getMobilizedBody(bodies_[i].mobilized)
+        .setUToFitVelocity(state, SpatialVec(mobiles[i].spin, mobiles[i].velocity + mobiles[i].spin % to_origin));
   }
 }
 

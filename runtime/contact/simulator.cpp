@@ -31,12 +31,16 @@ constexpr double kContactStep = 5e-4;     // s; while something touches
 constexpr double kTogether = 1e-4;        // s; touches nearer in time than this are one impact (a Hertz contact lasts about as long)
 constexpr double kTouchDepth = 3e-7;      // m; how well the first instant of a touch is found
 constexpr double kTouchTime = 2e-7;       // s; the same in time
+constexpr double kRollingTime = 10e-3;    // s; a body that rolls or slides over the corners of its own mesh hops from one to the next so fast ...
+constexpr double kRollingSpeed = 0.1;     // m/s; ... and lands on them slower than this: that is the mesh, not the body, and must not be heard
+constexpr double kSamePlace = 2e-4;       // m; a bouncing body comes back to the same place, a rolling one does not
 constexpr double kPoseInterval = 2e-3;    // s
 
-/// A spot that was in contact when the step began and is not about to leave.
+/// A point that was in contact a moment ago.
 struct OldPoint {
   int a, b;
   Point in_a;
+  double time_s;
 };
 
 struct Step {
@@ -53,7 +57,8 @@ class Simulator {
  private:
   void record_poses(bool always);
   std::vector<OldPoint> find_old(const Snapshot& now, const std::vector<TouchPoint>& touches) const;
-  bool is_old(const TouchPoint& touch, const Snapshot& now) const;
+  bool is_old(const TouchPoint& touch, const Snapshot& now, double approach) const;
+  void remember(const Snapshot& now, const std::vector<TouchPoint>& touches);
   std::vector<TouchPoint> find_fresh(const Snapshot& now) const;
   Step calc_step(double step_s);
   void strike();
@@ -63,7 +68,8 @@ class Simulator {
   Engine engine_;
   double duration_s_;
   State state_;
-  std::vector<OldPoint> old_;
+  std::vector<OldPoint> old_;     // in contact when the step began and not about to leave
+  std::vector<OldPoint> recent_;  // in contact within the last kRollingTime
   Simulation result_;
   int stuck_ = 0;  // impacts in a row with no time between them
 };
@@ -75,21 +81,40 @@ double calc_approach(const Engine& engine, const Snapshot& now, const TouchPoint
 std::vector<OldPoint> Simulator::find_old(const Snapshot& now, const std::vector<TouchPoint>& touches) const {
   std::vector<OldPoint> old;
   for (const TouchPoint& t : touches) {
-    if (calc_approach(engine_, now, t) > -0.5 * kSlowest) old.push_back({t.a, t.b, ~now.poses[t.a] * t.where});
+    if (calc_approach(engine_, now, t) > -0.5 * kSlowest) old.push_back({t.a, t.b, ~now.poses[t.a] * t.where, state_.getTime()});
   }
   return old;
 }
 
-bool Simulator::is_old(const TouchPoint& t, const Snapshot& now) const {
+/// Does the touch belong to a spot that is in contact anyway, or to a body that rolls?
+bool Simulator::is_old(const TouchPoint& t, const Snapshot& now, double approach) const {
   const Point in_a = ~now.poses[t.a] * t.where;
   const double near = engine_.spot_radius_m(t.a, t.b);
-  return std::any_of(old_.begin(), old_.end(), [&](const OldPoint& o) { return o.a == t.a && o.b == t.b && (o.in_a - in_a).norm() < near; });
+  const auto is_near = [&](const OldPoint& o) { return o.a == t.a && o.b == t.b && (o.in_a - in_a).norm() < near; };
+  if (std::any_of(old_.begin(), old_.end(), is_near)) return true;
+  if (approach > kRollingSpeed) return false;
+  // Only the latest touches count; one of them at the very same place means a bounce.
+  bool rolls = false;
+  for (const OldPoint& o : recent_) {
+    if (!is_near(o)) continue;
+    if ((o.in_a - in_a).norm() < kSamePlace) return false;
+    rolls = true;
+  }
+  return rolls;
+}
+
+void Simulator::remember(const Snapshot& now, const std::vector<TouchPoint>& touches) {
+  const double time = state_.getTime();
+  const auto stale = [&](const OldPoint& o) { return o.time_s < time - kRollingTime; };
+  recent_.erase(std::remove_if(recent_.begin(), recent_.end(), stale), recent_.end());
+  for (const TouchPoint& t : touches) recent_.push_back({t.a, t.b, ~now.poses[t.a] * t.where, time});
 }
 
 std::vector<TouchPoint> Simulator::find_fresh(const Snapshot& now) const {
   std::vector<TouchPoint> fresh;
   for (const TouchPoint& t : engine_.find_touches(now.poses)) {
-    if (calc_approach(engine_, now, t) > kSlowest && !is_old(t, now)) fresh.push_back(t);
+    const double approach = calc_approach(engine_, now, t);
+    if (approach > kSlowest && !is_old(t, now, approach)) fresh.push_back(t);
   }
   return fresh;
 }
@@ -149,8 +174,9 @@ void Simulator::strike() {
   for (const auto& [key, touch] : together) {
     touches.push_back(touch);
     points.push_back(engine_.make_impact_point(touch));
-    if (is_old(touch, now)) points.back().restitution = 0.0;
+    if (is_old(touch, now, calc_approach(engine_, now, touch))) points.back().restitution = 0.0;
   }
+  remember(now, touches);
   Snapshot after = now;
   solve_impact(after.mobiles, points, kSlowest);
   engine_.set_velocities(state_, after.mobiles);
@@ -247,6 +273,7 @@ Simulation Simulator::run(const std::function<void(double)>& progress) {
     const Snapshot now = engine_.calc_snapshot(state_);
     const auto touches = engine_.find_touches(now.poses);
     old_ = find_old(now, touches);
+    remember(now, touches);
     engine_.set_resting(touches);
     double step = std::min(engine_.calc_largest_step(now), duration_s_ - state_.getTime());
     if (!touches.empty()) step = std::min(step, kContactStep);
