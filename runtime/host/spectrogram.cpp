@@ -143,7 +143,7 @@ void draw_axes(cairo_t* cr, const SpectrogramLayout& at, double duration_s, doub
     draw_line(cr, at.left - 8, y, at.left - 1, y);
     draw_text(cr, at.left - 13, y + 6, fmt::format("{:g}", i * freq_step), Anchor::kRight);
   }
-  draw_upright_text(cr, 30, at.top + at.plot_height / 2, "Frequency (Hz)");
+  draw_upright_text(cr, 28, at.top + at.plot_height / 2, "Frequency (Hz)");
 }
 
 void draw_color_bar(cairo_t* cr, const SpectrogramLayout& at, double top_db) {
@@ -193,7 +193,7 @@ void draw_pressure(cairo_t* cr, const SpectrogramLayout& at, const Sound& sound,
     draw_text(cr, at.left - 8, top + 14, fmt::format("{:.2g}", peak_pa), Anchor::kRight);
     draw_text(cr, at.left - 8, top + height, fmt::format("−{:.2g}", peak_pa), Anchor::kRight);
   }
-  draw_upright_text(cr, 30, middle, "Pressure (Pa)");
+  draw_upright_text(cr, 28, middle, "Pressure (Pa)");
 }
 
 cairo_status_t append_bytes(void* closure, const unsigned char* data, unsigned int length) {

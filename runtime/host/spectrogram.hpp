@@ -27,7 +27,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frame
 /// the top.
 struct SpectrogramLayout {
   int width = 1400, height = 900;
-  int left = 100, top = 190, plot_width = 1150, plot_height = 620;
+  int left = 112, top = 190, plot_width = 1140, plot_height = 620;
 };
 
 /// Draws the spectrogram with its axes (s, Hz), a colour bar (dB re 20 uPa) and the pressure over time above it; returns the bytes of a PNG

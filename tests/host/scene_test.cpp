@@ -1,0 +1,153 @@
+#include "runtime/host/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "runtime/host/pose.hpp"
+
+namespace carillon::host {
+namespace {
+
+std::string read_text(const std::string& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+Scene parse(const std::string& text) { return parse_scene(config::parse_document(text, "/somewhere/scene.json")); }
+
+const std::string kBody = R"("bodies": [{"name": "a", "bank": "a.h5"}])";
+
+TEST(Scene, AWholeSceneIsRead) {
+  const Scene scene = parse(read_text(std::string(CARILLON_SOURCE_DIR) + "/tests/host/scenes/drop.json"));
+  EXPECT_EQ(scene.duration_s, 1.5);
+  EXPECT_EQ(scene.sample_rate_hz, 48000);
+  ASSERT_TRUE(scene.ground.has_value());
+  EXPECT_EQ(scene.ground->young_modulus_pa, 30e9);
+  ASSERT_EQ(scene.bodies.size(), 2u);
+  EXPECT_EQ(scene.bodies[0].bank, "/somewhere/cube.h5");
+  EXPECT_EQ(scene.bodies[0].spec.velocity_m_s[2], -0.5);
+  EXPECT_TRUE(scene.bodies[1].spec.fixed);
+  EXPECT_NEAR(scene.listener.facing[0], -0.3 / std::sqrt(0.09 + 1.0 + 0.09), 1e-12);
+  EXPECT_FALSE(scene.output.gain_per_pa.has_value());
+}
+
+TEST(Scene, WhatIsLeftOutHasItsDefault) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kBody + "}");
+  EXPECT_EQ(scene.sample_rate_hz, 48000);
+  EXPECT_EQ(scene.gravity_m_s2[2], -9.81);
+  EXPECT_FALSE(scene.ground.has_value());
+  EXPECT_EQ(scene.listener.ear_distance_m, 0.2);
+  EXPECT_EQ(scene.output.format, SampleFormat::kPcm24);
+  EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": 0.25}, " + kBody + "}").output.gain_per_pa, 0.25);
+  EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": \"auto\"}, " + kBody + "}").output.gain_per_pa, std::nullopt);
+}
+
+TEST(Scene, AnglesTurnAboutTheFixedAxesXThenYThenZ) {
+  const Scene scene =
+      parse(R"({"duration_s": 1, "bodies": [{"name": "a", "bank": "a.h5", "rotation_deg": [90, 0, 90], "position_m": [1, 2, 3]}]})");
+  // y goes to z by the turn about x, and stays there; x goes to y by the turn about z; z goes to -y, then to x.
+  const auto check = [&](const Vec3& body, const Vec3& world) {
+    const Vec3 x = calc_world_point(scene.bodies[0].spec.initial, body);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], world[k], 1e-12);
+  };
+  check({0, 1, 0}, {1, 2, 4});
+  check({1, 0, 0}, {1, 3, 3});
+  check({0, 0, 1}, {2, 2, 3});
+}
+
+TEST(Scene, TheLeftEarIsOnTheLeft) {
+  Listener listener;
+  listener.position_m = {1.0, 2.0, 3.0};
+  listener.facing = {0.0, 1.0, 0.0};
+  auto ears = calc_ears(listener);
+  EXPECT_NEAR(ears[0][0], 0.9, 1e-12);
+  EXPECT_NEAR(ears[1][0], 1.1, 1e-12);
+  EXPECT_NEAR(ears[0][2], 3.0, 1e-12);
+  listener.facing = {0.0, 0.0, -1.0};
+  ears = calc_ears(listener);
+  EXPECT_NEAR(std::hypot(ears[0][0] - ears[1][0], ears[0][1] - ears[1][1], ears[0][2] - ears[1][2]), 0.2, 1e-12);
+}
+
+struct BadScene {
+  const char* name;
+  std::string text;
+  std::vector<const char*> words;
+};
+
+void PrintTo(const BadScene& bad, std::ostream* out) { *out << bad.name; }
+
+class BadSceneTest : public ::testing::TestWithParam<BadScene> {};
+
+TEST_P(BadSceneTest, IsRefusedWithAMessageThatNamesThePlace) {
+  try {
+    parse(GetParam().text);
+    FAIL() << "it was accepted";
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(message.rfind("/somewhere/scene.json:", 0), 0u) << message;
+    for (const char* word : GetParam().words) EXPECT_NE(message.find(word), std::string::npos) << "no \"" << word << "\" in: " << message;
+  }
+}
+
+std::string with_body(const std::string& keys) {
+  return "{\"duration_s\": 1,\n \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\",\n  " + keys + "}]}";
+}
+std::string with_root(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n" + keys + "}"; }
+
+INSTANTIATE_TEST_SUITE_P(
+    Scene, BadSceneTest,
+    ::testing::Values(BadScene{"empty", "", {"JSON"}}, BadScene{"cut_short", "{\"duration_s\": 1, \"bodies\": [", {"JSON"}},
+                      BadScene{"a_list", "[1, 2]", {"object"}}, BadScene{"no_duration", "{" + kBody + "}", {"duration_s", "missing"}},
+                      BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "greater than 0"}},
+                      BadScene{"duration_as_text", "{\"duration_s\": \"1\", " + kBody + "}", {"duration_s", "number"}},
+                      BadScene{"endless", "{\"duration_s\": 1e9, " + kBody + "}", {"duration_s", "too long", "3600"}},
+                      BadScene{"too_much_memory",
+                               "{\"duration_s\": 3000, \"sample_rate_hz\": 192000, " + kBody + "}",
+                               {"duration_s", "memory", "sample_rate_hz"}},
+                      BadScene{"low_rate", with_root("\"sample_rate_hz\": 100"), {":2:", "sample_rate_hz", "8000"}},
+                      BadScene{"no_bodies", "{\"duration_s\": 1}", {"bodies", "at least one"}},
+                      BadScene{"empty_bodies", "{\"duration_s\": 1, \"bodies\": []}", {"bodies", "at least one"}},
+                      BadScene{"misspelt_key", with_root("\"gravity_ms2\": [0, 0, 0]"), {":2:", "gravity_ms2", "gravity_m_s2"}},
+                      BadScene{"misspelt_body_key", with_body("\"positon_m\": [0, 0, 0]"), {":3:", "positon_m", "position_m"}},
+                      BadScene{"body_without_bank", "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\"}]}", {"bank", "missing"}},
+                      BadScene{"body_without_name", "{\"duration_s\": 1, \"bodies\": [{\"bank\": \"a.h5\"}]}", {"name", "missing"}},
+                      BadScene{
+                          "twice_the_name",
+                          "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\"}, {\"name\": \"a\", \"bank\": \"b.h5\"}]}",
+                          {"already", "\"a\"", "another name"}},
+                      BadScene{"two_numbers", with_body("\"position_m\": [0, 0]"), {":3:", "position_m", "3 numbers"}},
+                      BadScene{"far_away", with_body("\"position_m\": [0, 0, 1e9]"), {"position_m", "out of range", "10000"}},
+                      BadScene{"bent_quaternion", with_body("\"quaternion\": [1, 1, 0, 0]"), {"quaternion", "1.41421", "length 1"}},
+                      BadScene{"two_rotations",
+                               with_body("\"quaternion\": [1, 0, 0, 0], \"rotation_deg\": [0, 0, 0]"),
+                               {"quaternion", "rotation_deg", "keep one"}},
+                      BadScene{"moving_shelf", with_body("\"fixed\": true, \"velocity_m_s\": [1, 0, 0]"), {"velocity_m_s", "fixed"}},
+                      BadScene{"too_bouncy", with_body("\"restitution\": 1.5"), {"restitution", "from 0 to 1"}},
+                      BadScene{"negative_friction", with_body("\"friction\": -0.1"), {"friction", "out of range"}},
+                      BadScene{"faster_than_sound", with_body("\"velocity_m_s\": [400, 0, 0]"), {"velocity_m_s", "300"}},
+                      BadScene{"fixed_as_number", with_body("\"fixed\": 1"), {"fixed", "true or false"}},
+                      BadScene{"soft_ground", with_root("\"ground\": {\"young_modulus_pa\": 0}"), {"young_modulus_pa", "greater than 0"}},
+                      BadScene{"impossible_ground", with_root("\"ground\": {\"poisson_ratio\": 0.5}"), {"poisson_ratio", "0.5"}},
+                      BadScene{"ground_as_number", with_root("\"ground\": 0"), {"ground", "object"}},
+                      BadScene{"nowhere_to_look",
+                               with_root("\"listener\": {\"position_m\": [1, 1, 1], \"look_at_m\": [1, 1, 1]}"),
+                               {"look_at_m", "direction"}},
+                      BadScene{"two_directions",
+                               with_root("\"listener\": {\"facing\": [1, 0, 0], \"look_at_m\": [1, 1, 1]}"),
+                               {"look_at_m", "facing", "keep one"}},
+                      BadScene{"giant_head", with_root("\"listener\": {\"ear_distance_m\": 11}"), {"ear_distance_m", "from 0 to 10"}},
+                      BadScene{"gain_word", with_root("\"output\": {\"gain\": \"loud\"}"), {"gain", "auto", "number"}},
+                      BadScene{"gain_list", with_root("\"output\": {\"gain\": [1]}"), {"gain", "auto", "number"}},
+                      BadScene{"gain_zero", with_root("\"output\": {\"gain\": 0}"), {"gain", "greater than 0"}},
+                      BadScene{"unknown_format", with_root("\"output\": {\"format\": \"pcm25\"}"), {"format", "pcm24"}},
+                      BadScene{"key_twice", "{\"duration_s\": 1, \"duration_s\": 2, " + kBody + "}", {"duration_s"}}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace carillon::host

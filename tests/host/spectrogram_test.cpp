@@ -1,0 +1,112 @@
+#include "runtime/host/spectrogram.hpp"
+
+#include <cairo.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+namespace carillon::host {
+namespace {
+
+Sound make_tone(double freq_hz, double amplitude_pa, int rate_hz, double seconds) {
+  Sound sound;
+  sound.rate_hz = rate_hz;
+  for (auto& ear : sound.pressure_pa) {
+    for (int n = 0; n < seconds * rate_hz; ++n) ear.push_back(amplitude_pa * std::sin(2 * std::numbers::pi * freq_hz * n / rate_hz));
+  }
+  return sound;
+}
+
+/// Brightness of the picture's pixels, as cairo reads the PNG.
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<int> brightness;
+  explicit Picture(const std::string& png) {
+    struct Source {
+      const std::string* bytes;
+      std::size_t at;
+    } source{&png, 0};
+    const auto read = [](void* closure, unsigned char* data, unsigned int length) {
+      auto& from = *static_cast<Source*>(closure);
+      if (from.at + length > from.bytes->size()) return CAIRO_STATUS_READ_ERROR;
+      std::memcpy(data, from.bytes->data() + from.at, length);
+      from.at += length;
+      return CAIRO_STATUS_SUCCESS;
+    };
+    cairo_surface_t* surface = cairo_image_surface_create_from_png_stream(read, &source);
+    EXPECT_EQ(cairo_surface_status(surface), CAIRO_STATUS_SUCCESS);
+    width = cairo_image_surface_get_width(surface);
+    height = cairo_image_surface_get_height(surface);
+    for (int y = 0; y < height; ++y) {
+      const unsigned char* row = cairo_image_surface_get_data(surface) + y * cairo_image_surface_get_stride(surface);
+      for (int x = 0; x < width; ++x) brightness.push_back(row[4 * x] + row[4 * x + 1] + row[4 * x + 2]);
+    }
+    cairo_surface_destroy(surface);
+  }
+  int at(int x, int y) const { return brightness[static_cast<std::size_t>(y) * width + x]; }
+};
+
+TEST(Spectrogram, AToneHasItsLevelAndItsBin) {
+  // 1 Pa rms is 93.98 dB; 46 bins of 48000 / 2048 Hz exactly, and 0.4 of a bin beside it.
+  const double bin_hz = 48000.0 / 2048.0;
+  const auto on = calc_short_time_spectrum(make_tone(46 * bin_hz, std::sqrt(2.0), 48000, 1.0), 50);
+  ASSERT_EQ(on.window, 2048);
+  EXPECT_NEAR(on.level_db[25 * on.bins + 46], 93.979, 0.01);
+  EXPECT_LT(on.level_db[25 * on.bins + 60], 40.0);
+  const auto beside = calc_short_time_spectrum(make_tone(46.4 * bin_hz, std::sqrt(2.0), 48000, 1.0), 50);
+  EXPECT_NEAR(beside.level_db[25 * beside.bins + 46], 93.979, 1.0);
+}
+
+TEST(Spectrogram, ALongSoundIsAveragedBetweenItsColumns) {
+  // 100 columns over 20 s: a click anywhere must be seen.
+  Sound sound = make_tone(1000.0, 0.0, 48000, 20.0);
+  for (auto& ear : sound.pressure_pa) ear[48000 * 7 + 3210] = 1.0;
+  const auto spectrum = calc_short_time_spectrum(sound, 100);
+  double loudest = kFloorDb;
+  std::size_t where = 0;
+  for (std::size_t frame = 0; frame < 100; ++frame) {
+    if (spectrum.level_db[frame * spectrum.bins + 400] > loudest) {
+      loudest = spectrum.level_db[frame * spectrum.bins + 400];
+      where = frame;
+    }
+  }
+  EXPECT_GT(loudest, 0.0);
+  EXPECT_EQ(where, 35u);
+}
+
+TEST(Spectrogram, TheRidgeOfAToneIsAtItsPixelRow) {
+  const SpectrogramLayout at;
+  for (const int rate : {48000, 44100, 8000}) {
+    for (const double part : {0.11, 0.5, 0.83}) {
+      const double freq = part * rate / 2;
+      const Picture picture(make_spectrogram_png(make_tone(freq, 0.3, rate, 1.0), "a tone"));
+      ASSERT_EQ(picture.width, at.width);
+      ASSERT_EQ(picture.height, at.height);
+      for (const int x : {at.left + at.plot_width / 4, at.left + at.plot_width / 2}) {
+        int best = at.top;
+        for (int y = at.top; y < at.top + at.plot_height; ++y) {
+          if (picture.at(x, y) > picture.at(x, best)) best = y;
+        }
+        const double expected = at.top + at.plot_height * (1.0 - part);
+        EXPECT_NEAR(best + 0.5, expected, 1.6) << freq << " Hz at " << rate;
+        EXPECT_LT(picture.at(x, at.top + at.plot_height / 4 + (part > 0.6 ? 200 : 0)), 150);
+      }
+    }
+  }
+}
+
+TEST(Spectrogram, SilenceIsADarkPicture) {
+  const SpectrogramLayout at;
+  const Picture picture(make_spectrogram_png(make_tone(1000.0, 0.0, 48000, 0.2), "silence"));
+  for (int x = at.left; x < at.left + at.plot_width; x += 50) EXPECT_LT(picture.at(x, at.top + at.plot_height / 2), 10);
+}
+
+TEST(Spectrogram, AVeryShortSoundIsDrawn) {
+  const Picture picture(make_spectrogram_png(make_tone(1000.0, 1.0, 48000, 5e-5), "two samples"));
+  EXPECT_GT(picture.width, 0);
+}
+
+}  // namespace
+}  // namespace carillon::host
