@@ -1,0 +1,23 @@
+# Writes OUTPUT, a C++ file that defines kGitId: the commit of SOURCE, "-dirty" when tracked files differ from it, "unknown" outside git.
+# Run at every build; the file is touched only when the answer changes.
+set(id "unknown")
+find_program(git git)
+if(git)
+  execute_process(COMMAND ${git} -C ${SOURCE} rev-parse HEAD OUTPUT_VARIABLE commit RESULT_VARIABLE status
+    OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  if(status EQUAL 0)
+    execute_process(COMMAND ${git} -C ${SOURCE} --no-optional-locks diff --quiet HEAD -- RESULT_VARIABLE dirty OUTPUT_QUIET ERROR_QUIET)
+    set(id "${commit}")
+    if(NOT dirty EQUAL 0)
+      string(APPEND id "-dirty")
+    endif()
+  endif()
+endif()
+set(text "#include \"precompute/io/git_id.hpp\"\n\nnamespace carillon::io {\n\nconst char* const kGitId = \"${id}\";\n\n}  // namespace carillon::io\n")
+set(old "")
+if(EXISTS ${OUTPUT})
+  file(READ ${OUTPUT} old)
+endif()
+if(NOT old STREQUAL text)
+  file(WRITE ${OUTPUT} "${text}")
+endif()

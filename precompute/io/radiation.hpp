@@ -1,0 +1,36 @@
+// How loud a mode is: its radiation gain from the motion of the outer surface. Equations: docs/equations.md, radiation.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::io {
+
+using bank::Vec3;
+using Triangle = std::array<std::int32_t, 3>;
+
+inline constexpr double kAirDensityKgM3 = 1.21;   // OCE01 section 4
+inline constexpr double kSoundSpeedMS = 343.0;
+
+/// The triangles that face the open air: those of closed shells (connected through edges) that enclose a positive volume. The wall of a
+/// closed cavity encloses a negative one; it moves air that cannot get out. A body open to the outside, such as a bowl, is one shell.
+/// Not collective.
+std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles);
+
+/// Calculates per mode the pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s):
+///   g = rho0 omega / (4 pi sqrt(1 + (k a)^2)) * sum over outer triangles of integral |phi . n| dA,   k = omega / c0,  a = sqrt(A / 4 pi),
+/// with A the area of the outer triangles. omega_rad_s: (m); shapes: (V, m, 3) [kg^-1/2] at the vertices, linear over each triangle.
+/// Exact for a pulsating sphere; OSG02 section 3.4 with the absolute value inside the integral, because the signed sum of a bending mode of a symmetric
+/// body is zero. Directions and interference are left out: an upper estimate for modes whose lobes are short against the wavelength.
+/// Not collective.
+std::vector<double> calc_radiation_gain(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles,
+                                        std::span<const double> omega_rad_s, std::span<const double> shapes);
+
+/// The integral of |f| over a triangle of the given area, f linear with the values a, b, c at the corners; exact. Not collective.
+double calc_absolute_integral(double area, double a, double b, double c);
+
+}  // namespace carillon::io

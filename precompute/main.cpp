@@ -1,0 +1,91 @@
+// carillon-precompute: one job to one mode bank, on as many ranks as mpirun starts.
+#include <fmt/core.h>
+#include <mpi.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <thread>
+
+#include "precompute/io/run_job.hpp"
+#include "precompute/io/run_record.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace {
+
+using namespace carillon;
+
+/// Prints the message once and returns the exit code. Errors are agreed on before they are thrown, so all ranks get here; should one get
+/// here alone, it would leave the others waiting for ever, so after a while it speaks for itself and ends them all.
+int fail(MPI_Comm comm, int rank, int code, const std::string& message) {
+  std::fflush(stdout);
+  MPI_Request request = MPI_REQUEST_NULL;
+  int all_here = 0;
+  MPI_Ibarrier(comm, &request);
+  for (int wait_ms = 0; wait_ms < 5000 && all_here == 0; wait_ms += 10) {
+    MPI_Test(&request, &all_here, MPI_STATUS_IGNORE);
+    if (all_here == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  if (rank == 0 || all_here == 0) fmt::print(stderr, "carillon-precompute: error: {}\n", message);
+  std::fflush(stderr);
+  if (all_here == 0) MPI_Abort(MPI_COMM_WORLD, code);
+  return code;
+}
+
+void print_start(const petsc::Session& session, bool quiet) {
+  if (session.rank() != 0) return;
+  if (!quiet)
+    fmt::print("carillon-precompute {} on {} rank{}, BLAS: {}\n", CARILLON_VERSION, session.size(), session.size() == 1 ? "" : "s",
+               petsc::blas_name());
+  std::fflush(stdout);
+  if (petsc::blas_is_reference())
+    fmt::print(stderr, "carillon-precompute: warning: this is the reference BLAS, about 14 times slower than OpenBLAS; "
+                       "apt-get install libopenblas0-serial\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const petsc::Session session(argc, argv);
+    petsc::pin_blas_threads();
+    MPI_Comm failures = MPI_COMM_NULL;
+    MPI_Comm_dup(MPI_COMM_WORLD, &failures);
+    CLI::App app("Computes the vibration modes of a solid body and writes them as a mode bank.\n"
+                 "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json", "carillon-precompute");
+    std::string job;
+    bool quiet = false;
+    app.add_option("JOB", job, "job file (JSON with // comments)")->required();
+    app.add_flag("-q,--quiet", quiet, "no progress on standard output");
+    app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
+    int code = 0;
+    try {
+      app.parse(argc, argv);
+      print_start(session, quiet);
+      const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, job, quiet);
+      if (session.rank() == 0 && !quiet)
+        fmt::print("{}: {} modes{}{}\n", summary.bank.string(), summary.modes,
+                   summary.modes > 0 ? fmt::format(", {:.2f} Hz to {:.2f} Hz", summary.first_hz, summary.last_hz) : "",
+                   summary.complete ? "" : " (cut by max_modes)");
+    } catch (const CLI::ParseError& error) {
+      code = error.get_exit_code() == 0 ? 0 : kExitInput;
+      if (session.rank() == 0) app.exit(error);
+    } catch (const InputError& error) {
+      code = fail(failures, session.rank(), kExitInput, error.what());
+    } catch (const SolveError& error) {
+      code = fail(failures, session.rank(), kExitSolve, error.what());
+    } catch (const std::bad_alloc&) {
+      code = fail(failures, session.rank(), kExitSystem, "out of memory; use a coarser mesh or a machine with more");
+    } catch (const std::exception& error) {
+      code = fail(failures, session.rank(), kExitSystem, error.what());
+    }
+    MPI_Comm_free(&failures);
+    return code;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "carillon-precompute: error: {}\n", error.what());
+    return kExitSystem;
+  }
+}
