@@ -96,6 +96,11 @@ TEST_F(BankFile, ComesBackExactly) {
   EXPECT_EQ(count_files(), 1u);
 }
 
+TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
+  // Written when the version was new, by: make_example_bank version_1_0.hdf 1 2
+  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/bank/pinned/version_1_0.hdf"), example::make_bank(1, 2));
+}
+
 TEST_F(BankFile, MayHoldNoModes) {
   const Bank bank = example::make_bank(2, 0);
   write_bank(bank, file_);
