@@ -48,7 +48,8 @@ std::string format_bytes(std::uintmax_t bytes) {
                            : fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
 }
 
-std::string format_scalar(const Json::Value& value) {
+std::string format_scalar(const std::string& key, const Json::Value& value) {
+  if (value.isUInt64() && key.find("bytes") != std::string::npos) return format_bytes(value.asUInt64());
   if (value.isDouble()) return fmt::format("{:.6g}", value.asDouble());
   if (value.isString()) return calc_printable(value.asString());
   std::string text = value.toStyledString();
@@ -56,32 +57,33 @@ std::string format_scalar(const Json::Value& value) {
   return text.size() > 100 ? text.substr(0, 97) + "..." : text;
 }
 
-bool is_flat(const Json::Value& value) {
-  return std::none_of(value.begin(), value.end(), [](const Json::Value& member) { return member.isObject() || member.isArray(); });
-}
+bool is_nested(const Json::Value& value) { return value.isObject() || value.isArray(); }
 
-/// One line per scalar and per flat object ("solve: seconds 12.25, peak_mib 900"), nested ones indented. The resolved job is left to
-/// --json.
-void append_tree(const Json::Value& value, int depth, std::string& text) {
-  const std::string indent(static_cast<std::size_t>(2 * depth), ' ');
+bool is_flat(const Json::Value& value) { return std::none_of(value.begin(), value.end(), is_nested); }
+
+/// One line per scalar and per short flat object ("solve: peak_bytes 900 MB, seconds 12.25"); what is nested is indented. The members of a
+/// list go by their "name" where they have one.
+void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) {
+  const std::string indent(2 * depth, ' ');
   std::size_t index = 0;
-  for (auto it = value.begin(); it != value.end() && depth < 6; ++it, ++index) {
-    const std::string key = value.isObject() ? calc_printable(it.name()) : fmt::format("{}", index);
-    if (!it->isObject() && !it->isArray()) {
-      text += fmt::format("{}{}: {}\n", indent, key, format_scalar(*it));
-    } else if (depth == 1 && (key == "job" || key == "resolved_job")) {
-      text += fmt::format("{}{}: (see --json)\n", indent, key);
-    } else if (it->isArray() && is_flat(*it)) {
-      text += fmt::format("{}{}: {}\n", indent, key, format_scalar(*it));
-    } else if (it->isObject() && is_flat(*it) && it->size() <= 5) {
+  for (auto it = tree.begin(); it != tree.end() && depth < 6; ++it, ++index) {
+    Json::Value value = *it;
+    std::string key = tree.isObject() ? it.name() : std::to_string(index);
+    if (tree.isArray() && value.isObject() && value["name"].isString()) {
+      key = value["name"].asString();
+      value.removeMember("name");
+    }
+    if (!is_nested(value) || (value.isArray() && is_flat(value))) {
+      text += fmt::format("{}{}: {}\n", indent, calc_printable(key), format_scalar(key, value));
+    } else if (value.isObject() && is_flat(value) && value.size() <= 4) {
       std::string line;
-      for (auto member = it->begin(); member != it->end(); ++member) {
-        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", calc_printable(member.name()), format_scalar(*member));
+      for (auto member = value.begin(); member != value.end(); ++member) {
+        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", calc_printable(member.name()), format_scalar(member.name(), *member));
       }
-      text += fmt::format("{}{}: {}\n", indent, key, line);
+      text += fmt::format("{}{}: {}\n", indent, calc_printable(key), line);
     } else {
-      text += fmt::format("{}{}:\n", indent, key);
-      append_tree(*it, depth + 1, text);
+      text += fmt::format("{}{}:\n", indent, calc_printable(key));
+      append_tree(value, depth + 1, text);
     }
   }
 }
@@ -147,10 +149,11 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
                       inertia[8], inertia[1], inertia[2], inertia[5]);
   if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, mode_limit);
-  const auto provenance = parse_provenance(bank.provenance);
-  if (provenance && provenance->isObject()) {
-    text += "\nprovenance\n";
-    append_tree(*provenance, 1, text);
+  const std::optional<Json::Value> provenance = parse_provenance(bank.provenance);
+  // The record of the run; the job around it is left to --json.
+  if (provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject()) {
+    text += "\nprovenance (the whole job: --json)\n";
+    append_tree((*provenance)["run"], 1, text);
   }
   return text;
 }

@@ -88,8 +88,9 @@ inline Bank make_bank(int n = 2, std::size_t modes = 5) {
   bank.counts = {static_cast<std::int64_t>(bank.vertex_count()) + 1, 6 * n * n * n, 1, 6};
   bank.element = "T10";
   bank.mass = "consistent";
-  bank.provenance =
-      R"({"program": "example", "ranks": 2, "stations": {"mesh": {"seconds": 0.5, "peak_mib": 80}, "solve": {"seconds": 12.25, "peak_mib": 900}}})";
+  bank.provenance = R"({"mesh": "box.msh", "run": {"program": "example", "ranks": 2, "versions": {"PETSc": "3.18.5", "SLEPc": "3.18.2"},)"
+                    R"( "stations": [{"name": "mesh", "seconds": 0.5, "peak_bytes_largest_rank": 80000000},)"
+                    R"( {"name": "solve", "seconds": 12.25, "peak_bytes_largest_rank": 900000000}]}})";
   quantise_shapes(bank, calc_shapes(bank));
   return bank;
 }
