@@ -61,10 +61,11 @@ void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEnco
   std::sort(regions.begin(), regions.end());
   regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
   std::vector<std::pair<std::string, const std::vector<std::int32_t>*>> sets;
-  for (const auto& [name, nodes] : mesh.node_sets) {
-    const bool of_region = std::any_of(regions.begin(), regions.end(), [&](std::int32_t r) { return r != 0 && name == fmt::format("physical:{}", r); });
-    if (!of_region) sets.emplace_back(clean_name(name), &nodes);
-  }
+  const auto is_region = [&](const std::string& name) {
+    return std::any_of(regions.begin(), regions.end(), [&](std::int32_t r) { return r != 0 && name == fmt::format("physical:{}", r); });
+  };
+  for (const auto& [name, nodes] : mesh.node_sets)
+    if (!is_region(name)) sets.emplace_back(clean_name(name), &nodes);
   Output out(binary);
   out.text(fmt::format("$MeshFormat\n4.1 {} 8\n", binary ? 1 : 0));
   if (binary) {
