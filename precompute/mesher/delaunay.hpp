@@ -1,0 +1,35 @@
+// Delaunay refinement (CGAL Mesh_3) of a body between closed surfaces; std only, CGAL stays in the .cpp files.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "precompute/mesh/tet_mesh.hpp"
+#include "precompute/mesher/distance_field.hpp"
+#include "precompute/mesher/triangle_surface.hpp"
+
+namespace carillon::mesher {
+
+/// What the elements must satisfy, in metres.
+struct DelaunaySizes {
+  double edge_m = 0;      // about the length of the edges
+  double distance_m = 0;  // farthest that a boundary face's middle may lie from the true surface
+};
+
+/// One mesh in the making: refine makes it anew for given sizes, optimise removes its slivers.
+class DelaunayBody {
+ public:
+  virtual ~DelaunayBody() = default;
+  /// Refines from the start. Returns the mesh as it is then, with slivers; linear.
+  virtual mesh::TetMesh refine(const DelaunaySizes& sizes) = 0;
+  /// Perturbs and exudes the last refined mesh until no dihedral angle is under `angle_deg`, or none can be raised.
+  virtual mesh::TetMesh optimise(double angle_deg) = 0;
+};
+
+/// The body of calc_body(field, wall_m, .). `curves` lie on its boundary and become edges of the mesh. The field must outlive it.
+std::unique_ptr<DelaunayBody> make_field_body(const DistanceField& field, double wall_m, const std::vector<Polyline>& curves);
+
+/// The solid inside a closed surface whose triangles do not intersect; its faces are followed exactly.
+std::unique_ptr<DelaunayBody> make_surface_body(const TriangleSurface& surface, const std::vector<Polyline>& curves);
+
+}  // namespace carillon::mesher

@@ -1,0 +1,105 @@
+// Method: restricted Delaunay refinement, then sliver perturbation and exudation, with balls protecting the sharp curves.
+// Source: Boissonnat and Oudot 2005 (refinement); Cheng, Dey, Edelsbrunner, Facello and Teng 2000 (exudation); Tournois,
+//   Srinivasan and Alliez 2009 (perturbation); all as CGAL 5.5 Mesh_3 has them.
+// Deviations: the first points on the surface are ours (CGAL shoots random lines from a centre and can miss a part of the body).
+//
+// The template behind the two kinds of body; only delaunay_field.cpp and delaunay_surface.cpp include it.
+#pragma once
+
+#include <CGAL/Mesh_complex_3_in_triangulation_3.h>
+#include <CGAL/Mesh_criteria_3.h>
+#include <CGAL/Mesh_triangulation_3.h>
+#include <CGAL/exude_mesh_3.h>
+#include <CGAL/make_mesh_3.h>
+#include <CGAL/perturb_mesh_3.h>
+#include <CGAL/refine_mesh_3.h>
+
+#include <unordered_map>
+#include <utility>
+
+#include "precompute/mesher/delaunay.hpp"
+
+namespace carillon::mesher {
+
+template <class Domain, class Index>
+class Mesh3Body : public DelaunayBody {
+  using Triangulation = typename CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
+  using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation, typename Domain::Corner_index, typename Domain::Curve_index>;
+  using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
+  using Point = typename Domain::Point_3;
+  using WeightedPoint = typename Triangulation::Weighted_point;
+
+ public:
+  mesh::TetMesh refine(const DelaunaySizes& sizes) override {
+    namespace p = CGAL::parameters;
+    // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
+    CGAL::get_default_random() = CGAL::Random(0);
+    make_domain();
+    complex_ = Complex();
+    const double radius = kRadiusPerEdge * sizes.edge_m;
+    const Criteria criteria(p::edge_size = sizes.edge_m, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
+                            p::cell_radius_edge_ratio = 2, p::cell_size = radius);
+    if (has_curves_) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria);
+    insert_first_points(sizes.edge_m);
+    CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold());
+    return extract();
+  }
+
+  mesh::TetMesh optimise(double angle_deg) override {
+    namespace p = CGAL::parameters;
+    CGAL::perturb_mesh_3(complex_, *domain_, p::time_limit = 0, p::sliver_bound = angle_deg);
+    CGAL::exude_mesh_3(complex_, p::time_limit = 0, p::sliver_bound = angle_deg);
+    return extract();
+  }
+
+ protected:
+  virtual void make_domain() = 0;  // sets domain_ and has_curves_
+  /// Points on the boundary about three edges apart, on every part of it, each with its index in the domain.
+  virtual std::vector<std::pair<Vec3, Index>> find_first_points(double spacing_m) = 0;
+
+  std::unique_ptr<Domain> domain_;
+  bool has_curves_ = false;
+
+ private:
+  // Mesh_3 bounds circumradii; the mean edge of the tetrahedra it makes is about 1.1 times that bound.
+  static constexpr double kRadiusPerEdge = 0.9;
+
+  void insert_first_points(double edge_m) {
+    auto& triangulation = complex_.triangulation();
+    // A point inside or close to the ball of a curve would be hidden by it, or would give it a needlessly short neighbour.
+    std::vector<WeightedPoint> balls;
+    for (auto v = triangulation.finite_vertices_begin(); v != triangulation.finite_vertices_end(); ++v)
+      balls.push_back(triangulation.point(v));
+    for (const auto& [position, index] : find_first_points(3 * edge_m)) {
+      const Point point(position[0], position[1], position[2]);
+      if (!balls.empty() && triangulation.dimension() == 3) {
+        const auto nearest = triangulation.nearest_power_vertex(point);
+        const auto& ball = triangulation.point(nearest);
+        if (CGAL::squared_distance(ball.point(), point) < 2 * ball.weight()) continue;
+      }
+      const auto v = triangulation.insert(WeightedPoint(point));
+      if (v == typename Triangulation::Vertex_handle()) continue;
+      complex_.set_dimension(v, 2);
+      complex_.set_index(v, index);
+    }
+  }
+
+  mesh::TetMesh extract() const {
+    mesh::TetMesh out;
+    std::unordered_map<const void*, std::int32_t> number;
+    number.reserve(complex_.triangulation().number_of_vertices());
+    for (auto cell = complex_.cells_in_complex_begin(); cell != complex_.cells_in_complex_end(); ++cell)
+      for (int c = 0; c < 4; ++c) {
+        const auto v = cell->vertex(c);
+        const auto [found, fresh] = number.try_emplace(static_cast<const void*>(&*v), static_cast<std::int32_t>(out.nodes.size()));
+        if (fresh) out.nodes.push_back({CGAL::to_double(v->point().x()), CGAL::to_double(v->point().y()), CGAL::to_double(v->point().z())});
+        out.tets.push_back(found->second);
+      }
+    out.regions.assign(out.tets.size() / 4, 0);
+    return out;
+  }
+
+  Complex complex_;
+};
+
+}  // namespace carillon::mesher

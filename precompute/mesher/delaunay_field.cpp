@@ -1,0 +1,78 @@
+// The Delaunay body of a distance field. Method and source: delaunay_body.hpp.
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Labeled_mesh_domain_3.h>
+#include <CGAL/Mesh_domain_with_polyline_features_3.h>
+
+#include <cmath>
+#include <set>
+
+#include "precompute/mesher/delaunay_body.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Domain = CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_domain_3<Kernel>>;
+
+class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
+ public:
+  FieldBody(const DistanceField& field, double wall_m, const std::vector<Polyline>& curves) : field_(field), wall_m_(wall_m) {
+    for (const Polyline& curve : curves) {
+      curves_.emplace_back();
+      for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
+    }
+    has_curves_ = !curves_.empty();
+  }
+
+ private:
+  void make_domain() override {
+    const auto body = [this](const Kernel::Point_3& p) { return calc_body(field_, wall_m_, {p.x(), p.y(), p.z()}); };
+    const Vec3 low = field_.origin;
+    Vec3 high = low;
+    for (int c = 0; c < 3; ++c) high[c] += field_.voxel_m * (field_.size[c] - 1);
+    const CGAL::Bbox_3 box(low[0], low[1], low[2], high[0], high[1], high[2]);
+    // The surface is found by bisection to a hundredth of a voxel; CGAL's bound is relative to the body's radius.
+    const double radius = 0.5 * norm(high - low);
+    domain_ = std::make_unique<Domain>(
+        Domain::create_implicit_mesh_domain(body, box, CGAL::parameters::relative_error_bound = 0.01 * field_.voxel_m / radius));
+    if (has_curves_) domain_->add_features(curves_.begin(), curves_.end());
+  }
+
+  std::vector<std::pair<Vec3, Domain::Index>> find_first_points(double spacing_m) override {
+    // Where the rows of samples cross the skins, thinned to one in every cube of the spacing.
+    std::vector<std::pair<Vec3, Domain::Index>> points;
+    std::set<std::array<std::int32_t, 4>> taken;
+    const auto index = domain_->index_from_surface_patch_index({0, 1});
+    const int skins = wall_m_ > 0 ? 2 : 1;
+    for (std::int32_t k = 0; k < field_.size[2]; ++k)
+      for (std::int32_t j = 0; j < field_.size[1]; ++j)
+        for (std::int32_t i = 0; i + 1 < field_.size[0]; ++i)
+          for (int skin = 0; skin < skins; ++skin) {
+            const double a = field_.sample(i, j, k) + skin * wall_m_, b = field_.sample(i + 1, j, k) + skin * wall_m_;
+            if ((a < 0) == (b < 0)) continue;
+            const Vec3 p{field_.origin[0] + field_.voxel_m * (i + a / (a - b)), field_.origin[1] + field_.voxel_m * j,
+                         field_.origin[2] + field_.voxel_m * k};
+            std::array<std::int32_t, 4> cube{0, 0, 0, skin};
+            for (int c = 0; c < 3; ++c) cube[c] = static_cast<std::int32_t>(std::floor((p[c] - field_.origin[c]) / spacing_m));
+            if (taken.contains(cube)) continue;
+            bool close = false;
+            for (const auto& [q, unused] : points) close = close || norm(q - p) < 0.5 * spacing_m;
+            if (close) continue;
+            taken.insert(cube);
+            points.emplace_back(p, index);
+          }
+    return points;
+  }
+
+  const DistanceField& field_;
+  double wall_m_;
+  std::vector<std::vector<Kernel::Point_3>> curves_;
+};
+
+}  // namespace
+
+std::unique_ptr<DelaunayBody> make_field_body(const DistanceField& field, double wall_m, const std::vector<Polyline>& curves) {
+  return std::make_unique<FieldBody>(field, wall_m, curves);
+}
+
+}  // namespace carillon::mesher

@@ -1,0 +1,75 @@
+// The Delaunay body inside a clean triangle surface. Method and source: delaunay_body.hpp.
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Mesh_domain_with_polyline_features_3.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polyhedral_mesh_domain_3.h>
+#include <CGAL/Surface_mesh.h>
+
+#include <cmath>
+#include <set>
+
+#include "precompute/mesher/delaunay_body.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
+using Domain = CGAL::Mesh_domain_with_polyline_features_3<CGAL::Polyhedral_mesh_domain_3<Mesh, Kernel>>;
+
+class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
+ public:
+  SurfaceBody(const TriangleSurface& surface, const std::vector<Polyline>& curves) : surface_(surface) {
+    std::vector<Kernel::Point_3> points;
+    for (const Vec3& p : surface.points) points.emplace_back(p[0], p[1], p[2]);
+    std::vector<std::vector<std::size_t>> polygons;
+    for (const Triangle& t : surface.triangles)
+      polygons.push_back({static_cast<std::size_t>(t[0]), static_cast<std::size_t>(t[1]), static_cast<std::size_t>(t[2])});
+    CGAL::Polygon_mesh_processing::polygon_soup_to_polygon_mesh(points, polygons, mesh_);
+    for (const Polyline& curve : curves) {
+      curves_.emplace_back();
+      for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
+    }
+    has_curves_ = !curves_.empty();
+  }
+
+ private:
+  void make_domain() override {
+    domain_ = std::make_unique<Domain>(mesh_);
+    if (has_curves_) domain_->add_features(curves_.begin(), curves_.end());
+  }
+
+  std::vector<std::pair<Vec3, Domain::Index>> find_first_points(double spacing_m) override {
+    // Points inside the triangles: never on an edge, where the patch of a Delaunay edge's crossing would be in doubt.
+    std::vector<std::pair<Vec3, Domain::Index>> points;
+    std::set<std::array<std::int64_t, 3>> taken;
+    const auto index = domain_->index_from_surface_patch_index({0, 1});
+    for (const Triangle& t : surface_.triangles) {
+      const Vec3 &a = surface_.points[t[0]], &b = surface_.points[t[1]], &c = surface_.points[t[2]];
+      const Vec3 p = 0.37 * a + (0.34 * b + 0.29 * c);
+      // One point per cube of the spacing, and none in the cubes around it.
+      std::array<std::int64_t, 3> cube;
+      for (int k = 0; k < 3; ++k) cube[k] = static_cast<std::int64_t>(std::floor(p[k] / spacing_m));
+      bool close = false;
+      for (int x = -1; x <= 1; ++x)
+        for (int y = -1; y <= 1; ++y)
+          for (int z = -1; z <= 1; ++z) close = close || taken.contains({cube[0] + x, cube[1] + y, cube[2] + z});
+      if (close) continue;
+      taken.insert(cube);
+      points.emplace_back(p, index);
+    }
+    return points;
+  }
+
+  const TriangleSurface& surface_;
+  Mesh mesh_;
+  std::vector<std::vector<Kernel::Point_3>> curves_;
+};
+
+}  // namespace
+
+std::unique_ptr<DelaunayBody> make_surface_body(const TriangleSurface& surface, const std::vector<Polyline>& curves) {
+  return std::make_unique<SurfaceBody>(surface, curves);
+}
+
+}  // namespace carillon::mesher

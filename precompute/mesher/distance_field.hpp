@@ -1,0 +1,42 @@
+// The signed distance to a closed triangle surface, sampled on a grid.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "precompute/mesher/triangle_surface.hpp"
+
+namespace carillon::mesher {
+
+/// Samples of the signed distance (positive outside) at origin + voxel * (i, j, k), x fastest. Exact to float precision within
+/// `band_m` of the surface, +-band_m beyond it.
+struct DistanceField {
+  Vec3 origin{};
+  double voxel_m = 0;
+  std::array<std::int32_t, 3> size{};
+  double band_m = 0;
+  std::vector<float> samples;
+
+  float sample(std::int32_t i, std::int32_t j, std::int32_t k) const {
+    return samples[static_cast<std::size_t>(i) +
+                   static_cast<std::size_t>(size[0]) * (static_cast<std::size_t>(j) + static_cast<std::size_t>(size[1]) * k)];
+  }
+  /// Trilinear interpolation; a point outside the grid is outside the body.
+  double calc_distance(const Vec3& p) const;
+};
+
+/// `surface` is closed and oriented outward (it may intersect itself: inside is where its winding number is positive).
+/// `offset_m` is added to every distance. Throws InputError if the grid would have more than 400 million samples.
+DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m, double band_m, double offset_m);
+
+/// The body within the field: {d < 0}, or with wall_m > 0 the shell {-wall_m < d < 0}. Negative inside.
+inline double calc_body(const DistanceField& field, double wall_m, const Vec3& p) {
+  const double d = field.calc_distance(p);
+  return wall_m > 0 ? (d > -d - wall_m ? d : -d - wall_m) : d;
+}
+
+/// Volume of the body, by the fraction of each voxel that is inside.
+double calc_volume(const DistanceField& field, double wall_m);
+
+}  // namespace carillon::mesher

@@ -1,0 +1,320 @@
+// Method: points at one place are joined; each patch is oriented across its edges; the boundary of the triangles, taken with
+//   their signs, is a set of loops, and each small enough loop is filled. A heap that this does not close is wrapped.
+// Source: the boundary of a chain is a cycle (any text on simplicial homology); winding number at a point: Van Oosterom and
+//   Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, 1983.
+// Deviations: none.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <unordered_map>
+
+#include "precompute/mesher/repair.hpp"
+#include "precompute/mesher/triangle_surface.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+// A hole is filled if the triangles over it are at most this part of the closed surface; a cube that lacks one of its
+// twelve triangles passes (1/12), one that lacks a side (1/6) does not: that is a vessel, not a body with a hole.
+constexpr double kLargestHole = 0.12;
+constexpr double kLargestHolesTogether = 0.3;
+constexpr std::size_t kMostComponentsNested = 2000;
+
+using Edge = std::array<std::int32_t, 2>;
+struct EdgeHash {
+  std::size_t operator()(const Edge& e) const {
+    return static_cast<std::size_t>(e[0]) * 0x9E3779B97F4A7C15ull ^ (static_cast<std::size_t>(e[1]) * 0xC2B2AE3D27D4EB4Full >> 7);
+  }
+};
+struct PointHash {
+  std::size_t operator()(const std::array<std::int64_t, 3>& c) const {
+    std::size_t h = 0;
+    for (const std::int64_t x : c) h = (h ^ static_cast<std::size_t>(x)) * 0x9E3779B97F4A7C15ull;
+    return h ^ (h >> 29);
+  }
+};
+
+Edge make_edge(std::int32_t a, std::int32_t b) { return a < b ? Edge{a, b} : Edge{b, a}; }
+
+/// The faces at each undirected edge; +f+1 where the face runs along it upward (low to high index), -f-1 downward.
+using EdgeFaces = std::unordered_map<Edge, std::vector<std::int32_t>, EdgeHash>;
+EdgeFaces find_edge_faces(const std::vector<Triangle>& triangles) {
+  EdgeFaces faces;
+  faces.reserve(triangles.size() * 3 / 2);
+  for (std::size_t f = 0; f < triangles.size(); ++f)
+    for (int c = 0; c < 3; ++c) {
+      const std::int32_t a = triangles[f][c], b = triangles[f][(c + 1) % 3], id = static_cast<std::int32_t>(f) + 1;
+      faces[make_edge(a, b)].push_back(a < b ? id : -id);
+    }
+  return faces;
+}
+
+/// Groups of faces joined by edges that have exactly two faces; with `any_edge` by all edges.
+std::vector<std::int32_t> find_patches(const EdgeFaces& edges, std::size_t face_count, bool any_edge, std::int32_t& count) {
+  std::vector<std::int32_t> root(face_count);
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](std::int32_t f) {
+    while (root[f] != f) f = root[f] = root[root[f]];
+    return f;
+  };
+  for (const auto& [edge, faces] : edges) {
+    if (!any_edge && faces.size() != 2) continue;
+    for (std::size_t i = 1; i < faces.size(); ++i) {
+      const std::int32_t a = find(std::abs(faces[0]) - 1), b = find(std::abs(faces[i]) - 1);
+      root[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::vector<std::int32_t> patch(face_count);
+  count = 0;
+  for (std::size_t f = 0; f < face_count; ++f) {
+    const std::int32_t r = find(static_cast<std::int32_t>(f));
+    patch[f] = r == static_cast<std::int32_t>(f) ? count++ : patch[r];
+  }
+  return patch;
+}
+
+/// Drops triangles with a repeated corner, and all but the first of those with the same three corners. Returns how many.
+std::int64_t drop_useless(std::vector<Triangle>& triangles) {
+  std::map<Triangle, int> seen;
+  const auto useless = [&](const Triangle& t) {
+    Triangle key = t;
+    std::sort(key.begin(), key.end());
+    return key[0] == key[1] || key[1] == key[2] || !seen.try_emplace(key, 1).second;
+  };
+  return static_cast<std::int64_t>(std::erase_if(triangles, useless));
+}
+
+/// Makes neighbours agree across every edge with two faces, by the fewest flips per patch. Returns how many were flipped.
+std::int64_t orient_patches(std::vector<Triangle>& triangles) {
+  const EdgeFaces edges = find_edge_faces(triangles);
+  std::vector<std::int8_t> flip(triangles.size(), -1);
+  std::vector<std::int32_t> patch;
+  std::int64_t flipped = 0;
+  for (std::size_t seed = 0; seed < triangles.size(); ++seed) {
+    if (flip[seed] >= 0) continue;
+    patch.assign(1, static_cast<std::int32_t>(seed));
+    flip[seed] = 0;
+    std::size_t turned = 0;
+    for (std::size_t next = 0; next < patch.size(); ++next) {
+      const std::int32_t f = patch[next];
+      turned += flip[f] == 1;
+      for (int c = 0; c < 3; ++c) {
+        const auto& faces = edges.at(make_edge(triangles[f][c], triangles[f][(c + 1) % 3]));
+        if (faces.size() != 2) continue;
+        const std::int32_t other = std::abs(std::abs(faces[0]) - 1 == f ? faces[1] : faces[0]) - 1;
+        if (flip[other] >= 0) continue;
+        const bool agree = (faces[0] > 0) != (faces[1] > 0);
+        flip[other] = static_cast<std::int8_t>(agree ? flip[f] : 1 - flip[f]);
+        patch.push_back(other);
+      }
+    }
+    const int turn = 2 * turned > patch.size() ? 0 : 1;  // the majority stays as it is
+    for (const std::int32_t f : patch)
+      if (flip[f] == turn) std::swap(triangles[f][1], triangles[f][2]), ++flipped;
+  }
+  return flipped;
+}
+
+/// The boundary of the triangles with their signs, as loops that run so that a triangle over one of them closes it.
+/// Empty if the surface is closed. `whole` is false where an edge is left more than once over, which no simple fill mends.
+std::vector<std::vector<std::int32_t>> find_loops(const std::vector<Triangle>& triangles, bool& whole) {
+  whole = true;
+  std::map<std::int32_t, std::vector<std::int32_t>> next;  // ordered, so that the loops come in a fixed order
+  for (const auto& [edge, faces] : find_edge_faces(triangles)) {
+    int net = 0;
+    for (const std::int32_t f : faces) net += f > 0 ? 1 : -1;
+    if (std::abs(net) > 1) whole = false;
+    for (int n = 0; n < std::abs(net); ++n) {
+      if (net > 0)
+        next[edge[1]].push_back(edge[0]);
+      else
+        next[edge[0]].push_back(edge[1]);
+    }
+  }
+  for (auto& [from, to] : next) std::sort(to.begin(), to.end());
+  std::vector<std::vector<std::int32_t>> loops;
+  for (auto& [start, ends] : next)
+    while (!ends.empty()) {
+      // Walk until a vertex comes back; what lies between is a loop, the walk goes on from there.
+      std::vector<std::int32_t> walk{start};
+      std::unordered_map<std::int32_t, std::size_t> place{{start, 0}};
+      while (!next[walk.back()].empty()) {
+        auto& out = next[walk.back()];
+        const std::int32_t to = out.back();
+        out.pop_back();
+        const auto found = place.find(to);
+        if (found == place.end()) {
+          place[to] = walk.size();
+          walk.push_back(to);
+          continue;
+        }
+        loops.emplace_back(walk.begin() + static_cast<std::ptrdiff_t>(found->second), walk.end());
+        for (std::size_t i = found->second + 1; i < walk.size(); ++i) place.erase(walk[i]);
+        walk.resize(found->second + 1);
+      }
+    }
+  return loops;
+}
+
+/// Fills every loop. False, and nothing changed, if one is too large for a hole or cannot be filled.
+bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops) {
+  const double area = calc_area(surface);
+  double filled = 0;
+  std::vector<Triangle> fresh;
+  for (const auto& loop : loops) {
+    Polyline polygon;
+    for (const std::int32_t v : loop) polygon.push_back(surface.points[static_cast<std::size_t>(v)]);
+    if (loop.size() == 2) continue;  // an edge there and back closes itself
+    const std::vector<Triangle> fill = fill_polygon(polygon);
+    const double patch_area = calc_area({polygon, fill});
+    filled += patch_area;
+    if (fill.empty() || patch_area > kLargestHole * (area + patch_area) || filled > kLargestHolesTogether * (area + filled)) return false;
+    for (const Triangle& t : fill)
+      fresh.push_back({loop[static_cast<std::size_t>(t[0])], loop[static_cast<std::size_t>(t[1])], loop[static_cast<std::size_t>(t[2])]});
+  }
+  surface.triangles.insert(surface.triangles.end(), fresh.begin(), fresh.end());
+  return true;
+}
+
+/// How often the surface winds around p.
+double calc_winding(const TriangleSurface& surface, const Vec3& p) {
+  double sum = 0;
+  for (const Triangle& t : surface.triangles) {
+    const Vec3 a = surface.points[t[0]] - p, b = surface.points[t[1]] - p, c = surface.points[t[2]] - p;
+    const double la = norm(a), lb = norm(b), lc = norm(c);
+    sum += 2 * std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  }
+  return sum / (4 * std::numbers::pi);
+}
+
+/// Turns every outermost component outward, and with it, as the file has them to each other, those inside it.
+void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
+  std::int32_t count = 0;
+  const auto patch = find_patches(find_edge_faces(surface.triangles), surface.triangles.size(), true, count);
+  std::vector<TriangleSurface> parts(static_cast<std::size_t>(count));
+  for (std::size_t f = 0; f < surface.triangles.size(); ++f) parts[patch[f]].triangles.push_back(surface.triangles[f]);
+  for (auto& part : parts) {
+    // Keep the parts' own points only, so that a part costs what it has.
+    std::unordered_map<std::int32_t, std::int32_t> number;
+    for (Triangle& t : part.triangles)
+      for (std::int32_t& v : t) {
+        const auto [found, fresh] = number.try_emplace(v, static_cast<std::int32_t>(part.points.size()));
+        if (fresh) part.points.push_back(surface.points[static_cast<std::size_t>(v)]);
+        v = found->second;
+      }
+  }
+  report.components = count;
+  std::vector<double> volume;
+  for (const auto& part : parts) volume.push_back(calc_volume(part));
+  std::vector<bool> flip(parts.size(), false);
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    // The largest part around this one decides; without one it decides for itself.
+    std::size_t outermost = p;
+    if (parts.size() <= kMostComponentsNested)
+      for (std::size_t q = 0; q < parts.size(); ++q)
+        if (std::abs(volume[q]) > std::abs(volume[outermost]) && std::abs(calc_winding(parts[q], parts[p].points.front())) > 0.5)
+          outermost = q;
+    flip[p] = volume[outermost] < 0;
+  }
+  for (std::size_t f = 0; f < surface.triangles.size(); ++f)
+    if (flip[patch[f]]) std::swap(surface.triangles[f][1], surface.triangles[f][2]), ++report.flipped_triangles;
+}
+
+/// Joins points closer than the tolerance (0: equal ones) and drops points without a triangle.
+void weld(TriangleSurface& surface, double tolerance) {
+  std::unordered_map<std::array<std::int64_t, 3>, std::vector<std::int32_t>, PointHash> cells;
+  std::vector<std::int32_t> number(surface.points.size(), -1);
+  std::vector<Vec3> kept;
+  const Vec3 low = calc_box(surface.points).low;
+  const auto join = [&](const Vec3& p) {
+    std::array<std::int64_t, 3> cell;
+    for (int c = 0; c < 3; ++c)
+      cell[c] = tolerance > 0 ? static_cast<std::int64_t>(std::floor((p[c] - low[c]) / tolerance))
+                              : static_cast<std::int64_t>(std::hash<double>()(p[c]));
+    const int reach = tolerance > 0 ? 1 : 0;
+    for (int x = -reach; x <= reach; ++x)
+      for (int y = -reach; y <= reach; ++y)
+        for (int z = -reach; z <= reach; ++z) {
+          const auto found = cells.find({cell[0] + x, cell[1] + y, cell[2] + z});
+          if (found == cells.end()) continue;
+          for (const std::int32_t v : found->second)
+            if (norm(kept[static_cast<std::size_t>(v)] - p) <= tolerance) return v;
+        }
+    const auto fresh = static_cast<std::int32_t>(kept.size());
+    kept.push_back(p);
+    cells[cell].push_back(fresh);
+    return fresh;
+  };
+  for (Triangle& t : surface.triangles)
+    for (std::int32_t& v : t) {
+      auto& n = number[static_cast<std::size_t>(v)];
+      if (n < 0) n = join(surface.points[static_cast<std::size_t>(v)]);
+      v = n;
+    }
+  surface.points = std::move(kept);
+}
+
+/// Closes the surface by joining, orienting and filling. False if that is not enough.
+bool close_surface(TriangleSurface& surface, double tolerance, SurfaceReport& report) {
+  weld(surface, tolerance);
+  report.removed_triangles = drop_useless(surface.triangles);
+  if (surface.triangles.empty()) return false;
+  report.input_vertices = static_cast<std::int64_t>(surface.points.size());
+  bool whole = false;
+  auto loops = find_loops(surface.triangles, whole);
+  if (!loops.empty()) {
+    report.flipped_triangles = orient_patches(surface.triangles);
+    loops = find_loops(surface.triangles, whole);
+  }
+  if (!whole || !fill_loops(surface, loops)) return false;
+  report.holes_closed = static_cast<std::int64_t>(loops.size());
+  return find_loops(surface.triangles, whole).empty();
+}
+
+}  // namespace
+
+MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path& path, SurfaceReport& report) {
+  const double diagonal = calc_box(surface.points).diagonal();
+  const auto refuse_open = [&](const std::string& what) {
+    throw InputError(fmt::format("{}: {}; a closed surface is needed: close its openings, or give the sheet a thickness, in a modeller",
+                                 path.string(), what));
+  };
+  for (const double tolerance : {0.0, 1e-6 * diagonal}) {
+    TriangleSurface candidate = surface;
+    SurfaceReport attempt = report;
+    if (!close_surface(candidate, tolerance, attempt)) continue;
+    orient_outward(candidate, attempt);
+    if (!(calc_volume(candidate) > 1e-9 * diagonal * calc_area(candidate))) continue;
+    report = attempt;
+    return {candidate, 0, is_clean(candidate)};
+  }
+  // No closed surface in it as it is: wrap it. A wrap that slips inside through an opening is a thin sheet around the
+  // triangles, of hardly any volume within its offset; then only a coarser one can help.
+  weld(surface, 0);
+  report.removed_triangles = drop_useless(surface.triangles);
+  report.input_vertices = static_cast<std::int64_t>(surface.points.size());
+  if (surface.triangles.empty()) refuse_open("all its triangles are degenerate");
+  const double area = calc_area(surface);
+  for (const double part : {50.0, 25.0, 12.0}) {
+    const double alpha = diagonal / part, offset = diagonal / 1000;
+    TriangleSurface wrapped = wrap(surface, alpha, offset);
+    const double core = calc_volume(wrapped) - offset * calc_area(wrapped);
+    if (!(core > 3 * offset * area) || calc_area(wrapped) > 1.6 * area) continue;
+    report.wrapped = true;
+    report.notes.push_back(fmt::format(
+        "The surface could not be closed as it is; it was wrapped: gaps narrower than {:.3g} m are bridged and edges are rounded.", alpha));
+    SurfaceReport unused;
+    orient_outward(wrapped, unused);
+    report.components = unused.components;
+    return {wrapped, offset, false};
+  }
+  refuse_open("it is an open sheet, not the skin of a body");
+  return {};
+}
+
+}  // namespace carillon::mesher

@@ -1,0 +1,22 @@
+// The exact distance to a triangle surface; std only, CGAL's AABB tree stays in nearest.cpp.
+#pragma once
+
+#include <memory>
+
+#include "precompute/mesher/triangle_surface.hpp"
+
+namespace carillon::mesher {
+
+class NearestPoint {
+ public:
+  explicit NearestPoint(const TriangleSurface& surface);
+  ~NearestPoint();
+  /// The point of the surface nearest to p.
+  Vec3 find(const Vec3& p) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+}  // namespace carillon::mesher

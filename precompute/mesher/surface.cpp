@@ -1,0 +1,366 @@
+// From a surface file to tetrahedra: reads, scales, mends, then makes meshes until the node count is met, and finishes the last one.
+#include "precompute/mesher/surface.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <new>
+
+#include "precompute/mesher/delaunay.hpp"
+#include "precompute/mesher/distance_field.hpp"
+#include "precompute/mesher/inset_curves.hpp"
+#include "precompute/mesher/nearest.hpp"
+#include "precompute/mesher/stuffing.hpp"
+#include "precompute/mesher/tet_quality.hpp"
+#include "precompute/mesher/triangle_surface.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+constexpr double kMostNodes = 2e7;
+constexpr double kCountTolerance = 0.10;  // promised
+constexpr double kCountAim = 0.04;        // where the search is content
+constexpr int kMostAttempts = 9;
+constexpr double kSliverDeg = 12;
+
+/// Tells the user of a phase and keeps its time.
+class Phases {
+ public:
+  Phases(SurfaceReport& report, const Progress& progress) : report_(report), progress_(progress) {}
+  template <class Work>
+  auto run(const std::string& name, Work&& work) {
+    if (progress_) progress_(name);
+    const Clock clock{report_, name};
+    return work();
+  }
+
+ private:
+  struct Clock {
+    SurfaceReport& report;
+    std::string name;
+    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+    ~Clock() {
+      const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const auto found = std::find_if(report.seconds.begin(), report.seconds.end(), [&](const auto& entry) { return entry.first == name; });
+      if (found == report.seconds.end())
+        report.seconds.emplace_back(name, s);
+      else
+        found->second += s;
+    }
+  };
+  SurfaceReport& report_;
+  const Progress& progress_;
+};
+
+void check_options(const SurfaceOptions& o) {
+  const auto positive = [&](const std::optional<double>& value, const char* name) {
+    if (value && !(*value > 0 && std::isfinite(*value)))
+      throw InputError(fmt::format("{} is {}; it must be a positive number of metres", name, *value));
+  };
+  positive(o.wall_m, "wall");
+  positive(o.height_m, "height");
+  positive(o.edge_m, "edge");
+  if (o.scale && !(*o.scale > 0 && std::isfinite(*o.scale)))
+    throw InputError(fmt::format("scale is {}; it must be a positive number", *o.scale));
+  if (o.height_m && o.scale) throw InputError("height and scale exclude each other; give one of them");
+  if (o.edge_m && o.nodes) throw InputError("edge and nodes exclude each other; give one of them");
+  if (o.order != 1 && o.order != 2) throw InputError(fmt::format("order is {}; it must be 1 or 2", o.order));
+  if (o.nodes && !(*o.nodes >= (o.order == 1 ? 8 : 27) && static_cast<double>(*o.nodes) <= kMostNodes))
+    throw InputError(fmt::format("nodes is {}; it must be from {} to {:.0f}", *o.nodes, o.order == 1 ? 8 : 27, kMostNodes));
+  if (!(o.sharp_angle_deg > 0 && o.sharp_angle_deg <= 180))
+    throw InputError(fmt::format("the sharp angle is {} degrees; it must be in (0, 180]", o.sharp_angle_deg));
+}
+
+/// Scales the surface to metres.
+void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, SurfaceReport& report) {
+  TriangleSurface used;  // points without a triangle do not count for the extent
+  for (const Triangle& t : surface.triangles)
+    for (const std::int32_t v : t) used.points.push_back(surface.points[static_cast<std::size_t>(v)]);
+  const Vec3 extent = calc_box(used.points).extent();
+  const int up = static_cast<int>(options.up);
+  for (int c = 0; c < 3; ++c)
+    if (!(extent[c] > 1e-9 * calc_box(used.points).diagonal()))
+      throw InputError(fmt::format("{}: the surface is flat: its extent along {} is {}; a closed surface that encloses a volume is needed",
+                                   options.surface.string(), "xyz"[c], extent[c]));
+  report.scale = options.height_m ? *options.height_m / extent[up] : options.scale.value_or(1);
+  for (Vec3& p : surface.points) p = report.scale * p;
+  report.extent_m = report.scale * extent;
+  const double largest = std::max({report.extent_m[0], report.extent_m[1], report.extent_m[2]});
+  if (largest > 20 || largest < 1e-3)
+    report.notes.push_back(fmt::format(
+        "The body is {:.3g} m long. If the file is not in metres, give its height or a scale (0.001 for millimetres).", largest));
+}
+
+/// About how many corner nodes a body gets; fitted to meshes of the hollow bunny with 5,000 to 40,000 nodes.
+struct CountModel {
+  double volume_m3, area_m2, factor = 1;
+  double calc_nodes(double edge_m) const { return factor * (0.61 * volume_m3 / std::pow(edge_m, 3) + 1.15 * area_m2 / (edge_m * edge_m)); }
+  double find_edge(double nodes) const {
+    double low = 0, high = std::cbrt(volume_m3) + std::sqrt(area_m2);
+    while (calc_nodes(high) > nodes) high *= 2;
+    for (int n = 0; n < 100; ++n) (calc_nodes(0.5 * (low + high)) > nodes ? low : high) = 0.5 * (low + high);
+    return 0.5 * (low + high);
+  }
+};
+
+std::int64_t count_nodes(const mesh::TetMesh& mesh, int order) {
+  return static_cast<std::int64_t>(mesh.nodes.size()) + (order == 2 ? count_edges(mesh) : 0);
+}
+
+/// Everything the meshers need of the body.
+struct Body {
+  MendedSurface mended;
+  std::optional<DistanceField> field;
+  std::optional<NearestPoint> nearest;
+  double wall_m = 0;
+  double thickness_m = 0;  // of the wall, or of the solid: volume over half its area
+  CountModel model{};
+};
+
+DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m) {
+  const Vec3 extent = calc_box(body.mended.surface.points).extent();
+  const double diagonal = norm(extent);
+  // Three samples an edge and eight through the wall, as far as sixty million samples reach.
+  constexpr double kPleasantSamples = 6e7;
+  double voxel = std::min({edge_m / 3, diagonal / 80, body.wall_m > 0 ? body.wall_m / 8 : diagonal});
+  voxel = std::max(voxel, std::cbrt(extent[0] * extent[1] * extent[2] / kPleasantSamples));
+  if (body.wall_m > 0) voxel = std::min(voxel, body.wall_m / 4);
+  DistanceField field = calc_distance_field(body.mended.surface, voxel, body.wall_m + 4 * voxel, body.mended.offset_m);
+  const auto deepest = *std::min_element(field.samples.begin(), field.samples.end());
+  if (deepest >= 0)
+    throw InputError(
+        fmt::format("{}: the surface encloses nothing thicker than {:.3g} m, the resolution for edges of {:.3g} m; "
+                    "ask for shorter edges or more nodes",
+                    options.surface.string(), voxel, edge_m));
+  if (body.wall_m > 0 && deepest >= -body.wall_m)
+    throw InputError(
+        fmt::format("{}: a wall of {:.4g} m leaves no hollow: no point of the body is deeper than {:.4g} m under its surface; "
+                    "give a thinner wall, or none for a solid",
+                    options.surface.string(), body.wall_m, -static_cast<double>(deepest)));
+  return field;
+}
+
+std::unique_ptr<DelaunayBody> make_delaunay(const Body& body, const SurfaceOptions& options, double edge_m, bool keep_sharp,
+                                            SurfaceReport& report) {
+  std::vector<Polyline> curves;
+  report.sharp_edges_m = 0;
+  report.sharp_curves = 0;
+  if (keep_sharp && !report.wrapped) {
+    const double diagonal = calc_box(body.mended.surface.points).diagonal();
+    curves = find_sharp_curves(body.mended.surface, options.sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m);
+    report.sharp_curves = static_cast<std::int64_t>(curves.size());
+    for (const Polyline& curve : curves)
+      for (std::size_t i = 1; i < curve.size(); ++i) report.sharp_edges_m += norm(curve[i] - curve[i - 1]);
+    if (body.wall_m > 0 && !curves.empty()) {
+      const auto inset = make_inset_curves(body.mended.surface, curves, *body.nearest, body.wall_m, 0.5 * edge_m);
+      curves.insert(curves.end(), inset.begin(), inset.end());
+    }
+  }
+  return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.mended.surface, curves);
+}
+
+DelaunaySizes calc_sizes(const Body& body, double edge_m) {
+  return {edge_m, body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m};
+}
+
+/// Makes meshes with make(edge) until the count is within kCountAim, then returns the best edge; the last mesh made is the one of that
+/// edge.
+template <class Make>
+mesh::TetMesh search_edge(const SurfaceOptions& options, CountModel model, double& edge_m, SurfaceReport& report, Make&& make) {
+  const auto target = static_cast<double>(*options.nodes);
+  double best_edge = edge_m, best_error = 1e300, low = 0, high = 1e300;
+  double fewest = 1e300;
+  mesh::TetMesh mesh;
+  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+    mesh = make(edge_m);
+    ++report.attempts;
+    const auto count = static_cast<double>(std::max<std::int64_t>(count_nodes(mesh, options.order), 1));
+    fewest = std::min(fewest, count);
+    const double error = std::abs(count / target - 1);
+    if (error < best_error) best_error = error, best_edge = edge_m;
+    if (error <= kCountAim) return mesh;
+    // The model, scaled to the last count, says where to go; the bracket keeps it from leaving what is known.
+    (count > target ? low : high) = edge_m;
+    model.factor *= count / model.calc_nodes(edge_m);
+    edge_m = model.find_edge(target);
+    if (high < 1e300 && low > 0 && !(edge_m > low * 1.002 && edge_m < high / 1.002)) edge_m = std::sqrt(low * high);
+    if (high < 1e300 && low > 0 && high / low < 1.004) break;
+  }
+  if (best_error > kCountTolerance)
+    throw InputError(fmt::format(
+        "{}: {} nodes cannot be met within 10 %: the nearest mesh has {:.0f} % {}; {}", options.surface.string(), *options.nodes,
+        100 * best_error, fewest > target ? "more" : "less or more",
+        fewest > target ? fmt::format("the body's shape{} needs at least about {:.0f}", options.wall_m ? " and wall" : "", fewest)
+                        : std::string("try another count")));
+  if (edge_m != best_edge || true) {
+    edge_m = best_edge;
+    mesh = make(edge_m);
+    ++report.attempts;
+  }
+  return mesh;
+}
+
+/// The linear mesh by Delaunay refinement.
+mesh::TetMesh make_delaunay_mesh(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases) {
+  const double first_edge = edge_m;
+  for (const bool keep_sharp : {true, false}) {
+    try {
+      edge_m = first_edge;
+      auto delaunay = phases.run("finding sharp edges", [&] { return make_delaunay(body, options, edge_m, keep_sharp, report); });
+      mesh::TetMesh mesh = phases.run("refining", [&] {
+        const auto make = [&](double edge) { return delaunay->refine(calc_sizes(body, edge)); };
+        if (options.nodes) return search_edge(options, body.model, edge_m, report, make);
+        ++report.attempts;
+        return make(edge_m);
+      });
+      if (mesh.tets.empty())
+        throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
+                                     options.surface.string(), edge_m));
+      return phases.run("removing slivers", [&] { return delaunay->optimise(kSliverDeg); });
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& failure) {
+      // Sharp edges that lie closer together than the elements are long defeat the mesher; rounded, the body can still be meshed.
+      if (!keep_sharp || report.sharp_curves == 0) {
+        if (dynamic_cast<const InputError*>(&failure)) throw;
+        throw SolveError(
+            fmt::format("{}: the mesher failed: {}; try another edge length or node count", options.surface.string(), failure.what()));
+      }
+      report.notes.push_back(
+          "The sharp edges lie too close to each other for this element size and were rounded; ask for more nodes to keep them.");
+    }
+  }
+  return {};
+}
+
+void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& report) {
+  const TetMeasures measures = measure(linear);
+  report.corner_nodes = static_cast<std::int64_t>(linear.nodes.size());
+  report.tets = linear.tet_count();
+  report.volume_m3 = measures.volume_m3;
+  report.min_dihedral_deg = measures.min_dihedral_deg;
+  report.max_dihedral_deg = measures.max_dihedral_deg;
+  report.mean_edge_m = measures.mean_edge_m;
+  report.layers_mean = measures.mean_edge_m > 0 ? body.thickness_m / measures.mean_edge_m : 0;
+  if (body.wall_m <= 0) return;
+  // The inner skin: boundary nodes deeper than half the wall.
+  std::vector<std::int32_t> skin;
+  for (const Triangle& t : find_boundary(linear)) skin.insert(skin.end(), t.begin(), t.end());
+  std::sort(skin.begin(), skin.end());
+  skin.erase(std::unique(skin.begin(), skin.end()), skin.end());
+  double sum = 0, low = 1e300, high = 0;
+  std::int64_t count = 0;
+  for (const std::int32_t v : skin) {
+    const Vec3& p = linear.nodes[static_cast<std::size_t>(v)];
+    if (body.field->calc_distance(p) > -0.5 * body.wall_m) continue;
+    const double depth = norm(body.nearest->find(p) - p) - body.mended.offset_m;
+    sum += depth;
+    low = std::min(low, depth);
+    high = std::max(high, depth);
+    ++count;
+  }
+  if (count == 0) return;
+  report.wall_min_m = low;
+  report.wall_max_m = high;
+  report.wall_mean_m = sum / static_cast<double>(count);
+}
+
+void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& report) {
+  const double error = report.volume_m3 / report.expected_volume_m3 - 1;
+  if (std::abs(error) > 0.03)
+    report.notes.push_back(
+        fmt::format("The mesh has {:+.1f} % of volume against the body: its elements are coarse for its shape; more nodes bring it closer.",
+                    100 * error));
+  if (report.min_dihedral_deg < 8)
+    report.notes.push_back(fmt::format("The flattest element has a dihedral angle of {:.1f} degrees.", report.min_dihedral_deg));
+  if (body.wall_m > 0 && options.order == 1 && report.layers_mean < 1.5)
+    report.notes.push_back(
+        fmt::format("The wall is about {:.1f} linear elements thick and will be too stiff in bending; take more nodes or order 2.",
+                    report.layers_mean));
+}
+
+mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
+  Body body;
+  TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
+  report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
+  scale_surface(raw, options, report);
+  body.mended = phases.run("mending", [&] { return mend_surface(std::move(raw), options.surface, report); });
+  body.wall_m = options.wall_m.value_or(0);
+  const TriangleSurface& surface = body.mended.surface;
+  report.input_area_m2 = calc_area(surface);
+  report.input_volume_m3 = calc_volume(surface) - body.mended.offset_m * report.input_area_m2;
+
+  // The wall takes at most the whole volume; the inner skin is about as large as the outer one.
+  const double wall_volume = std::min(body.wall_m * report.input_area_m2, report.input_volume_m3);
+  body.model =
+      body.wall_m > 0 ? CountModel{wall_volume, 2 * report.input_area_m2} : CountModel{report.input_volume_m3, report.input_area_m2};
+  body.thickness_m = body.wall_m > 0 ? body.wall_m : 2 * report.input_volume_m3 / report.input_area_m2;
+  // A second-order mesh has about seven and a half times as many nodes as corners.
+  if (options.order == 2) body.model.factor = 7.5;
+  const double diagonal = calc_box(surface.points).diagonal();
+  double edge = options.edge_m
+                    ? *options.edge_m
+                    : body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : (options.order == 2 ? 30000 : 10000));
+  if (options.edge_m && edge > diagonal)
+    throw InputError(fmt::format("edges of {:.3g} m are longer than the body ({:.3g} m)", edge, diagonal));
+  if (const double nodes = body.model.calc_nodes(edge); nodes > 1.5 * kMostNodes)
+    throw InputError(
+        fmt::format("edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones", edge, nodes, kMostNodes));
+  if (!options.edge_m && !options.nodes)
+    report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
+
+  report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
+  if (body.wall_m > 0) body.nearest.emplace(surface);
+  if (body.wall_m > 0 || !body.mended.clean || report.method == Method::kStuffing)
+    body.field = phases.run("computing distances", [&] { return make_field(body, options, edge); });
+  report.expected_volume_m3 = body.field ? calc_volume(*body.field, body.wall_m) : report.input_volume_m3;
+
+  mesh::TetMesh linear;
+  if (report.method == Method::kStuffing) {
+    linear = phases.run("stuffing", [&] {
+      const auto make = [&](double e) { return stuff(*body.field, body.wall_m, e); };
+      if (options.nodes) return search_edge(options, body.model, edge, report, make);
+      ++report.attempts;
+      return make(edge);
+    });
+  } else {
+    linear = make_delaunay_mesh(body, options, edge, report, phases);
+  }
+  phases.run("checking", [&] {
+    const std::int64_t removed = make_manifold(linear, report.components);
+    if (removed > 0)
+      report.notes.push_back(fmt::format("{} elements were removed where the body only touched itself or was cut off.", removed));
+    if (linear.tets.empty())
+      throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
+                                   options.surface.string(), edge));
+    measure_mesh(linear, body, report);
+    if (!(report.volume_m3 > 0.6 * report.expected_volume_m3))
+      throw InputError(
+          fmt::format("{}: with edges of {:.3g} m only {:.0f} % of the body's volume can be meshed; ask for shorter edges or more nodes",
+                      options.surface.string(), edge, 100 * report.volume_m3 / report.expected_volume_m3));
+    return 0;
+  });
+  report.edge_m = edge;
+  mesh::TetMesh out = options.order == 2 ? make_second_order(linear) : std::move(linear);
+  report.nodes = static_cast<std::int64_t>(out.nodes.size());
+  add_notes(options, body, report);
+  return out;
+}
+
+}  // namespace
+
+mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report, const Progress& progress) {
+  report = SurfaceReport{};
+  check_options(options);
+  Phases phases(report, progress);
+  try {
+    return make_mesh(options, report, phases);
+  } catch (const std::bad_alloc&) {
+    throw SystemError(fmt::format("{}: memory ran out while meshing; ask for longer edges or fewer nodes", options.surface.string()));
+  }
+}
+
+}  // namespace carillon::mesher

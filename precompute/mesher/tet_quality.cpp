@@ -1,0 +1,237 @@
+// Method: an edge or a node at which the boundary is no surface is the meeting of several groups of elements that share no face
+//   there; all but the largest group are removed, and again, until there is none.
+// Source: our own.
+// Deviations: none.
+#include "precompute/mesher/tet_quality.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <unordered_map>
+
+namespace carillon::mesher {
+namespace {
+
+using Edge = std::array<std::int32_t, 2>;
+
+struct KeyHash {
+  template <std::size_t N>
+  std::size_t operator()(const std::array<std::int32_t, N>& key) const {
+    std::size_t h = 0;
+    for (const std::int32_t v : key) h = (h ^ static_cast<std::size_t>(v)) * 0x9E3779B97F4A7C15ull;
+    return h ^ (h >> 31);
+  }
+};
+
+template <std::size_t N>
+std::array<std::int32_t, N> sorted(std::array<std::int32_t, N> key) {
+  std::sort(key.begin(), key.end());
+  return key;
+}
+
+Triangle get_face(const mesh::TetMesh& mesh, std::int64_t e, int face) {
+  const auto tet = mesh.tet(e);
+  return {tet[mesh::kFaces[face][0]], tet[mesh::kFaces[face][1]], tet[mesh::kFaces[face][2]]};
+}
+
+/// The element at the other side of each face of each element; -1 at the boundary.
+std::vector<std::array<std::int32_t, 4>> find_neighbours(const mesh::TetMesh& mesh) {
+  std::vector<std::array<std::int32_t, 4>> neighbours(static_cast<std::size_t>(mesh.tet_count()), {-1, -1, -1, -1});
+  std::unordered_map<Triangle, std::array<std::int32_t, 2>, KeyHash> open;
+  open.reserve(neighbours.size() * 2);
+  for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
+    for (int f = 0; f < 4; ++f) {
+      const auto [found, fresh] = open.try_emplace(sorted(get_face(mesh, e, f)), std::array{e, f});
+      if (fresh) continue;
+      const auto [other, other_face] = found->second;
+      neighbours[e][f] = other;
+      neighbours[other][other_face] = e;
+      open.erase(found);
+    }
+  return neighbours;
+}
+
+/// Groups of `around` (elements that share a node or an edge) that hang together by faces which hold all of `shared`.
+template <std::size_t N>
+std::vector<std::vector<std::int32_t>> find_groups(const mesh::TetMesh& mesh, const std::vector<std::array<std::int32_t, 4>>& neighbours,
+                                                   const std::vector<std::int32_t>& around, const std::array<std::int32_t, N>& shared) {
+  std::vector<std::vector<std::int32_t>> groups;
+  std::vector<std::int32_t> left = around;
+  while (!left.empty()) {
+    std::vector<std::int32_t> group{left.back()};
+    left.pop_back();
+    for (std::size_t next = 0; next < group.size(); ++next)
+      for (int f = 0; f < 4; ++f) {
+        const std::int32_t other = neighbours[group[next]][f];
+        const Triangle face = get_face(mesh, group[next], f);
+        const bool holds =
+            std::all_of(shared.begin(), shared.end(), [&](std::int32_t v) { return std::find(face.begin(), face.end(), v) != face.end(); });
+        const auto found = other >= 0 && holds ? std::find(left.begin(), left.end(), other) : left.end();
+        if (found == left.end()) continue;
+        group.push_back(other);
+        left.erase(found);
+      }
+    groups.push_back(group);
+  }
+  std::stable_sort(groups.begin(), groups.end(), [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  return groups;
+}
+
+/// Elements to remove so that the boundary around edges and nodes becomes a surface; empty if it is one.
+std::vector<char> find_pinching(const mesh::TetMesh& mesh, const std::vector<std::array<std::int32_t, 4>>& neighbours, bool& any) {
+  std::vector<char> remove(neighbours.size(), 0);
+  any = false;
+  // Only nodes and edges on the boundary can pinch.
+  std::unordered_map<Edge, int, KeyHash> boundary_edges;
+  std::vector<char> on_boundary(mesh.nodes.size(), 0);
+  for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
+    for (int f = 0; f < 4; ++f) {
+      if (neighbours[e][f] >= 0) continue;
+      const Triangle face = get_face(mesh, e, f);
+      for (int c = 0; c < 3; ++c) {
+        ++boundary_edges[sorted(Edge{face[c], face[(c + 1) % 3]})];
+        on_boundary[face[c]] = 1;
+      }
+    }
+  std::vector<std::vector<std::int32_t>> at_node(mesh.nodes.size());
+  for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
+    for (const std::int32_t v : mesh.tet(e).first(4))
+      if (on_boundary[v]) at_node[v].push_back(e);
+  const auto remove_small = [&](const std::vector<std::vector<std::int32_t>>& groups) {
+    for (std::size_t g = 1; g < groups.size(); ++g)
+      for (const std::int32_t e : groups[g]) remove[e] = 1, any = true;
+  };
+  for (const auto& [edge, count] : boundary_edges) {
+    if (count == 2) continue;
+    std::vector<std::int32_t> around;
+    for (const std::int32_t e : at_node[edge[0]]) {
+      const auto tet = mesh.tet(e);
+      if (std::find(tet.begin(), tet.end(), edge[1]) != tet.end()) around.push_back(e);
+    }
+    remove_small(find_groups(mesh, neighbours, around, edge));
+  }
+  if (any) return remove;
+  for (std::int32_t v = 0; v < static_cast<std::int32_t>(mesh.nodes.size()); ++v)
+    if (on_boundary[v]) remove_small(find_groups(mesh, neighbours, at_node[v], std::array{v}));
+  return remove;
+}
+
+/// Marks the elements of all but the `components` largest pieces.
+std::vector<char> find_crumbs(const std::vector<std::array<std::int32_t, 4>>& neighbours, std::int64_t components, bool& any) {
+  std::vector<std::int32_t> piece(neighbours.size(), -1);
+  std::vector<std::pair<std::int64_t, std::int32_t>> sizes;  // minus the size, so that sorting puts the largest first
+  for (std::size_t seed = 0; seed < neighbours.size(); ++seed) {
+    if (piece[seed] >= 0) continue;
+    const auto number = static_cast<std::int32_t>(sizes.size());
+    std::vector<std::int32_t> reached{static_cast<std::int32_t>(seed)};
+    piece[seed] = number;
+    for (std::size_t next = 0; next < reached.size(); ++next)
+      for (const std::int32_t other : neighbours[reached[next]])
+        if (other >= 0 && piece[other] < 0) piece[other] = number, reached.push_back(other);
+    sizes.emplace_back(-static_cast<std::int64_t>(reached.size()), number);
+  }
+  any = static_cast<std::int64_t>(sizes.size()) > components;
+  std::vector<char> remove(neighbours.size(), 0);
+  if (!any) return remove;
+  std::sort(sizes.begin(), sizes.end());
+  std::vector<char> keep(sizes.size(), 0);
+  for (std::int64_t c = 0; c < components; ++c) keep[sizes[static_cast<std::size_t>(c)].second] = 1;
+  for (std::size_t e = 0; e < remove.size(); ++e) remove[e] = keep[piece[e]] ? 0 : 1;
+  return remove;
+}
+
+void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove) {
+  std::vector<std::int32_t> number(mesh.nodes.size(), -1), tets;
+  std::vector<Vec3> nodes;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+    if (remove[static_cast<std::size_t>(e)]) continue;
+    for (const std::int32_t v : mesh.tet(e)) {
+      if (number[v] < 0) {
+        number[v] = static_cast<std::int32_t>(nodes.size());
+        nodes.push_back(mesh.nodes[v]);
+      }
+      tets.push_back(number[v]);
+    }
+  }
+  mesh.nodes = std::move(nodes);
+  mesh.tets = std::move(tets);
+  mesh.regions.assign(static_cast<std::size_t>(mesh.tet_count()), 0);
+}
+
+}  // namespace
+
+TetMeasures measure(const mesh::TetMesh& mesh) {
+  TetMeasures out;
+  double edges = 0;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+    const auto tet = mesh.tet(e);
+    std::array<Vec3, 4> p, normal;
+    for (int c = 0; c < 4; ++c) p[c] = mesh.nodes[tet[c]];
+    for (int f = 0; f < 4; ++f) {
+      const auto& corner = mesh::kFaces[f];
+      normal[f] = cross(p[corner[1]] - p[corner[0]], p[corner[2]] - p[corner[0]]);
+    }
+    for (int i = 0; i < 4; ++i)
+      for (int j = i + 1; j < 4; ++j) {
+        const double angle = 180 - std::atan2(norm(cross(normal[i], normal[j])), dot(normal[i], normal[j])) * 180 / std::numbers::pi;
+        out.min_dihedral_deg = std::min(out.min_dihedral_deg, angle);
+        out.max_dihedral_deg = std::max(out.max_dihedral_deg, angle);
+        edges += norm(p[j] - p[i]);
+      }
+    out.volume_m3 += dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) / 6;
+  }
+  out.mean_edge_m = mesh.tet_count() > 0 ? edges / (6.0 * static_cast<double>(mesh.tet_count())) : 0;
+  return out;
+}
+
+std::vector<Triangle> find_boundary(const mesh::TetMesh& mesh) {
+  const auto neighbours = find_neighbours(mesh);
+  std::vector<Triangle> out;
+  for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
+    for (int f = 0; f < 4; ++f)
+      if (neighbours[e][f] < 0) out.push_back(get_face(mesh, e, f));
+  return out;
+}
+
+std::int64_t count_edges(const mesh::TetMesh& mesh) {
+  std::vector<Edge> edges;
+  edges.reserve(static_cast<std::size_t>(mesh.tet_count()) * 6);
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (const auto& [a, b] : mesh::kEdges) edges.push_back(sorted(Edge{mesh.tet(e)[a], mesh.tet(e)[b]}));
+  std::sort(edges.begin(), edges.end());
+  return std::unique(edges.begin(), edges.end()) - edges.begin();
+}
+
+std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components) {
+  const std::int64_t before = mesh.tet_count();
+  for (bool any = true; any && mesh.tet_count() > 0;) {
+    const auto neighbours = find_neighbours(mesh);
+    auto remove = find_pinching(mesh, neighbours, any);
+    if (!any) remove = find_crumbs(neighbours, components, any);
+    if (any) drop_elements(mesh, remove);
+  }
+  return before - mesh.tet_count();
+}
+
+mesh::TetMesh make_second_order(const mesh::TetMesh& linear) {
+  mesh::TetMesh out;
+  out.order = 2;
+  out.nodes = linear.nodes;
+  out.regions = linear.regions;
+  out.tets.reserve(static_cast<std::size_t>(linear.tet_count()) * 10);
+  std::unordered_map<Edge, std::int32_t, KeyHash> middles;
+  for (std::int64_t e = 0; e < linear.tet_count(); ++e) {
+    const auto tet = linear.tet(e);
+    out.tets.insert(out.tets.end(), tet.begin(), tet.end());
+    for (const auto& [a, b] : mesh::kEdges) {
+      const auto [found, fresh] = middles.try_emplace(sorted(Edge{tet[a], tet[b]}), static_cast<std::int32_t>(out.nodes.size()));
+      if (fresh) out.nodes.push_back(0.5 * (linear.nodes[tet[a]] + linear.nodes[tet[b]]));
+      out.tets.push_back(found->second);
+    }
+  }
+  return out;
+}
+
+}  // namespace carillon::mesher

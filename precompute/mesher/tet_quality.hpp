@@ -1,0 +1,32 @@
+// What a mesher does with tetrahedra of whatever origin: measures, boundary, repair, second order. Std only.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/mesh/tet_mesh.hpp"
+#include "precompute/mesher/triangle_surface.hpp"
+
+namespace carillon::mesher {
+
+struct TetMeasures {
+  double min_dihedral_deg = 180, max_dihedral_deg = 0;
+  double volume_m3 = 0;
+  double mean_edge_m = 0;  // over the elements' edges, each counted as often as it has elements
+};
+TetMeasures measure(const mesh::TetMesh& mesh);
+
+/// Faces that belong to one element, counter-clockwise seen from outside.
+std::vector<Triangle> find_boundary(const mesh::TetMesh& mesh);
+
+/// Number of different edges, so corner nodes plus this is the count of the second-order mesh.
+std::int64_t count_edges(const mesh::TetMesh& mesh);
+
+/// Removes elements until every boundary edge has two boundary faces, the boundary is a surface around every node too, and no more
+/// than `components` pieces are left (the largest ones). Removes unused nodes. Linear meshes. Returns how many elements went.
+std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components);
+
+/// The same mesh with a node at the middle of every edge.
+mesh::TetMesh make_second_order(const mesh::TetMesh& linear);
+
+}  // namespace carillon::mesher

@@ -1,0 +1,64 @@
+// A triangle surface: read from a file, mended until it encloses a volume, and its sharp edges.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "precompute/mesh/tet_mesh.hpp"
+#include "precompute/mesher/surface.hpp"
+
+namespace carillon::mesher {
+
+using mesh::Vec3;
+using Triangle = std::array<std::int32_t, 3>;
+using Polyline = std::vector<Vec3>;
+
+struct TriangleSurface {
+  std::vector<Vec3> points;         // (P)
+  std::vector<Triangle> triangles;  // (T), counter-clockwise seen from outside once mended
+};
+
+inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+inline Vec3 operator*(double s, const Vec3& a) { return {s * a[0], s * a[1], s * a[2]}; }
+inline double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+double norm(const Vec3& a);
+
+/// The corners of the axis-aligned box around some points: lowest, highest.
+struct Box {
+  Vec3 low{}, high{};
+  Vec3 extent() const { return high - low; }
+  double diagonal() const { return norm(high - low); }
+};
+Box calc_box(const std::vector<Vec3>& points);
+
+/// The enclosed volume by the divergence theorem (signed: positive if the triangles face outward), and the area.
+double calc_volume(const TriangleSurface& surface);
+double calc_area(const TriangleSurface& surface);
+
+/// Reads OBJ, STL, PLY or OFF, chosen by the ending of the name. Polygons become triangles, points at one place become one.
+/// Throws InputError if there is no such file, no such format, no triangle, or a coordinate that is no finite number.
+TriangleSurface read_surface(const std::filesystem::path& path);
+
+/// Makes a closed, consistently outward oriented surface of any heap of triangles: drops duplicate and degenerate
+/// triangles, orients, fills holes; where that does not lead to a closed manifold, wraps it (CGAL alpha wrap).
+/// `offset_m` is how far the returned surface lies outside the true one: 0 unless it was wrapped; the distance field adds it.
+/// `clean` is true if no two triangles of it intersect. Throws InputError (naming `path`) if it encloses nothing.
+struct MendedSurface {
+  TriangleSurface surface;
+  double offset_m = 0;
+  bool clean = false;
+};
+MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path& path, SurfaceReport& report);
+
+/// The sharp edges of a mended surface, joined to curves. An edge is sharp if its two faces turn by more than
+/// `sharp_angle_deg`, also when its sides are averaged over `radius`; curves shorter than `shortest_m` are left out.
+/// A closed curve repeats its first point.
+std::vector<Polyline> find_sharp_curves(const TriangleSurface& surface, double sharp_angle_deg, double shortest_m, double radius);
+
+}  // namespace carillon::mesher
