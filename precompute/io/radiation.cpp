@@ -1,9 +1,10 @@
-// Method: one omnidirectional gain per mode from the volume velocity of the surface, taken without sign, as of a pulsating sphere of the same
-//   area. The integral of the absolute value of a linear function over a triangle is closed form: where the sign changes, the lone corner
-//   cuts off a smaller similar piece.
+// Method: one omnidirectional gain per mode from the volume velocity of the surface, taken triangle by triangle without sign, as of a
+//   pulsating sphere of the same area.
 // Source: OSG02 section 3.4 (one gain per mode); Pierce 1981, Acoustics, section 4.1 (pulsating sphere).
 // Deviations: OSG02 sums the signed normal displacement, which is zero for every bending mode of a symmetric body; here its absolute value
-//   times area. The factor 1 / sqrt(1 + (k a)^2) bounds the gain at high frequencies, where OSG02's grows without end.
+//   times area. The sign is dropped after the integral over a triangle, not inside it: a motion along a curved surface leaks through flat
+//   triangles with both signs, which cancel within each. The factor 1 / sqrt(1 + (k a)^2) bounds the gain at high frequencies, where
+//   OSG02's grows without end.
 #include "precompute/io/radiation.hpp"
 
 #include <algorithm>
@@ -73,34 +74,21 @@ std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, 
   return outer;
 }
 
-double calc_absolute_integral(double area, double a, double b, double c) {
-  const double sum = a + b + c;
-  std::array<double, 3> value{a, b, c};
-  std::sort(value.begin(), value.end());
-  if (value[0] >= 0 || value[2] <= 0) return area * std::abs(sum) / 3;
-  // One corner has a sign of its own. The piece that it cuts off has the integral area p^3 / (3 (p - q) (p - r)), the rest the other sign.
-  const double p = value[1] > 0 ? value[0] : value[2], q = value[1], r = value[1] > 0 ? value[2] : value[0];
-  const double piece = area * (p / (p - q)) * (p / (p - r)) * p / 3;
-  return std::abs(2 * piece - area * sum / 3);
-}
-
 std::vector<double> calc_radiation_gain(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles,
                                         std::span<const double> omega_rad_s, std::span<const double> shapes) {
   const std::size_t modes = omega_rad_s.size();
-  std::vector<double> flow(modes, 0.0);  // integral |phi . n| dA
+  std::vector<double> flow(modes, 0.0);  // sum of |phi . n| A
   double area_sum = 0.0;
   for (const Triangle& t : find_outer_triangles(vertices_m, triangles)) {
     const Vec3 normal = calc_normal(vertices_m, t);
-    const double length = norm(normal), area = length / 2;
-    if (!(length > 0.0)) continue;
-    area_sum += area;
+    area_sum += norm(normal) / 2;
     for (std::size_t m = 0; m < modes; ++m) {
-      std::array<double, 3> along{};
+      double through = 0.0;  // 3 phi . n of the middle, times twice the area
       for (int i = 0; i < 3; ++i) {
         const double* phi = &shapes[(t[i] * modes + m) * 3];
-        along[i] = (phi[0] * normal[0] + phi[1] * normal[1] + phi[2] * normal[2]) / length;
+        through += phi[0] * normal[0] + phi[1] * normal[1] + phi[2] * normal[2];
       }
-      flow[m] += calc_absolute_integral(area, along[0], along[1], along[2]);
+      flow[m] += std::abs(through) / 6;
     }
   }
   const double radius = std::sqrt(area_sum / (4 * std::numbers::pi));

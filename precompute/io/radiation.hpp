@@ -22,15 +22,12 @@ inline constexpr double kSoundSpeedMS = 343.0;
 std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles);
 
 /// Calculates per mode the pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s):
-///   g = rho0 omega / (4 pi sqrt(1 + (k a)^2)) * sum over outer triangles of integral |phi . n| dA,   k = omega / c0,  a = sqrt(A / 4 pi),
+///   g = rho0 omega / (4 pi sqrt(1 + (k a)^2)) * sum over outer triangles of |integral phi . n dA|,   k = omega / c0,  a = sqrt(A / 4 pi),
 /// with A the area of the outer triangles. omega_rad_s: (m); shapes: (V, m, 3) [kg^-1/2] at the vertices, linear over each triangle.
-/// Exact for a pulsating sphere; OSG02 section 3.4 with the absolute value inside the integral, because the signed sum of a bending mode of a symmetric
-/// body is zero. Directions and interference are left out: an upper estimate for modes whose lobes are short against the wavelength.
+/// Exact for a pulsating sphere. OSG02 section 3.4 with absolute values, because the signed sum is zero for a bending mode of a symmetric
+/// body. Directions and interference are left out: too loud for modes whose lobes are short against the wavelength.
 /// Not collective.
 std::vector<double> calc_radiation_gain(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles,
                                         std::span<const double> omega_rad_s, std::span<const double> shapes);
-
-/// The integral of |f| over a triangle of the given area, f linear with the values a, b, c at the corners; exact. Not collective.
-double calc_absolute_integral(double area, double a, double b, double c);
 
 }  // namespace carillon::io
