@@ -1,0 +1,730 @@
+#!/usr/bin/python3
+"""carillon-draw: pictures of mode banks and of simulated scenes, drawn off-screen with VTK.
+
+    carillon-draw modes BANK -o OUT.png [--modes 1,2,3] [--up x|y|z]
+    carillon-draw scene TRAJECTORY.json -o OUT.png
+
+Exit codes: 0 done, 2 the input cannot be used, 4 the machine refused.
+"""
+import argparse
+import atexit
+import ctypes
+import hashlib
+import json
+import math
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import h5py
+import numpy
+
+SUPERSAMPLING = 2  # pixels drawn per pixel written, along each side
+TEXT = (0.16, 0.17, 0.20)
+BACKGROUND = ((1.0, 1.0, 1.0), (0.90, 0.92, 0.95))  # top, bottom
+# viridis (van der Walt and Smith 2015), nine of its colours; equal steps look equal.
+VIRIDIS = numpy.array([(68, 1, 84), (71, 44, 122), (59, 82, 139), (44, 113, 142), (33, 145, 140), (39, 173, 129), (92, 200, 99),
+                       (170, 220, 50), (253, 231, 37)]) / 255.0
+MOVING = [(0.85, 0.42, 0.20), (0.20, 0.45, 0.78), (0.55, 0.30, 0.62), (0.25, 0.60, 0.35)]
+FIXED = [(0.55, 0.66, 0.80), (0.72, 0.74, 0.78), (0.80, 0.66, 0.46), (0.62, 0.74, 0.62), (0.76, 0.62, 0.70)]
+
+
+class InputError(Exception):
+    """The input cannot be used; the message says what would mend it."""
+
+
+class SystemError_(Exception):
+    """The machine refused."""
+
+
+# ------------------------------------------------------------------ what is drawn
+
+
+class Bank:
+    """The drawable part of a mode bank: surface, frequencies, modes on demand. Checked by its seal (docs/bank-format.md) before HDF5 sees it."""
+
+    def __init__(self, path):
+        self.path = pathlib.Path(path)
+        try:
+            data = self.path.read_bytes()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a mode bank") from None
+        first = data[:80].split(b"\n")[0]
+        if not first.startswith(b"CARILLON BANK "):
+            raise InputError(f"{path}: this is no mode bank (it does not begin with 'CARILLON BANK'); make one with carillon-precompute")
+        version = first[14:].decode("ascii", "replace")
+        if version.split(".")[0] != "1":
+            raise InputError(f"{path}: bank version {version} is newer than 1.x, which this program reads; use a newer carillon-draw")
+        if len(data) < 4096 or hashlib.sha256(data[:4032] + data[4096:]).hexdigest().encode() != data[4032:4096]:
+            raise InputError(f"{path}: the bank is cut short or was changed (its SHA-256 disagrees); copy or compute it again")
+        del data
+        try:
+            with h5py.File(self.path, "r") as file:
+                self.vertices = file["mesh/vertices"][:]
+                self.triangles = file["mesh/triangles"][:]
+                self.freq_hz = file["modes/frequency_hz"][:]
+                self.centre = file["rigid/centre_m"][:]
+                self.note = f"{file['solve/element'][()].decode()}, {int(file['solve/nodes'][()]):,} nodes"
+        except (OSError, KeyError) as error:
+            raise InputError(f"{path}: the bank cannot be read ({error}); run carillon-bank check on it") from None
+
+    def read_mode(self, number):
+        """The displacement of mode `number`, counted from 1, at every surface vertex; any scale."""
+        with h5py.File(self.path, "r") as file:
+            return file["modes/shape"][:, number - 1, :].astype(float) * file["modes/shape_scale"][number - 1]
+
+
+class Trajectory:
+    """A rendered scene: bodies with their poses, the ground, impulses (written by carillon-render --trajectory)."""
+
+    def __init__(self, path):
+        path = pathlib.Path(path)
+        try:
+            data = json.loads(path.read_text())
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror}); carillon-render --trajectory writes it") from None
+        except ValueError as error:
+            raise InputError(f"{path}: this is no JSON ({error}); carillon-render --trajectory writes it") from None
+        banks = {}
+        try:
+            self.up = "xyz".index(data.get("up", "z"))
+            self.bodies = []
+            for body in data["bodies"]:
+                file = path.parent / body["bank"]
+                if file not in banks:
+                    banks[file] = Bank(file)
+                poses = numpy.array(body["poses"], dtype=float).reshape(-1, 8)
+                if not len(poses) or not numpy.isfinite(poses).all():
+                    raise InputError(f"{path}: body '{body['name']}' has no finite poses; render the scene again")
+                self.bodies.append((body["name"], banks[file], bool(body["fixed"]), poses))
+            if not self.bodies:
+                raise InputError(f"{path}: there are no bodies in it; render a scene that has some")
+            self.ground = (data.get("ground") or {}).get("height_m")
+            impulses = [(*i["world_m"], i["impulse_n_s"]) for i in data.get("impulses", [])]
+            self.impulses = numpy.array(impulses, dtype=float).reshape(-1, 4)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"{path}: this is no trajectory ({type(error).__name__}: {error}); "
+                             "carillon-render --trajectory writes one") from None
+
+
+def drop_cavities(vertices, triangles):
+    """The triangles without the inner skins of hollow bodies: connected parts that enclose a negative volume cannot be seen."""
+    label = numpy.arange(len(vertices))
+    while True:  # every vertex takes the least label of its triangles until nothing changes
+        least = label[triangles].min(axis=1)
+        new = label.copy()
+        for corner in range(3):
+            numpy.minimum.at(new, triangles[:, corner], least)
+        new = new[new]
+        if (new == label).all():
+            break
+        label = new
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    volumes = numpy.bincount(label[triangles[:, 0]], numpy.einsum("ij,ij->i", a, numpy.cross(b, c)), len(vertices))
+    seen = volumes[label[triangles[:, 0]]] > 0
+    return triangles[seen] if seen.any() else triangles
+
+
+def rotate(quaternion, points):
+    """Points (N, 3) turned by a quaternion (w, x, y, z)."""
+    w, v = quaternion[0], numpy.asarray(quaternion[1:])
+    t = 2 * numpy.cross(v, points)
+    return points + w * t + numpy.cross(v, t)
+
+
+# ------------------------------------------------------------------ VTK
+
+
+def open_display():
+    """VTK of Debian draws through X: a virtual server of our own, gone when we are."""
+    if shutil.which("Xvfb") is None:
+        if os.environ.get("DISPLAY"):
+            return
+        raise SystemError_("Xvfb is missing, and there is no display to draw on; install the package xvfb")
+    read_end, write_end = os.pipe()
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"],
+                              pass_fds=[write_end], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                              preexec_fn=lambda: ctypes.CDLL(None).prctl(1, signal.SIGTERM))  # PR_SET_PDEATHSIG: it ends with us
+    os.close(write_end)
+    atexit.register(lambda: (server.terminate(), server.wait()))
+    with os.fdopen(read_end) as pipe:
+        number = pipe.readline().strip()
+    if not number:
+        raise SystemError_("the virtual display Xvfb did not start; try 'Xvfb :99' by hand to see why")
+    # VTK ends the process when it cannot connect, so somebody else tries first.
+    x11 = ctypes.CDLL("libX11.so.6")
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
+    for _ in range(100):
+        display = x11.XOpenDisplay(f":{number}".encode())
+        if display:
+            x11.XCloseDisplay(display)
+            os.environ["DISPLAY"] = f":{number}"
+            return
+        time.sleep(0.1)
+    raise SystemError_(f"the virtual display :{number} takes no connections; is /tmp/.X11-unix a folder that everybody may write to?")
+
+
+def load_vtk():
+    """Imports VTK, which takes half a second and is not needed for messages about the input."""
+    global vtk, to_vtk, to_numpy
+    os.environ.setdefault("LIBGL_ALWAYS_SOFTWARE", "1")
+    import vtkmodules.all as vtk
+    from vtkmodules.util.numpy_support import numpy_to_vtk as to_vtk, vtk_to_numpy as to_numpy
+
+
+def make_surface(vertices, triangles, values=None, crease_deg=40.0):
+    """Polygons with smooth normals that break at creases."""
+    points = vtk.vtkPoints()
+    points.SetData(to_vtk(numpy.ascontiguousarray(vertices, dtype=float), deep=True))
+    cells = vtk.vtkCellArray()
+    rows = numpy.hstack([numpy.full((len(triangles), 1), 3), triangles]).astype(numpy.int64)
+    connectivity = vtk.vtkIdTypeArray()
+    connectivity.DeepCopy(to_vtk(rows.ravel(), array_type=vtk.VTK_ID_TYPE))
+    cells.SetCells(len(triangles), connectivity)
+    surface = vtk.vtkPolyData()
+    surface.SetPoints(points)
+    surface.SetPolys(cells)
+    if values is not None:
+        surface.GetPointData().SetScalars(to_vtk(numpy.ascontiguousarray(values), deep=True))
+    normals = vtk.vtkPolyDataNormals()
+    normals.SetInputData(surface)
+    normals.SetFeatureAngle(crease_deg)
+    normals.ConsistencyOff()
+    normals.Update()
+    return normals.GetOutput()
+
+
+def make_colours():
+    table = vtk.vtkColorTransferFunction()
+    for i, colour in enumerate(VIRIDIS):
+        table.AddRGBPoint(i / (len(VIRIDIS) - 1), *colour)
+    return table
+
+
+def make_actor(data, colour=None, colours=None, opacity=1.0):
+    mapper = vtk.vtkPolyDataMapper()
+    mapper.SetInputData(data)
+    if colours is not None:
+        mapper.SetLookupTable(colours)
+        mapper.InterpolateScalarsBeforeMappingOn()
+    else:
+        mapper.ScalarVisibilityOff()
+    actor = vtk.vtkActor()
+    actor.SetMapper(mapper)
+    look = actor.GetProperty()
+    if colour is not None:
+        look.SetColor(*colour)
+    look.SetOpacity(opacity)
+    look.SetAmbient(0.28)
+    look.SetDiffuse(0.84)
+    look.SetSpecular(0.18)
+    look.SetSpecularPower(28)
+    return actor
+
+
+def make_flat(actor):
+    actor.GetProperty().LightingOff()
+    return actor
+
+
+def make_text(text, x, y, size, bold=False, centred=True, colour=TEXT):
+    """Text at a place in fractions of the viewport, `size` in pixels of the finished picture."""
+    actor = vtk.vtkTextActor()
+    actor.SetInput(text)
+    actor.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+    actor.SetPosition(x, y)
+    look = actor.GetTextProperty()
+    look.SetFontFamilyToArial()
+    look.SetFontSize(int(size * SUPERSAMPLING))
+    look.SetBold(bold)
+    look.SetColor(*colour)
+    if centred:
+        look.SetJustificationToCentered()
+    look.SetVerticalJustificationToCentered()
+    return actor
+
+
+def make_lights(renderer):
+    """A key from the upper left of the eye, soft fills from the right and below, a rim from behind."""
+    renderer.AutomaticLightCreationOff()
+    for place, strength, colour in [((-0.7, 0.9, 1.0), 0.80, (1.0, 0.98, 0.95)), ((1.0, 0.2, 0.8), 0.34, (0.92, 0.95, 1.0)),
+                                    ((0.1, 0.8, -1.0), 0.25, (1.0, 1.0, 1.0)), ((0.0, -0.9, 0.6), 0.22, (0.96, 0.97, 1.0))]:
+        light = vtk.vtkLight()
+        light.SetLightTypeToCameraLight()
+        light.SetPosition(*place)
+        light.SetFocalPoint(0, 0, 0)
+        light.SetIntensity(strength)
+        light.SetColor(*colour)
+        renderer.AddLight(light)
+
+
+def make_renderer():
+    renderer = vtk.vtkRenderer()
+    renderer.GradientBackgroundOn()
+    renderer.SetBackground2(*BACKGROUND[0])
+    renderer.SetBackground(*BACKGROUND[1])
+    renderer.SetUseDepthPeeling(True)
+    renderer.SetMaximumNumberOfPeels(12)
+    make_lights(renderer)
+    return renderer
+
+
+def draw(renderers, width, height):
+    """The picture (height, width, 3) of renderers that lie on each other; every pixel is the mean of several."""
+    window = vtk.vtkRenderWindow()
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    window.SetAlphaBitPlanes(True)
+    window.SetSize(width * SUPERSAMPLING, height * SUPERSAMPLING)
+    window.SetNumberOfLayers(len(renderers))
+    for layer, renderer in enumerate(renderers):
+        renderer.SetLayer(layer)
+        renderer.UseFXAAOn()
+        window.AddRenderer(renderer)
+    window.Render()
+    grab = vtk.vtkWindowToImageFilter()
+    grab.SetInput(window)
+    grab.ReadFrontBufferOff()
+    grab.Update()
+    image = to_numpy(grab.GetOutput().GetPointData().GetScalars())[:, :3]
+    image = image.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING, 3).astype(float).mean(axis=(1, 3))
+    window.Finalize()
+    return image[::-1]
+
+
+def write_png(image, path):
+    """Writes the picture beside `path` first and renames it, so that there is a whole picture or none."""
+    height, width, _ = image.shape
+    data = vtk.vtkImageData()
+    data.SetDimensions(width, height, 1)
+    pixels = numpy.clip(numpy.rint(image[::-1]), 0, 255).astype(numpy.uint8).reshape(-1, 3)
+    data.GetPointData().SetScalars(to_vtk(pixels, deep=True))
+    writer = vtk.vtkPNGWriter()
+    writer.SetInputData(data)
+    writer.WriteToMemoryOn()
+    writer.Write()
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".", suffix=".png", delete=False) as file:
+            file.write(bytes(to_numpy(writer.GetResult())))
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(file.name, 0o644)
+        os.replace(file.name, path)
+    except OSError as error:
+        raise SystemError_(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+
+
+class View:
+    """Directions of a picture: right, up and towards the eye, as rows of a rotation."""
+
+    def __init__(self, up, points, azimuth_deg, elevation_deg):
+        extent = points.max(axis=0) - points.min(axis=0)
+        # The longer horizontal axis runs across the picture.
+        first, second = (up + 1) % 3, (up + 2) % 3
+        across = first if extent[first] >= extent[second] else second
+        up_vector, right = numpy.eye(3)[up], numpy.eye(3)[across]
+        toward = numpy.cross(right, up_vector)
+        azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
+        toward = toward * math.cos(azimuth) + right * math.sin(azimuth)
+        toward = toward * math.cos(elevation) + up_vector * math.sin(elevation)
+        right = numpy.cross(up_vector, toward)
+        right /= numpy.linalg.norm(right)
+        self.axes = numpy.array([right, numpy.cross(toward, right), toward])
+
+    def aim(self, renderer, low, high, width, height, room):
+        """A parallel camera that shows the box low..high (in view axes) within `room` = (left, right, bottom, top) pixels of margin."""
+        left, right, bottom, top = room
+        pixel = max((high[0] - low[0]) / (width - left - right), (high[1] - low[1]) / (height - bottom - top))
+        centre = 0.5 * (low + high) + numpy.array([0.5 * (right - left), 0.5 * (top - bottom), 0.0]) * pixel
+        focus = self.axes.T @ centre
+        camera = renderer.GetActiveCamera()
+        camera.ParallelProjectionOn()
+        camera.SetFocalPoint(*focus)
+        camera.SetPosition(*(focus + self.axes[2] * 4 * max(high - low)))
+        camera.SetViewUp(*self.axes[1])
+        camera.SetParallelScale(0.5 * height * pixel)
+        renderer.ResetCameraClippingRange()
+        return pixel
+
+
+# ------------------------------------------------------------------ modes
+
+
+def choose_panels(count, aspect):
+    """Columns and panel size (pixels) for `count` bodies of a width-to-height ratio, in a picture of about 3 to 2."""
+    best = None
+    for columns in range(1, count + 1):
+        rows = math.ceil(count / columns)
+        width = 1860 // columns
+        height = int(min(max((width - 90) / aspect, 150), 900)) + 150
+        picture = columns * width / (rows * height)
+        body = min((width - 90) / aspect, height - 150)  # height of the body on the page
+        cost = abs(math.log(picture / 1.7)) + 0.4 * (columns * rows - count) - 0.15 * math.log(body * body * aspect)
+        if best is None or cost < best[0]:
+            best = (cost, columns, width, height)
+    return best[1:]
+
+
+def draw_modes(bank, numbers, up):
+    triangles = drop_cavities(bank.vertices, bank.triangles)
+    used = numpy.unique(triangles)
+    place = bank.vertices[used]
+    size = numpy.linalg.norm(place.max(axis=0) - place.min(axis=0))
+    extent = place.max(axis=0) - place.min(axis=0)
+    flat = extent[up] < 0.25 * max(extent)
+    view = View(up, place, 28, 34 if flat else 14)
+    deformed = []
+    for number in numbers:
+        mode = bank.read_mode(number)
+        length = numpy.linalg.norm(mode, axis=1)
+        # A tenth of the body's size is visible and does not turn it inside out; the sign makes the largest motion point outward.
+        k = int(length[used].argmax())
+        sign = 1.0 if mode[used][k] @ (place[k] - place.mean(axis=0)) >= 0 else -1.0
+        deformed.append((bank.vertices + sign * 0.10 * size / length[used].max() * mode, length / length[used].max()))
+    seen = numpy.vstack([place] + [shape[used] for shape, _ in deformed]) @ view.axes.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    columns, width, height = choose_panels(len(numbers), (high[0] - low[0]) / max(high[1] - low[1], 0.05 * (high[0] - low[0])))
+    rows = math.ceil(len(numbers) / columns)
+    legend = 84
+    canvas = numpy.full((rows * height + legend, columns * width, 3), 255.0)
+    colours = make_colours()
+    rest = make_surface(bank.vertices, triangles)
+    corners = numpy.vstack([place] + [shape[used] for shape, _ in deformed])
+    bounds = numpy.column_stack([corners.min(axis=0), corners.max(axis=0)]).ravel()
+    for index, (number, (shape, colour)) in enumerate(zip(numbers, deformed)):
+        # The body at rest lies in a layer below: it shows where the deformed one has left it.
+        renderer, above = make_renderer(), vtk.vtkRenderer()
+        renderer.GradientBackgroundOff()
+        renderer.SetBackground(1.0, 1.0, 1.0)
+        make_lights(above)
+        view.aim(renderer, low, high, width, height, (45, 45, 110, 25))
+        above.SetActiveCamera(renderer.GetActiveCamera())
+        above.AddActor(make_actor(make_surface(shape, triangles, colour), colours=colours))
+        renderer.AddActor(make_actor(rest, (0.84, 0.86, 0.89)))
+        outline = vtk.vtkPolyDataSilhouette()
+        outline.SetInputData(rest)
+        outline.SetCamera(renderer.GetActiveCamera())
+        outline.SetEnableFeatureAngle(0)
+        outline.Update()
+        lines = make_flat(make_actor(outline.GetOutput(), (0.55, 0.58, 0.63)))
+        lines.GetProperty().SetLineWidth(1.2 * SUPERSAMPLING)
+        renderer.AddActor(lines)
+        above.ResetCameraClippingRange(*bounds)
+        renderer.AddActor2D(make_text(f"Mode {number}", 0.5, 80 / height, 30, bold=True))
+        renderer.AddActor2D(make_text(f"{bank.freq_hz[number - 1]:,.1f} Hz", 0.5, 42 / height, 26))
+        row, column = divmod(index, columns)
+        canvas[row * height:(row + 1) * height, column * width:(column + 1) * width] = draw([renderer, above], width, height)
+    canvas[rows * height:] = draw_legend(canvas.shape[1], legend, colours, bank)
+    return canvas
+
+
+def draw_legend(width, height, colours, bank):
+    renderer = make_renderer()
+    renderer.SetBackground(1.0, 1.0, 1.0)
+    renderer.SetBackground2(1.0, 1.0, 1.0)
+    bar = vtk.vtkPlaneSource()
+    bar.SetResolution(128, 1)
+    bar.SetOrigin(0, 0, 0)
+    bar.SetPoint1(1, 0, 0)
+    bar.SetPoint2(0, 0.05, 0)
+    bar.Update()
+    plane = bar.GetOutput()
+    plane.GetPointData().SetScalars(to_vtk(to_numpy(plane.GetPoints().GetData())[:, 0].copy(), deep=True))
+    renderer.AddActor(make_flat(make_actor(plane, colours=colours)))
+    pixel = 1.0 / 360
+    camera = renderer.GetActiveCamera()
+    camera.ParallelProjectionOn()
+    camera.SetFocalPoint(0.5, 0.025 - 14 * pixel, 0)
+    camera.SetPosition(0.5, 0.025 - 14 * pixel, 1)
+    camera.SetParallelScale(0.5 * height * pixel)
+    middle = 0.5 + 14 / height
+    renderer.AddActor2D(make_text("at rest", 0.5 - (180 + 48) / width, middle, 19))
+    renderer.AddActor2D(make_text("largest displacement", 0.5 + (180 + 108) / width, middle, 19))
+    renderer.AddActor2D(make_text(f"{bank.path.name}   ·   {bank.note}   ·   grey: undeformed; displacements exaggerated", 0.5,
+                                  18 / height, 16, colour=(0.42, 0.44, 0.48)))
+    return draw([renderer], width, height)
+
+
+# ------------------------------------------------------------------ scene
+
+
+def decimate(vertices, triangles, most):
+    """A body of at most about `most` triangles, for copies that are drawn many times."""
+    if len(triangles) <= most:
+        return vertices, triangles
+    clean = vtk.vtkCleanPolyData()  # also drops the points that no triangle uses
+    clean.SetInputData(make_surface(vertices, triangles, crease_deg=180.0))
+    clean.SetTolerance(0.0)
+    thin = vtk.vtkQuadricDecimation()
+    thin.SetInputConnection(clean.GetOutputPort())
+    thin.SetTargetReduction(1.0 - most / len(triangles))
+    thin.Update()
+    output = thin.GetOutput()
+    return to_numpy(output.GetPoints().GetData()).astype(float), to_numpy(output.GetPolys().GetData()).reshape(-1, 4)[:, 1:]
+
+
+def choose_poses(centres, poses, radius, count):
+    """Indices of poses spread evenly over way and rotation, the first and the last among them."""
+    way = numpy.linalg.norm(numpy.diff(centres, axis=0), axis=1)
+    turn = 2 * numpy.arccos(numpy.clip(numpy.abs(numpy.einsum("ij,ij->i", poses[1:, 4:], poses[:-1, 4:])), 0, 1))
+    total = numpy.concatenate([[0.0], numpy.cumsum(way + 0.25 * radius * turn)])
+    if total[-1] < 0.05 * radius:
+        return [len(poses) - 1]
+    count = int(min(count, max(2, round(total[-1] / (0.9 * radius)) + 1)))
+    return sorted({int(numpy.searchsorted(total, t)) for t in numpy.linspace(0, total[-1], count)} & set(range(len(poses))) | {len(poses) - 1})
+
+
+def make_line(points, radius, colour, opacity=1.0):
+    line = vtk.vtkPolyData()
+    vertices = vtk.vtkPoints()
+    vertices.SetData(to_vtk(numpy.ascontiguousarray(points), deep=True))
+    cells = vtk.vtkCellArray()
+    cells.InsertNextCell(len(points))
+    for i in range(len(points)):
+        cells.InsertCellPoint(i)
+    line.SetPoints(vertices)
+    line.SetLines(cells)
+    tube = vtk.vtkTubeFilter()
+    tube.SetInputData(line)
+    tube.SetRadius(radius)
+    tube.SetNumberOfSides(10)
+    tube.CappingOn()
+    tube.Update()
+    return make_actor(tube.GetOutput(), colour, opacity=opacity)
+
+
+def make_ground(centre, radius, up):
+    """A disc that fades into the background."""
+    disc = vtk.vtkDiskSource()
+    disc.SetInnerRadius(0.0)
+    disc.SetOuterRadius(radius)
+    disc.SetRadialResolution(24)
+    disc.SetCircumferentialResolution(96)
+    disc.Update()
+    data = disc.GetOutput()
+    flat = to_numpy(data.GetPoints().GetData()).astype(float)
+    points = numpy.zeros_like(flat)
+    points[:, (up + 1) % 3], points[:, (up + 2) % 3] = flat[:, 0], flat[:, 1]
+    data.GetPoints().SetData(to_vtk(points + centre, deep=True))
+    fade = numpy.clip(1.15 - numpy.hypot(flat[:, 0], flat[:, 1]) / radius, 0, 1) ** 1.2
+    rgba = numpy.column_stack([numpy.tile((202, 207, 214), (len(flat), 1)), 255 * numpy.minimum(fade, 1)]).astype(numpy.uint8)
+    rgba[numpy.hypot(flat[:, 0], flat[:, 1]) > 0.999 * radius, 3] = 0
+    data.GetPointData().SetScalars(to_vtk(rgba, deep=True))
+    return make_flat(make_actor(data, colours=vtk.vtkLookupTable()))
+
+
+def blend(colour, other, weight):
+    return tuple((1 - weight) * a + weight * b for a, b in zip(colour, other))
+
+
+def add_legend(renderer, entries, width, height):
+    """Entries (text, colour or None) in centred rows at the foot of the picture. Returns the number of rows."""
+    size, letter = 24, 12.0
+    rows, room = [[]], 0.0
+    for text, colour in entries:
+        need = letter * len(text) + (34 if colour else 0) + 44
+        if rows[-1] and room + need > width - 80:
+            rows.append([])
+            room = 0.0
+        rows[-1].append((text, colour, need))
+        room += need
+    for row, line in enumerate(rows):
+        x = 0.5 * (width - sum(need for *_, need in line))
+        y = 36 + 44 * (len(rows) - 1 - row)
+        for text, colour, need in line:
+            if colour:
+                dot = vtk.vtkRegularPolygonSource()
+                dot.SetNumberOfSides(32)
+                dot.SetRadius(9 * SUPERSAMPLING)
+                dot.SetCenter((x + 12) * SUPERSAMPLING, y * SUPERSAMPLING, 0)
+                mapper = vtk.vtkPolyDataMapper2D()
+                mapper.SetInputConnection(dot.GetOutputPort())
+                actor = vtk.vtkActor2D()
+                actor.SetMapper(mapper)
+                actor.GetProperty().SetColor(*colour)
+                renderer.AddActor2D(actor)
+                x += 34
+                need -= 34
+            renderer.AddActor2D(make_text(text, x / width, y / height, size, centred=False))
+            x += need
+    return len(rows)
+
+
+def draw_scene(scene):
+    up = scene.up
+    bodies, moving_points, fixed_points = [], [], []
+    for name, bank, fixed, poses in scene.bodies:
+        triangles = drop_cavities(bank.vertices, bank.triangles)
+        used = bank.vertices[numpy.unique(triangles)]
+        radius = numpy.linalg.norm(used - bank.centre, axis=1).max()
+        centres = numpy.array([rotate(p[4:], bank.centre[None])[0] + p[1:4] for p in poses])
+        bodies.append((name, bank, fixed, poses, triangles, radius, centres))
+        if fixed:
+            fixed_points.append(rotate(poses[0][4:], used) + poses[0][1:4])
+        else:
+            moving_points += [centres - radius, centres + radius]
+    # A floor far wider than the action is drawn whole but does not decide the frame.
+    points = numpy.vstack(moving_points or fixed_points)
+    for shelf in fixed_points:
+        low, high = points.min(axis=0), points.max(axis=0)
+        room = 1.0 * (high - low).max()
+        points = numpy.vstack([points, numpy.clip(shelf, low - room, high + room)])
+    if scene.ground is not None:
+        foot = points.min(axis=0)
+        foot[up] = max(min(scene.ground, foot[up]), foot[up] - (points.max(axis=0) - foot).max())
+        points = numpy.vstack([points, foot])
+    size = numpy.linalg.norm(points.max(axis=0) - points.min(axis=0))
+
+    view = View(up, points, 24, 13)
+    renderer, overlay = make_renderer(), vtk.vtkRenderer()
+    make_lights(overlay)
+    seen = points @ view.axes.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    aspect = (high[0] - low[0]) / (high[1] - low[1])
+    width, height = (1800, int(min(max(1650 / aspect, 900), 1900))) if aspect > 0.75 else (1600, 1900)
+    camera = renderer.GetActiveCamera()
+    slope = math.tan(math.radians(11))
+    margin = 1.10
+    focus = view.axes.T @ numpy.append(0.5 * (low + high)[:2], high[2])
+    half = max(0.5 * margin * (high[1] - low[1]), 0.5 * margin * (high[0] - low[0]) * height / width)
+    camera.SetViewAngle(22)
+    camera.SetFocalPoint(*focus)
+    camera.SetPosition(*(focus + view.axes[2] * half / slope))
+    camera.SetViewUp(*view.axes[1])
+    overlay.SetActiveCamera(camera)
+
+    if scene.ground is not None:
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        centre[up] = scene.ground
+        renderer.AddActor(make_ground(centre, 1.1 * size, up))
+    legend, moving = [], 0
+    for name, bank, fixed, poses, triangles, radius, centres in bodies:
+        if fixed:
+            colour = FIXED[len([entry for entry in legend if entry[2]]) % len(FIXED)]
+            legend.append((name, colour, True))
+            renderer.AddActor(make_actor(make_surface(rotate(poses[0][4:], bank.vertices) + poses[0][1:4], triangles), colour))
+            continue
+        colour = MOVING[moving % len(MOVING)]
+        moving += 1
+        legend.append((name, colour, False))
+        chosen = choose_poses(centres, poses, radius, 14)
+        vertices, thin = decimate(bank.vertices, triangles, 16000)
+        for order, index in enumerate(chosen):
+            last = order == len(chosen) - 1
+            pale = 0.55 * (1 - order / max(1, len(chosen) - 1))
+            surface = make_surface(rotate(poses[index][4:], vertices) + poses[index][1:4], thin)
+            renderer.AddActor(make_actor(surface, blend(colour, (1, 1, 1), pale), opacity=1.0 if last else 0.42))
+        if len(centres) > 1 and numpy.ptp(centres, axis=0).max() > 0.02 * size:
+            step = max(1, len(centres) // 2000)
+            overlay.AddActor(make_line(centres[::step], 0.0018 * size, (0.95, 0.75, 0.10), 0.9))
+    impulses = scene.impulses[numpy.argsort(-scene.impulses[:, 3])][:600]
+    if len(impulses):
+        largest = impulses[0, 3] if impulses[0, 3] > 0 else 1.0
+        dots = vtk.vtkAppendPolyData()
+        for x, y, z, impulse in impulses[impulses[:, 3] > 0.01 * largest]:
+            dot = vtk.vtkSphereSource()
+            dot.SetCenter(x, y, z)
+            dot.SetRadius(size * 0.0105 * (max(impulse, 0.0) / largest) ** 0.5 + 0.0012 * size)
+            dot.SetThetaResolution(24)
+            dot.SetPhiResolution(24)
+            dot.Update()
+            dots.AddInputData(dot.GetOutput())
+        dots.Update()
+        overlay.AddActor(make_actor(dots.GetOutput(), (0.80, 0.10, 0.16), opacity=0.85))
+        legend.append((f"contacts, largest {largest:.2g} N s", (0.80, 0.10, 0.16), True))
+    if moving:
+        legend.append(("path of the centre of mass", (0.95, 0.75, 0.10), True))
+    times = [poses[:, 0] for _, _, fixed, poses, *_ in bodies if not fixed]
+    if times:
+        legend.append((f"{min(t[0] for t in times):.2f} s to {max(t[-1] for t in times):.2f} s, paler is earlier", None, False))
+    rows = add_legend(overlay, [entry[:2] for entry in legend], width, height)
+    # The scene keeps clear of the legend below it.
+    band = (36 + 44 * rows) / height
+    camera.SetViewAngle(2 * math.degrees(math.atan(slope / (1 - band))))
+    camera.SetWindowCenter(0.0, -band)
+    renderer.ResetCameraClippingRange()
+    return draw([renderer, overlay], width, height)
+
+
+# ------------------------------------------------------------------ the program
+
+
+def parse_modes(text, bank):
+    count = len(bank.freq_hz)
+    if count == 0:
+        raise InputError(f"{bank.path}: the bank has no modes to draw; compute one with a wider band_hz")
+    if text is None:
+        return list(range(1, min(3, count) + 1))
+    numbers = []
+    for word in text.split(","):
+        if not word.strip().isdigit():
+            raise InputError(f"--modes {text}: '{word}' is no mode number; give numbers from 1 to {count}, such as 1,2,3")
+        number = int(word)
+        if not 1 <= number <= count:
+            raise InputError(f"--modes {text}: there is no mode {number} in {bank.path}, which has {count}; give numbers from 1 to {count}")
+        numbers.append(number)
+    if len(numbers) > 12:
+        raise InputError(f"--modes {text}: {len(numbers)} modes are too many for one picture; give at most 12")
+    return numbers
+
+
+def check_output(path):
+    if path.suffix.lower() != ".png":
+        raise InputError(f"{path}: pictures are PNG; give the output a name that ends in .png")
+    if path.is_dir():
+        raise InputError(f"{path}: this is a folder; give the name of a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: there is no such folder; make it first")
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        raise InputError(f"{message}; see {self.prog} --help")
+
+
+def run():
+    parser = Parser(prog="carillon-draw", description="Draws mode banks and simulated scenes.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="modes|scene", parser_class=Parser)
+    modes = commands.add_parser("modes", help="modes of a bank as deformed bodies", allow_abbrev=False)
+    modes.add_argument("bank", metavar="BANK")
+    modes.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
+    modes.add_argument("--modes", metavar="1,2,3", help="which modes, counted from 1 [the first three]")
+    modes.add_argument("--up", choices="xyz", default="y", help="the axis of the mesh that points up in the picture [y]")
+    scene = commands.add_parser("scene", help="the bodies of a simulated scene along their ways", allow_abbrev=False)
+    scene.add_argument("trajectory", metavar="TRAJECTORY.json", help="written by carillon-render --trajectory")
+    scene.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
+    arguments = parser.parse_args()
+
+    check_output(arguments.output)
+    if arguments.command == "modes":
+        bank = Bank(arguments.bank)
+        numbers = parse_modes(arguments.modes, bank)
+    else:
+        trajectory = Trajectory(arguments.trajectory)
+    open_display()
+    load_vtk()
+    image = draw_modes(bank, numbers, "xyz".index(arguments.up)) if arguments.command == "modes" else draw_scene(trajectory)
+    write_png(image, arguments.output)
+    print(f"{arguments.output}: {image.shape[1]} x {image.shape[0]} pixels")
+
+
+def main():
+    try:
+        run()
+    except InputError as error:
+        print(f"carillon-draw: {error}", file=sys.stderr)
+        return 2
+    except (SystemError_, ImportError, MemoryError, OSError) as error:
+        print(f"carillon-draw: {error}", file=sys.stderr)
+        return 4
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
