@@ -1,4 +1,6 @@
 // Mode banks: what precompute writes and the runtime plays. Layout on disk: docs/bank-format.md.
+// Reading and checking may be done on any thread, several at once; write_bank on one thread at a time (it uses HDF5). None of it is for an
+// audio thread.
 #pragma once
 
 #include <array>

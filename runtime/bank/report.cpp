@@ -90,7 +90,7 @@ void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) 
 
 std::string format_modes(const Bank& bank, std::size_t limit) {
   std::string text = fmt::format("\n{:>5} {:>11} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "freq [Hz]", "decay [1/s]", "T60 [s]",
-                                 "d/omega", "regime", "residual", "gain [Pa...]");
+                                 "d/omega", "regime", "residual", "gain");
   const std::size_t shown = std::min(limit, bank.mode_count());
   for (std::size_t i = 0; i < shown; ++i) {
     const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
@@ -99,6 +99,7 @@ std::string format_modes(const Bank& bank, std::size_t limit) {
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
+  text += "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
   return text;
 }
 

@@ -100,8 +100,12 @@ def datasets_of(bank):
 
 
 def check_vtk(folder):
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkIOHDF import vtkHDFReader
+    try:
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkIOHDF import vtkHDFReader
+    except ImportError as error:  # Debian's VTK needs MPI, which a machine for the runtime alone lacks; CTest calls 77 skipped only there
+        print(error)
+        sys.exit(77)
 
     for squares, modes in ((3, 12), (40, 120)):
         path = f"{folder}/vtk.hdf"
