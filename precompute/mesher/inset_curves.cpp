@@ -77,24 +77,37 @@ std::vector<Polyline> make_inset_curves(const TriangleSurface& surface, const st
       if (piece.size() > 1) out.push_back(piece);
       piece.clear();
     };
-    const auto add = [&](const Vec3& p, const Normals& normals) {
+    // A corner is exactly the same point for all curves that meet in it, so it replaces points that came too close before it.
+    const auto add = [&](const Vec3& p, const Normals& normals, bool corner) {
       const Vec3 q = p + calc_inset(group_sides(normals), wall_m);
-      if (!is_on_skin(q) || (!piece.empty() && norm(q - piece.back()) > 3 * spacing_m)) finish();
-      if (is_on_skin(q) && (piece.empty() || norm(q - piece.back()) > 0.05 * spacing_m)) piece.push_back(q);
+      if (!is_on_skin(q)) return;
+      if (!piece.empty() && norm(q - piece.back()) > 3 * spacing_m) finish();
+      if (corner)
+        while (piece.size() > 1 && norm(q - piece.back()) < 0.4 * spacing_m) piece.pop_back();
+      if (piece.empty() || norm(q - piece.back()) > 0.4 * spacing_m) piece.push_back(q);
     };
-    add(curve.front(), at_point.at(curve.front()));
+    add(curve.front(), at_point.at(curve.front()), true);
     for (std::size_t i = 0; i + 1 < curve.size(); ++i) {
       const Vec3 &a = curve[i], &b = curve[i + 1];
       const Normals& sides = at_edge.at(a < b ? std::array{a, b} : std::array{b, a});
       const int pieces = static_cast<int>(std::ceil(norm(b - a) / spacing_m));
-      for (int k = 1; k < pieces; ++k) add(a + (static_cast<double>(k) / pieces) * (b - a), sides);
-      add(b, at_point.at(b));
+      for (int k = 1; k < pieces; ++k) add(a + (static_cast<double>(k) / pieces) * (b - a), sides, false);
+      add(b, at_point.at(b), i + 2 == curve.size());
     }
     // A closed curve whose inset is whole closes too.
     if (curve.front() == curve.back() && piece.size() > 2 && norm(piece.front() - piece.back()) < 3 * spacing_m)
       piece.back() = piece.front();
     finish();
   }
+  // Ends that nearly meet are made to meet: the mesher would put ever smaller balls between them.
+  std::vector<Vec3*> ends;
+  for (Polyline& piece : out)
+    for (Vec3* end : {&piece.front(), &piece.back()}) {
+      const auto close = std::find_if(ends.begin(), ends.end(), [&](const Vec3* other) { return norm(*other - *end) < 0.5 * spacing_m; });
+      if (close != ends.end()) *end = **close;
+      ends.push_back(end);
+    }
+  std::erase_if(out, [](const Polyline& piece) { return piece.size() == 2 && piece.front() == piece.back(); });
   return out;
 }
 
