@@ -18,6 +18,7 @@ namespace {
 constexpr std::size_t kBlock = 512;
 constexpr double kReferencePa = 20e-6;
 constexpr double kFastS = 0.125;
+constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away is not heard (84 dB down, and memory has an end)
 
 double get_cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -52,7 +53,7 @@ double calc_longest_m(const std::vector<contact::Pose>& poses, const contact::Bo
   };
   visit(spec.initial);
   for (const contact::Pose& pose : poses) visit(pose);
-  return longest + 1.0;
+  return std::min(longest + 1.0, kFarthestHeardM);
 }
 
 std::vector<std::unique_ptr<Voice>> make_voices(const Scene& scene, const std::vector<const bank::Bank*>& banks,

@@ -10,6 +10,7 @@
 namespace carillon::host {
 namespace {
 
+constexpr double kShortestS = 1e-3;
 constexpr double kLongestS = 3600.0;
 constexpr double kFarthestM = 1e4;  // of positions; sound takes half a minute from there
 constexpr std::size_t kMostBodies = 1000;
@@ -155,8 +156,8 @@ Scene parse_scene(const config::Document& document) {
   scene.file = document.file();
   config::Object root = document.root();
   scene.duration_s = root.number("duration_s", config::kPositive);
-  if (scene.duration_s > kLongestS) {
-    root.fail("duration_s", fmt::format("{} is too long; give {} s at most", scene.duration_s, kLongestS));
+  if (scene.duration_s < kShortestS || scene.duration_s > kLongestS) {
+    root.fail("duration_s", fmt::format("{} is out of range; give {} to {} s", scene.duration_s, kShortestS, kLongestS));
   }
   scene.sample_rate_hz = static_cast<int>(root.integer_if("sample_rate_hz", 8000, 192000).value_or(scene.sample_rate_hz));
   if (scene.duration_s * scene.sample_rate_hz > kMostSamples) {

@@ -211,7 +211,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frame
   while (spectrum.window < 16384 && spectrum.window * 23.5 < sound.rate_hz) spectrum.window *= 2;
   const int window = spectrum.window;
   spectrum.bin_hz = static_cast<double>(sound.rate_hz) / window;
-  spectrum.duration_s = static_cast<double>(samples) / sound.rate_hz;
+  spectrum.duration_s = static_cast<double>(std::max<std::size_t>(samples, 1)) / sound.rate_hz;
   spectrum.frames = frames;
   spectrum.bins = static_cast<std::size_t>(window) / 2 + 1;
   spectrum.level_db.assign(frames * spectrum.bins, kFloorDb);

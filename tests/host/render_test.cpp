@@ -83,6 +83,14 @@ TEST(Render, ABodyThatFliesAwayIsHeardLowerAndSofter) {
   EXPECT_GT(std::abs(component(expected, 4800)), 1.5 * std::abs(component(expected, 19200)));
 }
 
+TEST(Render, ABodyThatFallsOutOfHearingDoesNoHarm) {
+  Case c({{1000.0, 1.0, 1.0}}, {0.0, 1.0, 0.0}, 0.001);
+  c.simulation.poses[0] = {{0.0, {0.0, 1.0, 0.0}}, {0.1, {0.0, 1.0, -10.0}}, {0.5, {0.0, 1.0, -1e7}}};
+  const Sound sound = c.render();
+  EXPECT_TRUE(std::isfinite(calc_peak_pa(sound)));
+  EXPECT_GT(calc_peak_pa(sound), 0.1);
+}
+
 TEST(Render, TheRateOfTheOutputDecidesWhichModesSound) {
   const Case c({{1000.0, 5.0}, {15000.0, 5.0}, {23999.0, 5.0}, {30000.0, 5.0}}, {0.0, 1.0, 0.0}, 0.1);
   EXPECT_EQ(c.render(48000).modes, 3);
