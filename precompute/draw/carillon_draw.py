@@ -365,7 +365,7 @@ def choose_panels(count, aspect):
         height = int(min(max((width - 90) / aspect, 150), 900)) + 150
         picture = columns * width / (rows * height)
         body = min((width - 90) / aspect, height - 150)  # height of the body on the page
-        cost = abs(math.log(picture / 1.7)) + 0.4 * (columns * rows - count) - 0.15 * math.log(body * body * aspect)
+        cost = abs(math.log(picture / 1.7)) + 1.0 * (columns * rows - count) - 0.15 * math.log(body * body * aspect)
         if best is None or cost < best[0]:
             best = (cost, columns, width, height)
     return best[1:]
@@ -383,10 +383,10 @@ def draw_modes(bank, numbers, up):
     for number in numbers:
         mode = bank.read_mode(number)
         length = numpy.linalg.norm(mode, axis=1)
-        # A tenth of the body's size is visible and does not turn it inside out; the sign makes the largest motion point outward.
+        # A twelfth of the size is visible and does not turn it inside out; the sign makes the largest motion point outward.
         k = int(length[used].argmax())
         sign = 1.0 if mode[used][k] @ (place[k] - place.mean(axis=0)) >= 0 else -1.0
-        deformed.append((bank.vertices + sign * 0.10 * size / length[used].max() * mode, length / length[used].max()))
+        deformed.append((bank.vertices + sign * 0.08 * size / length[used].max() * mode, length / length[used].max()))
     seen = numpy.vstack([place] + [shape[used] for shape, _ in deformed]) @ view.axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     columns, width, height = choose_panels(len(numbers), (high[0] - low[0]) / max(high[1] - low[1], 0.05 * (high[0] - low[0])))
