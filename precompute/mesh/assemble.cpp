@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <limits>
 
 namespace carillon::mesh {
@@ -70,7 +71,8 @@ void sort_set(std::vector<std::int32_t>& set, std::size_t node_count) {
 void RawMesh::add_node(const Cursor& cursor, std::int64_t tag, const Vec3& x, std::size_t place) {
   for (const double value : x)
     if (!std::isfinite(value))
-      cursor.fail(place, "node {} has the coordinates ({}, {}, {}), which are not all finite; mend the mesh where it was made", tag, x[0], x[1], x[2]);
+      cursor.fail(place, "node {} has the coordinates ({}, {}, {}), which are not all finite; mend the mesh where it was made", tag, x[0],
+                  x[1], x[2]);
   if (nodes.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
     cursor.fail(place, "more than 2147483647 nodes; use a coarser mesh");
   node_tags.push_back(tag);
@@ -82,8 +84,8 @@ void RawMesh::add_tet(const Cursor& cursor, std::int64_t tag, const std::int64_t
                       std::int32_t region, std::size_t place) {
   const int own_order = node_count == 4 ? 1 : 2;
   if (order != 0 && order != own_order)
-    cursor.fail(place, "element {} is a {} tetrahedron among {} ones; write all of them in one order", tag, own_order == 1 ? "linear" : "quadratic",
-                order == 1 ? "linear" : "quadratic");
+    cursor.fail(place, "element {} is a {} tetrahedron among {} ones; write all of them in one order", tag,
+                own_order == 1 ? "linear" : "quadratic", order == 1 ? "linear" : "quadratic");
   order = own_order;
   for (int i = 0; i < node_count; ++i) tets.push_back(tags[file_position[i]]);
   tet_tags.push_back(tag);
@@ -91,13 +93,52 @@ void RawMesh::add_tet(const Cursor& cursor, std::int64_t tag, const std::int64_t
   regions.push_back(region);
 }
 
+std::vector<std::int64_t> merge_repeated_tets(RawMesh& raw) {
+  const std::size_t count = raw.tet_tags.size();
+  const std::size_t width = raw.order == 2 ? 10 : 4;
+  const auto nodes_of = [&](std::size_t e) { return raw.tets.begin() + static_cast<std::ptrdiff_t>(e * width); };
+  const auto end_of = [&](std::size_t e) { return nodes_of(e) + static_cast<std::ptrdiff_t>(width); };
+  std::vector<std::size_t> sorted(count);
+  for (std::size_t e = 0; e < count; ++e) sorted[e] = e;
+  std::sort(sorted.begin(), sorted.end(), [&](std::size_t a, std::size_t b) {
+    const auto order = std::lexicographical_compare_three_way(nodes_of(a), end_of(a), nodes_of(b), end_of(b));
+    return order < 0 || (order == 0 && a < b);
+  });
+  std::vector<std::size_t> first(count);  // the earliest element with the same nodes
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool same = i > 0 && std::equal(nodes_of(sorted[i]), end_of(sorted[i]), nodes_of(sorted[i - 1]));
+    first[sorted[i]] = same ? first[sorted[i - 1]] : sorted[i];
+  }
+  std::vector<std::int64_t> position(count);
+  std::size_t kept = 0;
+  for (std::size_t e = 0; e < count; ++e) {
+    // A copy under the same region is a fault of the mesh: it stays, for check_mesh to name.
+    const auto original = first[e] == e ? kept : static_cast<std::size_t>(position[first[e]]);
+    if (first[e] != e && raw.regions[e] != raw.regions[original]) {
+      position[e] = static_cast<std::int64_t>(original);
+      continue;
+    }
+    position[e] = static_cast<std::int64_t>(kept);
+    std::copy(nodes_of(e), end_of(e), nodes_of(kept));
+    raw.tet_tags[kept] = raw.tet_tags[e];
+    raw.tet_places[kept] = raw.tet_places[e];
+    raw.regions[kept] = raw.regions[e];
+    ++kept;
+  }
+  raw.tets.resize(kept * width);
+  raw.tet_tags.resize(kept);
+  raw.tet_places.resize(kept);
+  raw.regions.resize(kept);
+  return position;
+}
+
 TetMesh assemble_mesh(RawMesh&& raw, const Cursor& nodes, const Cursor& elements) {
   if (raw.nodes.empty()) throw InputError(fmt::format("{}: the file holds no nodes; write the mesh again", nodes.name()));
   if (raw.tet_tags.empty()) {
     std::string others;
     for (const auto& [kind, count] : raw.others) others += fmt::format("{}{} {}", others.empty() ? "" : ", ", count, kind);
-    throw InputError(fmt::format("{}: the file holds no tetrahedra{}; mesh the volume first (a closed surface with carillon-mesh)", elements.name(),
-                                 others.empty() ? "" : " (only " + others + ")"));
+    throw InputError(fmt::format("{}: the file holds no tetrahedra{}; mesh the volume first (a closed surface with carillon-mesh)",
+                                 elements.name(), others.empty() ? "" : " (only " + others + ")"));
   }
   if (raw.tet_tags.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
     throw InputError(fmt::format("{}: more than 2147483647 tetrahedra; use a coarser mesh", elements.name()));
@@ -109,7 +150,8 @@ TetMesh assemble_mesh(RawMesh&& raw, const Cursor& nodes, const Cursor& elements
   for (std::size_t k = 0; k < raw.tets.size(); ++k) {
     mesh.tets[k] = table.find(raw.tets[k]);
     if (mesh.tets[k] < 0)
-      elements.fail(raw.tet_places[k / width], "element {} refers to node {}, which the file does not define; write the mesh again with all nodes saved",
+      elements.fail(raw.tet_places[k / width],
+                    "element {} refers to node {}, which the file does not define; write the mesh again with all nodes saved",
                     raw.tet_tags[k / width], raw.tets[k]);
   }
   mesh.nodes = std::move(raw.nodes);
@@ -119,8 +161,10 @@ TetMesh assemble_mesh(RawMesh&& raw, const Cursor& nodes, const Cursor& elements
     for (const auto& reference : references) {
       set.push_back(table.find(reference.node_tag));
       if (set.back() < 0)
-        elements.fail(reference.place, "an element of the group '{}' refers to node {}, which the file does not define; write the mesh again with all nodes saved",
-                      name, reference.node_tag);
+        elements.fail(
+            reference.place,
+            "an element of the group '{}' refers to node {}, which the file does not define; write the mesh again with all nodes saved",
+            name, reference.node_tag);
     }
   }
   for (const auto& [name, positions] : raw.tet_sets) {

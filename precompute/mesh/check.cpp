@@ -1,4 +1,5 @@
-// Method: indices, welding, orientation, volume, twins of elements, then the faces: two elements on a face run through its corners in opposite
+// Method: indices, welding, orientation, volume, twins of elements, then the faces: two elements on a face run through its corners in
+// opposite
 //   senses when they lie on opposite sides of it; faces that stay alone form the boundary, whose edges must pair up.
 // Source: own; orientation by the sign of det(x1 - x0, x2 - x0, x3 - x0).
 // Deviations: elements that interpenetrate without sharing a face are not found (that would need a search for intersections).
@@ -25,7 +26,8 @@ constexpr double kFlat = 1e-9;  // six volumes over the cube of the longest edge
 void check_indices(const TetMesh& mesh, const std::string& name) {
   if (mesh.order != 1 && mesh.order != 2) refuse(name, fmt::format("elements of order {}; only 1 and 2 are known", mesh.order));
   if (mesh.tets.empty()) refuse(name, "the mesh has no tetrahedra; mesh the volume first");
-  if (mesh.tets.size() % static_cast<std::size_t>(mesh.nodes_per_tet()) != 0) refuse(name, "the last element lacks nodes; write the mesh again");
+  if (mesh.tets.size() % static_cast<std::size_t>(mesh.nodes_per_tet()) != 0)
+    refuse(name, "the last element lacks nodes; write the mesh again");
   const auto count = static_cast<std::int64_t>(mesh.nodes.size());
   std::vector<std::int64_t> repeated;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
@@ -33,7 +35,8 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
     bool twice = false;
     for (std::size_t i = 0; i < tet.size(); ++i) {
       if (tet[i] < 0 || tet[i] >= count)
-        refuse(name, fmt::format("element {} refers to node {}, but the nodes run from 1 to {}; write the mesh again", e + 1, std::int64_t{tet[i]} + 1, count));
+        refuse(name, fmt::format("element {} refers to node {}, but the nodes run from 1 to {}; write the mesh again", e + 1,
+                                 std::int64_t{tet[i]} + 1, count));
       for (std::size_t j = 0; j < i; ++j) twice = twice || tet[i] == tet[j];
     }
     if (twice) repeated.push_back(e);
@@ -43,10 +46,12 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
                              list_elements(repeated)));
   for (std::int64_t i = 0; i < count; ++i)
     for (const double x : mesh.nodes[static_cast<std::size_t>(i)])
-      if (!std::isfinite(x)) refuse(name, fmt::format("node {} has a coordinate that is not finite; mend the mesh where it was made", i + 1));
+      if (!std::isfinite(x))
+        refuse(name, fmt::format("node {} has a coordinate that is not finite; mend the mesh where it was made", i + 1));
   for (const auto& [set, nodes] : mesh.node_sets)
     for (const auto node : nodes)
-      if (node < 0 || node >= count) refuse(name, fmt::format("the node set '{}' holds node {}, but the nodes run from 1 to {}", set, std::int64_t{node} + 1, count));
+      if (node < 0 || node >= count)
+        refuse(name, fmt::format("the node set '{}' holds node {}, but the nodes run from 1 to {}", set, std::int64_t{node} + 1, count));
 }
 
 double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squared) {
@@ -119,13 +124,16 @@ std::vector<Face> check_faces(const TetMesh& mesh, const std::vector<Face>& face
     } else if (end - i > 2) {
       std::vector<std::int64_t> elements;
       for (std::size_t j = i; j < end; ++j) elements.push_back(faces[j].tet);
-      refuse(name, fmt::format("the face of nodes {}, {} and {} belongs to {} elements: {}; a face joins two at most: mesh the body again", faces[i].a + 1,
-                               faces[i].b + 1, faces[i].c + 1, end - i, list_elements(elements)));
+      refuse(name, fmt::format("the face of nodes {}, {} and {} belongs to {} elements: {}; a face joins two at most: mesh the body again",
+                               faces[i].a + 1, faces[i].b + 1, faces[i].c + 1, end - i, list_elements(elements)));
     } else if (faces[i].odd == faces[i + 1].odd) {
       const auto apex = [&](const Face& face) { return mesh.tet(face.tet)[static_cast<std::size_t>(face.local)] + 1; };
-      refuse(name, fmt::format("elements {} and {} lie on the same side of their common face (nodes {}, {}, {}; apexes {} and {}): one of them is inverted "
-                               "(counted from 1 in the order of the file); mesh the body again",
-                               faces[i].tet + 1, faces[i + 1].tet + 1, faces[i].a + 1, faces[i].b + 1, faces[i].c + 1, apex(faces[i]), apex(faces[i + 1])));
+      refuse(
+          name,
+          fmt::format(
+              "elements {} and {} lie on the same side of their common face (nodes {}, {}, {}; apexes {} and {}): one of them is inverted "
+              "(tetrahedra counted from 1 in the order of the file); mesh the body again",
+              faces[i].tet + 1, faces[i + 1].tet + 1, faces[i].a + 1, faces[i].b + 1, faces[i].c + 1, apex(faces[i]), apex(faces[i + 1])));
     }
     i = end;
   }
@@ -169,10 +177,13 @@ void check_boundary(const std::vector<Face>& boundary, std::size_t node_count, c
     std::vector<std::int64_t> elements;
     for (std::size_t i = broken.front(); i < edges.size() && edges[i].low == edge.low && edges[i].high == edge.high; ++i)
       elements.push_back(boundary[static_cast<std::size_t>(edges[i].face)].tet);
-    refuse(name, fmt::format("the boundary is not a closed surface: {} edge{}; the first, between nodes {} and {}, carries {} boundary faces instead of 2, "
-                             "of elements {}; thicken the body there or part it, and mesh it again",
-                             broken.size(), broken.size() == 1 ? " is at fault" : "s are at fault", edge.low + 1, edge.high + 1, elements.size(),
-                             list_elements(elements)));
+    refuse(
+        name,
+        fmt::format(
+            "the boundary is not a closed surface: {} edge{}; the first, between nodes {} and {}, carries {} boundary faces instead of 2, "
+            "of elements {}; thicken the body there or part it, and mesh it again",
+            broken.size(), broken.size() == 1 ? " is at fault" : "s are at fault", edge.low + 1, edge.high + 1, elements.size(),
+            list_elements(elements)));
   }
   std::vector<std::int32_t> fan_of(node_count, -1);
   std::vector<char> pinched(node_count, 0);
@@ -225,20 +236,26 @@ void find_components(const TetMesh& mesh, CheckReport& report) {
 
 void collect_warnings(CheckReport& report) {
   const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
-  const double diagonal = std::hypot(report.box_high[0] - report.box_low[0], report.box_high[1] - report.box_low[1], report.box_high[2] - report.box_low[2]);
+  const double diagonal =
+      std::hypot(report.box_high[0] - report.box_low[0], report.box_high[1] - report.box_low[1], report.box_high[2] - report.box_low[2]);
   if (diagonal > 50.0) add(fmt::format("the body measures {:.4g} m across: were millimetres given as metres?", diagonal));
   if (diagonal < 1e-3) add(fmt::format("the body measures only {:.3g} m across: coordinates are taken as metres", diagonal));
   if (report.slivers > 0)
-    add(fmt::format("{} slivers (a dihedral angle under 5 or over 175 degrees; the worst {:.2f} and {:.2f}): frequencies near them are too high, and the "
+    add(
+        fmt::format("{} slivers (a dihedral angle under 5 or over 175 degrees; the worst {:.2f} and {:.2f}): frequencies near them are too "
+                    "high, and the "
                     "solver may lose digits",
                     report.slivers, report.min_dihedral_deg, report.max_dihedral_deg));
   if (report.welded > 0) add(fmt::format("{} repeated nodes were joined with their twins, closing cracks in the mesh", report.welded));
   if (report.touching_nodes > 0)
-    add(fmt::format("{} nodes lie in the place of another without a common face and were left apart: bodies that only touch do not hold together",
-                    report.touching_nodes));
-  if (report.pinched_nodes > 0) add(fmt::format("{} nodes join two parts of the body at a point only: the motion there is not determined by elasticity",
-                                                report.pinched_nodes));
-  if (report.straightened > 0) add(fmt::format("{} quadratic elements were folded over by their curved edges and made straight-sided", report.straightened));
+    add(fmt::format(
+        "{} nodes lie in the place of another without a common face and were left apart: bodies that only touch do not hold together",
+        report.touching_nodes));
+  if (report.pinched_nodes > 0)
+    add(fmt::format("{} nodes join two parts of the body at a point only: the motion there is not determined by elasticity",
+                    report.pinched_nodes));
+  if (report.straightened > 0)
+    add(fmt::format("{} quadratic elements were folded over by their curved edges and made straight-sided", report.straightened));
 }
 
 }  // namespace
@@ -248,7 +265,7 @@ std::string list_elements(const std::vector<std::int64_t>& elements) {
   std::string text;
   for (std::size_t i = 0; i < std::min(elements.size(), kShown); ++i) text += fmt::format("{}{}", i == 0 ? "" : ", ", elements[i] + 1);
   if (elements.size() > kShown) text += fmt::format(" and {} more", elements.size() - kShown);
-  return text + " (counted from 1 in the order of the file)";
+  return text + " (tetrahedra counted from 1 in the order of the file)";
 }
 
 CheckReport check_mesh(TetMesh& mesh, const std::string& name) {
@@ -277,11 +294,12 @@ std::string describe(const CheckReport& report) {
   std::string text = fmt::format("{} nodes, {} {} tetrahedra, {} part{}, {} boundary faces, {:.6g} m3\n", report.nodes, report.tets,
                                  report.order == 1 ? "linear" : "quadratic", report.components, report.components == 1 ? "" : "s",
                                  report.boundary_faces, report.volume_m3);
-  text += fmt::format("box ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}) m\n", report.box_low[0], report.box_low[1], report.box_low[2],
-                      report.box_high[0], report.box_high[1], report.box_high[2]);
-  text += fmt::format("dihedral angles {:.2f} to {:.2f} degrees; mean ratio {:.3f} at worst, {:.3f} at 1 %, {:.3f} on average; {} slivers\n",
-                      report.min_dihedral_deg, report.max_dihedral_deg, report.mean_ratio_min, report.mean_ratio_1_percent, report.mean_ratio_mean,
-                      report.slivers);
+  text += fmt::format("box ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g}) m\n", report.box_low[0], report.box_low[1],
+                      report.box_low[2], report.box_high[0], report.box_high[1], report.box_high[2]);
+  text +=
+      fmt::format("dihedral angles {:.2f} to {:.2f} degrees; mean ratio {:.3f} at worst, {:.3f} at 1 %, {:.3f} on average; {} slivers\n",
+                  report.min_dihedral_deg, report.max_dihedral_deg, report.mean_ratio_min, report.mean_ratio_1_percent,
+                  report.mean_ratio_mean, report.slivers);
   text += fmt::format("mended: {} elements turned, {} unused nodes dropped, {} nodes welded, {} elements straightened", report.reoriented,
                       report.unreferenced, report.welded, report.straightened);
   if (report.order == 2) text += fmt::format("; {} curved elements", report.curved);

@@ -21,20 +21,20 @@ struct CheckReport {
   int order = 1;
 
   // What was mended.
-  std::int64_t reoriented = 0;     // elements that were numbered inside out
-  std::int64_t unreferenced = 0;   // nodes of no element, dropped
-  std::int64_t welded = 0;         // nodes that were joined with another in the same place, closing a crack
-  std::int64_t straightened = 0;   // quadratic elements whose curved edges folded them over, made straight-sided
+  std::int64_t reoriented = 0;    // elements that were numbered inside out
+  std::int64_t unreferenced = 0;  // nodes of no element, dropped
+  std::int64_t welded = 0;        // nodes that were joined with another in the same place, closing a crack
+  std::int64_t straightened = 0;  // quadratic elements whose curved edges folded them over, made straight-sided
 
   // What the mesh is.
-  int components = 0;                            // parts that share no node
-  std::vector<std::int32_t> component_of_node;   // (N), numbered by their first node
-  std::int64_t boundary_faces = 0;               // element faces on the boundary
-  std::int64_t pinched_nodes = 0;                // boundary nodes that join two parts of the body at a point only
-  std::int64_t touching_nodes = 0;               // nodes in the place of another that were left apart (no common face)
-  std::int64_t curved = 0;                       // quadratic elements with a mid node off the middle of its edge
-  Vec3 box_low{};                                // [m]
-  Vec3 box_high{};                               // [m]
+  int components = 0;                           // parts that share no node
+  std::vector<std::int32_t> component_of_node;  // (N), numbered by their first node
+  std::int64_t boundary_faces = 0;              // element faces on the boundary
+  std::int64_t pinched_nodes = 0;               // boundary nodes that join two parts of the body at a point only
+  std::int64_t touching_nodes = 0;              // nodes in the place of another that were left apart (no common face)
+  std::int64_t curved = 0;                      // quadratic elements with a mid node off the middle of its edge
+  Vec3 box_low{};                               // [m]
+  Vec3 box_high{};                              // [m]
   double volume_m3 = 0.0;
 
   // Quality of the straight-sided elements. Mean ratio (Liu and Joe 1994): 12 (3 V)^(2/3) / sum of squared edges; 1 regular, 0 flat.
@@ -43,15 +43,15 @@ struct CheckReport {
   double mean_ratio_min = 0.0;
   double mean_ratio_1_percent = 0.0;  // one element in a hundred is worse
   double mean_ratio_mean = 0.0;
-  std::int64_t slivers = 0;           // elements with a dihedral angle under 5 or over 175 degrees
+  std::int64_t slivers = 0;  // elements with a dihedral angle under 5 or over 175 degrees
 
   std::vector<std::string> warnings;  // sentences for the user
 };
 
 /// Checks and mends `mesh`; afterwards its elements are positively oriented, its nodes all used, its boundary is a closed edge manifold.
 /// Nodes are renumbered when some were dropped or welded; node sets follow. `name` begins every message.
-/// Throws InputError naming the first ten offenders, their number and the mend: an element with a repeated node or without volume; an element
-/// twice; two elements on the same side of their common face; a face of more than two elements; a boundary edge of other than two
+/// Throws InputError naming the first ten offenders, their number and the mend: an element with a repeated node or without volume; an
+/// element twice; two elements on the same side of their common face; a face of more than two elements; a boundary edge of other than two
 /// boundary faces; quadratic elements that disagree about a mid node; indices out of range. The mesh is then in no defined state.
 /// Not collective.
 CheckReport check_mesh(TetMesh& mesh, const std::string& name = "mesh");

@@ -83,8 +83,8 @@ double Cursor::text_real(const char* what) {
 std::size_t Cursor::checked_count(std::int64_t count, std::size_t least_bytes, const char* what, std::size_t place) const {
   const std::size_t most = remaining() / least_bytes + 1;
   if (count < 0 || static_cast<std::uint64_t>(count) > most)
-    fail(place, "the file announces {} {}, but the {} bytes after it have room for {} at most; it was cut short or damaged: write it again", count,
-         what, remaining(), most);
+    fail(place, "the file announces {} {}, but the {} bytes after it have room for {} at most; it was cut short or damaged: write it again",
+         count, what, remaining(), most);
   return static_cast<std::size_t>(count);
 }
 

@@ -1,14 +1,14 @@
 // A bounds-checked place in the bytes of a mesh file: text tokens and binary numbers. Inner header of the readers.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <bit>
 #include <cstdint>
 #include <cstring>
 #include <string>
 #include <string_view>
 #include <type_traits>
-
-#include <fmt/format.h>
 
 #include "runtime/config/error.hpp"
 
@@ -50,7 +50,9 @@ class Cursor {
   std::string_view word(const char* what);
 
   /// The next number in the file's present mode (text, or binary of exactly this type).
-  std::int32_t int32(const char* what) { return binary_ ? raw<std::int32_t>(what) : static_cast<std::int32_t>(text_int(what, INT32_MIN, INT32_MAX)); }
+  std::int32_t int32(const char* what) {
+    return binary_ ? raw<std::int32_t>(what) : static_cast<std::int32_t>(text_int(what, INT32_MIN, INT32_MAX));
+  }
   std::int64_t int64(const char* what) { return binary_ ? raw<std::int64_t>(what) : text_int(what, INT64_MIN, INT64_MAX); }
   double real(const char* what) { return binary_ ? raw<double>(what) : text_real(what); }
 

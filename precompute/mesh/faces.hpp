@@ -11,8 +11,8 @@ namespace carillon::mesh {
 struct Face {
   std::int32_t a, b, c;  // corners, ascending
   std::int32_t tet;
-  std::int8_t local;     // 0..3, see kFaces
-  bool odd;              // seen from outside the element, a b c run clockwise
+  std::int8_t local;  // 0..3, see kFaces
+  bool odd;           // seen from outside the element, a b c run clockwise
 };
 
 inline bool same_corners(const Face& x, const Face& y) { return x.a == y.a && x.b == y.b && x.c == y.c; }

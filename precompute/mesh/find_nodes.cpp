@@ -13,11 +13,13 @@ std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const std::strin
   const auto found = mesh.node_sets.find(set);
   if (found != mesh.node_sets.end()) {
     if (found->second.empty())
-      throw InputError(fmt::format("the node set '{}' of the mesh holds no node; save its elements with the mesh, or name another set", set));
+      throw InputError(
+          fmt::format("the node set '{}' of the mesh holds no node; save its elements with the mesh, or name another set", set));
     return found->second;
   }
   if (mesh.node_sets.empty())
-    throw InputError(fmt::format("the mesh has no node set '{}': it has none at all; mesh it with named groups, or give a box instead", set));
+    throw InputError(
+        fmt::format("the mesh has no node set '{}': it has none at all; mesh it with named groups, or give a box instead", set));
   constexpr std::size_t kMostListed = 20;
   std::vector<std::string> names;
   std::string list;
@@ -27,7 +29,8 @@ std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const std::strin
   }
   if (names.size() > kMostListed) list += fmt::format(" and {} more", names.size() - kMostListed);
   const std::string nearest = config::find_nearest(set, names);
-  throw InputError(fmt::format("the mesh has no node set '{}'{}; it has {}", set, nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), list));
+  throw InputError(fmt::format("the mesh has no node set '{}'{}; it has {}", set,
+                               nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), list));
 }
 
 std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const Vec3& low, const Vec3& high) {
@@ -49,8 +52,9 @@ std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const Vec3& low,
     if (in) inside.push_back(static_cast<std::int32_t>(i));
   }
   if (inside.empty())
-    throw InputError(fmt::format("no node lies in the box ({}, {}, {}) to ({}, {}, {}) m; the mesh spans ({}, {}, {}) to ({}, {}, {}) m", low[0], low[1],
-                                 low[2], high[0], high[1], high[2], mesh_low[0], mesh_low[1], mesh_low[2], mesh_high[0], mesh_high[1], mesh_high[2]));
+    throw InputError(fmt::format("no node lies in the box ({}, {}, {}) to ({}, {}, {}) m; the mesh spans ({}, {}, {}) to ({}, {}, {}) m",
+                                 low[0], low[1], low[2], high[0], high[1], high[2], mesh_low[0], mesh_low[1], mesh_low[2], mesh_high[0],
+                                 mesh_high[1], mesh_high[2]));
   return inside;
 }
 

@@ -1,4 +1,5 @@
-// Method: edges are dropped into buckets by their smaller corner; each gets one mid node, numbered after the corners in the order of the edges.
+// Method: edges are dropped into buckets by their smaller corner; each gets one mid node, numbered after the corners in the order of the
+// edges.
 
 #include <algorithm>
 

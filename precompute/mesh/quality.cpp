@@ -93,10 +93,11 @@ void straighten_folded(TetMesh& mesh, CheckReport& report) {
     if (is_curved(mesh, e)) curved.push_back(e);
   const auto folded = [&](std::int64_t e) {
     const auto& points = quadrature_points();
-    return std::any_of(points.begin(), points.end(), [&](const QuadraturePoint& point) { return calc_jacobian(mesh, e, point.barycentric) <= 0.0; });
+    return std::any_of(points.begin(), points.end(),
+                       [&](const QuadraturePoint& point) { return calc_jacobian(mesh, e, point.barycentric) <= 0.0; });
   };
-  // Straightening one element moves mid nodes of its neighbours, so it repeats until none is folded. It ends: each pass straightens at least one
-  // element for good, and straight elements of positive volume are not folded.
+  // Straightening one element moves mid nodes of its neighbours, so it repeats until none is folded. It ends: each pass straightens at
+  // least one element for good, and straight elements of positive volume are not folded.
   for (bool again = true; again;) {
     again = false;
     for (const auto e : curved) {

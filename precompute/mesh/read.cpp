@@ -37,8 +37,10 @@ MeshFormat find_format(std::string_view bytes, const std::string& name, const st
   if (extension == ".mesh") return MeshFormat::kMedit;
   if (extension == ".msh") return MeshFormat::kGmsh;
   if (extension == ".stl" || extension == ".obj" || extension == ".ply" || extension == ".off")
-    throw InputError(fmt::format("{}: a surface ({}), not a volume mesh; make one with carillon-mesh {} -o OUT.msh", name, extension, name));
-  throw InputError(fmt::format("{}:1: not a mesh file that is known (it begins with {}); {}", name, quote_excerpt(head.substr(0, head.find('\n'))), kReadable));
+    throw InputError(
+        fmt::format("{}: a surface ({}), not a volume mesh; make one with carillon-mesh {} -o OUT.msh", name, extension, name));
+  throw InputError(fmt::format("{}:1: not a mesh file that is known (it begins with {}); {}", name,
+                               quote_excerpt(head.substr(0, head.find('\n'))), kReadable));
 }
 
 std::string lower_extension(const std::filesystem::path& file) {
@@ -55,8 +57,8 @@ TetMesh parse_mesh(std::span<const std::byte> bytes, const std::string& name, Me
   std::string_view text = view_of(bytes);
   if (format == MeshFormat::kTetgen) {
     const auto split = text.find('\0');
-    return parse_tetgen(text.substr(0, split), name + ".node", split == std::string_view::npos ? std::string_view{} : text.substr(split + 1),
-                        name + ".ele");
+    return parse_tetgen(text.substr(0, split), name + ".node",
+                        split == std::string_view::npos ? std::string_view{} : text.substr(split + 1), name + ".ele");
   }
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a byte-order mark of UTF-8
   if (format == MeshFormat::kGmsh) return parse_gmsh(text, name);
@@ -68,7 +70,9 @@ TetMesh read_mesh(const std::filesystem::path& file) {
   try {
     const std::string extension = lower_extension(file);
     if (extension == ".node" || extension == ".ele") {
-      const auto partner = [&](const char* wanted) { return extension == wanted ? file : std::filesystem::path(file).replace_extension(wanted); };
+      const auto partner = [&](const char* wanted) {
+        return extension == wanted ? file : std::filesystem::path(file).replace_extension(wanted);
+      };
       const std::string node = read_bytes(partner(".node"));
       const std::string ele = read_bytes(partner(".ele"));
       return parse_tetgen(node, partner(".node").string(), ele, partner(".ele").string());

@@ -1,6 +1,7 @@
 // Method: one pass over the sections of a .msh file, versions 2.0-2.2 and 4.1, text and binary in either byte order; sections that are not
 //   about the mesh are skipped. Tags become indices at the end (assemble_mesh), so the order of the sections is free.
-// Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Gmsh's quadratic tetrahedron swaps the last two
+// Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Gmsh's quadratic tetrahedron swaps the last
+// two
 //   mid nodes against VTK's.
 // Deviations: $Periodic, $GhostElements, post-processing data and parametric coordinates are not used.
 
@@ -23,12 +24,14 @@ struct GmshType {
 
 const std::unordered_map<int, GmshType>& gmsh_types() {
   static const std::unordered_map<int, GmshType> types{
-      {1, {2, 1, "lines"}},        {2, {3, 2, "triangles"}},    {3, {4, 2, "quadrangles"}},  {4, {4, 3, "tetrahedra"}},   {5, {8, 3, "hexahedra"}},
-      {6, {6, 3, "prisms"}},       {7, {5, 3, "pyramids"}},     {8, {3, 1, "lines"}},        {9, {6, 2, "triangles"}},    {10, {9, 2, "quadrangles"}},
-      {11, {10, 3, "tetrahedra"}}, {12, {27, 3, "hexahedra"}},  {13, {18, 3, "prisms"}},     {14, {14, 3, "pyramids"}},   {15, {1, 0, "points"}},
-      {16, {8, 2, "quadrangles"}}, {17, {20, 3, "hexahedra"}},  {18, {15, 3, "prisms"}},     {19, {13, 3, "pyramids"}},   {20, {9, 2, "triangles"}},
-      {21, {10, 2, "triangles"}},  {22, {12, 2, "triangles"}},  {23, {15, 2, "triangles"}},  {26, {4, 1, "lines"}},       {27, {5, 1, "lines"}},
-      {28, {6, 1, "lines"}},       {29, {20, 3, "tetrahedra"}}, {30, {35, 3, "tetrahedra"}}, {31, {56, 3, "tetrahedra"}}};
+      {1, {2, 1, "lines"}},       {2, {3, 2, "triangles"}},    {3, {4, 2, "quadrangles"}},  {4, {4, 3, "tetrahedra"}},
+      {5, {8, 3, "hexahedra"}},   {6, {6, 3, "prisms"}},       {7, {5, 3, "pyramids"}},     {8, {3, 1, "lines"}},
+      {9, {6, 2, "triangles"}},   {10, {9, 2, "quadrangles"}}, {11, {10, 3, "tetrahedra"}}, {12, {27, 3, "hexahedra"}},
+      {13, {18, 3, "prisms"}},    {14, {14, 3, "pyramids"}},   {15, {1, 0, "points"}},      {16, {8, 2, "quadrangles"}},
+      {17, {20, 3, "hexahedra"}}, {18, {15, 3, "prisms"}},     {19, {13, 3, "pyramids"}},   {20, {9, 2, "triangles"}},
+      {21, {10, 2, "triangles"}}, {22, {12, 2, "triangles"}},  {23, {15, 2, "triangles"}},  {26, {4, 1, "lines"}},
+      {27, {5, 1, "lines"}},      {28, {6, 1, "lines"}},       {29, {20, 3, "tetrahedra"}}, {30, {35, 3, "tetrahedra"}},
+      {31, {56, 3, "tetrahedra"}}};
   return types;
 }
 
@@ -91,14 +94,16 @@ void GmshReader::read_format() {
   cursor_.set_binary(false);
   const auto one = cursor_.raw<std::uint32_t>("the byte-order mark");
   if (one != 1 && one != 0x01000000U)
-    cursor_.fail(mark, "the byte-order mark of the binary file is {} and not 1; the file was damaged (copied as text?): copy it again", one);
+    cursor_.fail(mark, "the byte-order mark of the binary file is {} and not 1; the file was damaged (copied as text?): copy it again",
+                 one);
   swap_ = one != 1;
   cursor_.set_binary(swap_);
 }
 
 void GmshReader::read_names() {
   const std::size_t place = cursor_.place();
-  const auto count = cursor_.checked_count(cursor_.text_int("the number of physical names", INT64_MIN, INT64_MAX), 7, "physical names", place);
+  const auto count =
+      cursor_.checked_count(cursor_.text_int("the number of physical names", INT64_MIN, INT64_MAX), 7, "physical names", place);
   for (std::size_t i = 0; i < count; ++i) {
     const auto dimension = static_cast<int>(cursor_.text_int("the dimension of a physical group", 0, 3));
     const auto tag = static_cast<std::int32_t>(cursor_.text_int("the tag of a physical group", INT32_MIN, INT32_MAX));
@@ -106,7 +111,8 @@ void GmshReader::read_names() {
     const std::string_view text = cursor_.line();
     const auto open = text.find('"');
     const auto close = text.rfind('"');
-    if (open == std::string_view::npos || close <= open) cursor_.fail(at, "the name of physical group {} is not in double quotes; write it again", tag);
+    if (open == std::string_view::npos || close <= open)
+      cursor_.fail(at, "the name of physical group {} is not in double quotes; write it again", tag);
     names_[{dimension, tag}] = std::string(text.substr(open + 1, close - open - 1));
   }
 }
@@ -193,19 +199,24 @@ void GmshReader::read_nodes_4() {
 const GmshType& GmshReader::find_type(int type, std::size_t place) const {
   const auto found = gmsh_types().find(type);
   if (found == gmsh_types().end())
-    cursor_.fail(place, "element type {} is not known; only tetrahedra of 4 or 10 nodes make the body: mesh it again with Mesh.ElementOrder 1 or 2", type);
+    cursor_.fail(
+        place, "element type {} is not known; only tetrahedra of 4 or 10 nodes make the body: mesh it again with Mesh.ElementOrder 1 or 2",
+        type);
   const GmshType& entry = found->second;
   if (entry.dimension == 3 && type != 4 && type != 11)
-    cursor_.fail(place, "the mesh holds {} of {} nodes (element type {}); only tetrahedra of 4 or 10 nodes are read: mesh the volume with those",
+    cursor_.fail(place,
+                 "the mesh holds {} of {} nodes (element type {}); only tetrahedra of 4 or 10 nodes are read: mesh the volume with those",
                  entry.name, entry.nodes, type);
   return entry;
 }
 
-void GmshReader::add_element(std::int64_t tag, int number, const GmshType& type, const std::vector<std::int32_t>& physicals, std::size_t place) {
+void GmshReader::add_element(std::int64_t tag, int number, const GmshType& type, const std::vector<std::int32_t>& physicals,
+                             std::size_t place) {
   // An entity may claim thousands of groups; what they take together stays in proportion to the file.
   const std::size_t entries = physicals.size() * static_cast<std::size_t>(type.nodes);
   if (entries > group_budget_)
-    cursor_.fail(place, "the elements belong to more physical groups than a file of {} bytes explains; use fewer groups", cursor_.bytes().size());
+    cursor_.fail(place, "the elements belong to more physical groups than a file of {} bytes explains; use fewer groups",
+                 cursor_.bytes().size());
   group_budget_ -= entries;
   if (type.dimension == 3) {
     const auto position = static_cast<std::int64_t>(raw_.tet_tags.size());
@@ -278,7 +289,8 @@ void GmshReader::read_elements_4() {
     const auto dimension = cursor_.int32("the dimension of an element block");
     const auto entity = cursor_.int32("the entity of an element block");
     const auto number = cursor_.int32("the type of an element block");
-    const auto size = cursor_.checked_count(cursor_.int64("the number of elements of a block"), binary_ ? 16 : 4, "elements in a block", block);
+    const auto size =
+        cursor_.checked_count(cursor_.int64("the number of elements of a block"), binary_ ? 16 : 4, "elements in a block", block);
     const GmshType& type = find_type(number, block);
     if (dimension != type.dimension)
       cursor_.fail(block, "a block of {} is said to have dimension {}; the file was damaged: write the mesh again", type.name, dimension);
@@ -324,41 +336,9 @@ void GmshReader::name_groups() {
 /// Version 2.2 writes an element of several physical groups once for each: the copies become one element of the first group.
 void GmshReader::merge_repeated() {
   if (version_ != 2 || tet_groups_.size() < 2) return;
-  const std::size_t width = raw_.order == 1 ? 4 : 10;
-  const auto less = [&](std::size_t a, std::size_t b) {
-    const auto* x = raw_.tets.data() + a * width;
-    const auto* y = raw_.tets.data() + b * width;
-    return std::lexicographical_compare(x, x + width, y, y + width) || (std::equal(x, x + width, y) && a < b);
-  };
-  std::vector<std::size_t> order(raw_.tet_tags.size());
-  for (std::size_t e = 0; e < order.size(); ++e) order[e] = e;
-  std::sort(order.begin(), order.end(), less);
-  std::vector<std::int64_t> kept_at(order.size(), -1);
-  std::vector<char> dropped(order.size(), 0);
-  std::vector<std::size_t> first(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const auto* x = raw_.tets.data() + order[i] * width;
-    const bool same = i > 0 && std::equal(x, x + width, raw_.tets.data() + order[i - 1] * width);
-    first[order[i]] = same ? first[order[i - 1]] : order[i];
-    dropped[order[i]] = same && raw_.regions[order[i]] != raw_.regions[first[order[i]]];
-  }
-  std::size_t kept = 0;
-  for (std::size_t e = 0; e < order.size(); ++e) {
-    if (dropped[e]) continue;
-    kept_at[e] = static_cast<std::int64_t>(kept);
-    std::copy_n(raw_.tets.begin() + static_cast<std::ptrdiff_t>(e * width), width, raw_.tets.begin() + static_cast<std::ptrdiff_t>(kept * width));
-    raw_.tet_tags[kept] = raw_.tet_tags[e];
-    raw_.tet_places[kept] = raw_.tet_places[e];
-    raw_.regions[kept] = raw_.regions[e];
-    ++kept;
-  }
-  raw_.tets.resize(kept * width);
-  raw_.tet_tags.resize(kept);
-  raw_.tet_places.resize(kept);
-  raw_.regions.resize(kept);
+  const std::vector<std::int64_t> position_of = merge_repeated_tets(raw_);
   for (auto& [group, positions] : tet_groups_)
-    for (auto& position : positions) position = kept_at[dropped[static_cast<std::size_t>(position)] ? first[static_cast<std::size_t>(position)]
-                                                                                                   : static_cast<std::size_t>(position)];
+    for (auto& position : positions) position = position_of[static_cast<std::size_t>(position)];
 }
 
 TetMesh GmshReader::read() {
@@ -367,7 +347,8 @@ TetMesh GmshReader::read() {
     const std::size_t place = cursor_.place();
     const std::string_view head = cursor_.line();
     if (head.front() != '$' || head.size() < 2)
-      cursor_.fail(place, "expected a section such as $Nodes, found {}; the count of the section before it may be wrong: write the mesh again",
+      cursor_.fail(place,
+                   "expected a section such as $Nodes, found {}; the count of the section before it may be wrong: write the mesh again",
                    quote_excerpt(head));
     const std::string name(head.substr(1));
     if (name == "NOD" || name == "ELM")

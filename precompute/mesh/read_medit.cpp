@@ -16,10 +16,10 @@ namespace carillon::mesh {
 namespace {
 
 struct Section {
-  int numbers;           // a line's node numbers, the reference not counted
-  const char* prefix;    // of the node sets, nullptr for none
-  const char* plural;    // in messages
-  bool volume = false;   // a solid element that is no tetrahedron
+  int numbers;          // a line's node numbers, the reference not counted
+  const char* prefix;   // of the node sets, nullptr for none
+  const char* plural;   // in messages
+  bool volume = false;  // a solid element that is no tetrahedron
 };
 
 const std::map<std::string_view, Section>& sections() {
@@ -86,7 +86,8 @@ void MeditReader::read_tets(int node_count) {
   for (std::size_t i = 0; i < count; ++i) {
     cursor_.skip_space();
     const std::size_t place = cursor_.place();
-    for (int k = 0; k < node_count; ++k) tags[static_cast<std::size_t>(k)] = cursor_.text_int("a vertex of a tetrahedron", INT32_MIN, INT32_MAX);
+    for (int k = 0; k < node_count; ++k)
+      tags[static_cast<std::size_t>(k)] = cursor_.text_int("a vertex of a tetrahedron", INT32_MIN, INT32_MAX);
     const auto region = static_cast<std::int32_t>(cursor_.text_int("the reference of a tetrahedron", INT32_MIN, INT32_MAX));
     raw_.add_tet(cursor_, static_cast<std::int64_t>(i) + 1, tags.data(), node_count, kVtkOrder, region, place);
   }
@@ -122,7 +123,8 @@ void MeditReader::read_ordering() {
     for (int c = 0; c < 4; ++c)
       if (weights[static_cast<std::size_t>(c)] == 2) ordering[static_cast<std::size_t>(c)] = row;
     for (std::size_t e = 0; e < kEdges.size(); ++e)
-      if (weights[static_cast<std::size_t>(kEdges[e][0])] == 1 && weights[static_cast<std::size_t>(kEdges[e][1])] == 1) ordering[4 + e] = row;
+      if (weights[static_cast<std::size_t>(kEdges[e][0])] == 1 && weights[static_cast<std::size_t>(kEdges[e][1])] == 1)
+        ordering[4 + e] = row;
   }
   for (const int position : ordering)
     if (position < 0) cursor_.fail(start, "TetrahedraP2Ordering does not place every corner and edge; write the mesh again");
@@ -173,7 +175,8 @@ TetMesh MeditReader::read() {
   while (cursor_.skip_space()) {
     const std::size_t place = cursor_.place();
     const std::string_view keyword = cursor_.word("a keyword");
-    if (!begun && keyword != "MeshVersionFormatted") cursor_.fail(place, "a Medit file begins with MeshVersionFormatted, not with {}", quote_excerpt(keyword));
+    if (!begun && keyword != "MeshVersionFormatted")
+      cursor_.fail(place, "a Medit file begins with MeshVersionFormatted, not with {}", quote_excerpt(keyword));
     if (keyword == "MeshVersionFormatted") {
       cursor_.text_int("the version", 0, 4);
       begun = true;
@@ -194,7 +197,8 @@ TetMesh MeditReader::read() {
     } else if (std::isalpha(static_cast<unsigned char>(keyword[0])) != 0) {
       skip_numbers();
     } else {
-      cursor_.fail(place, "expected a keyword such as Tetrahedra, found {}; the count of the list before it may be wrong: write the mesh again",
+      cursor_.fail(place,
+                   "expected a keyword such as Tetrahedra, found {}; the count of the list before it may be wrong: write the mesh again",
                    quote_excerpt(keyword));
     }
   }

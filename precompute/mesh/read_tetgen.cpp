@@ -1,5 +1,6 @@
 // Method: the two text files of TetGen, numbered from 0 or 1 (or any other way: the numbers are looked up).
-// Source: TetGen 1.5 manual, sections 5.2.1 (.node) and 5.2.4 (.ele). The order of the mid nodes of -o2 was read off the program's own output
+// Source: TetGen 1.5 manual, sections 5.2.1 (.node) and 5.2.4 (.ele). The order of the mid nodes of -o2 was read off the program's own
+// output
 //   (tests/mesh/data/box2.1.ele): edges 23, 03, 01, 12, 13, 02.
 // Deviations: .face, .edge and .neigh files are not needed; attributes of nodes are skipped.
 

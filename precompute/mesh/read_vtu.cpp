@@ -21,13 +21,35 @@ constexpr std::size_t kMostSetArrays = 64;
 
 const char* solid_name(std::int64_t type) {
   switch (type) {
-    case 11: return "voxels";
-    case 12: case 25: case 29: case 33: case 72: case 79: return "hexahedra";
-    case 13: case 26: case 31: case 32: case 73: case 80: return "prisms (wedges)";
-    case 14: case 27: case 37: case 74: case 81: return "pyramids";
-    case 42: return "polyhedra";
-    case 71: case 78: return "tetrahedra of higher order";
-    default: return nullptr;
+    case 11:
+      return "voxels";
+    case 12:
+    case 25:
+    case 29:
+    case 33:
+    case 72:
+    case 79:
+      return "hexahedra";
+    case 13:
+    case 26:
+    case 31:
+    case 32:
+    case 73:
+    case 80:
+      return "prisms (wedges)";
+    case 14:
+    case 27:
+    case 37:
+    case 74:
+    case 81:
+      return "pyramids";
+    case 42:
+      return "polyhedra";
+    case 71:
+    case 78:
+      return "tetrahedra of higher order";
+    default:
+      return nullptr;
   }
 }
 
@@ -58,8 +80,8 @@ class VtuReader {
   void read_point_sets(const Piece& piece, std::size_t first_node);
 
   Cursor file_;
-  std::string xml_;              // the file without its appended data
-  std::size_t cut_at_ = 0;       // where they were
+  std::string xml_;         // the file without its appended data
+  std::size_t cut_at_ = 0;  // where they were
   std::size_t cut_size_ = 0;
   std::string_view appended_;
   pugi::xml_document document_;
@@ -110,11 +132,13 @@ VtuEncoding VtuReader::read_encoding(const pugi::xml_node& root) const {
     file_.fail(place_of(root), "byte_order is {}; it has to be LittleEndian or BigEndian", quote_excerpt(order));
   encoding.swap_bytes = (order == "LittleEndian") != (std::endian::native == std::endian::little);
   const std::string header = root.attribute("header_type").as_string("UInt32");
-  if (header != "UInt32" && header != "UInt64") file_.fail(place_of(root), "header_type is {}; it has to be UInt32 or UInt64", quote_excerpt(header));
+  if (header != "UInt32" && header != "UInt64")
+    file_.fail(place_of(root), "header_type is {}; it has to be UInt32 or UInt64", quote_excerpt(header));
   encoding.header_bytes = header == "UInt32" ? 4 : 8;
   const std::string compressor = root.attribute("compressor").as_string();
   if (!compressor.empty() && compressor != "vtkZLibDataCompressor")
-    file_.fail(place_of(root), "the data are compressed with {}, which is not read; save with zlib or no compression", quote_excerpt(compressor));
+    file_.fail(place_of(root), "the data are compressed with {}, which is not read; save with zlib or no compression",
+               quote_excerpt(compressor));
   encoding.zlib = !compressor.empty();
   const std::string appended = root.child("AppendedData").attribute("encoding").as_string("base64");
   encoding.appended_raw = appended == "raw";
@@ -135,8 +159,8 @@ pugi::xml_node VtuReader::find_array(const Piece& piece, const char* parent, con
   const pugi::xml_node owner = piece.node.child(parent);
   for (const pugi::xml_node& array : owner.children("DataArray"))
     if (name == nullptr || std::string_view(array.attribute("Name").as_string()) == name) return array;
-  file_.fail(place_of(owner ? owner : piece.node), "<{}> has no DataArray {}; the file was cut short or damaged: write the mesh again", parent,
-             name == nullptr ? "" : name);
+  file_.fail(place_of(owner ? owner : piece.node), "<{}> has no DataArray {}; the file was cut short or damaged: write the mesh again",
+             parent, name == nullptr ? "" : name);
 }
 
 template <class T>
@@ -144,8 +168,8 @@ std::vector<T> VtuReader::read_array(const pugi::xml_node& array, std::size_t co
   const std::string format = array.attribute("format").as_string("ascii");
   // as_ullong stops at the first character that is no digit; an absent offset is beyond every file.
   const std::uint64_t offset = array.attribute("offset").as_ullong(std::numeric_limits<std::uint64_t>::max());
-  return data_->read<T>(array.attribute("Name").as_string("Points"), array.attribute("type").as_string(), format, array.child_value(), offset, count,
-                        place_of(array));
+  return data_->read<T>(array.attribute("Name").as_string("Points"), array.attribute("type").as_string(), format, array.child_value(),
+                        offset, count, place_of(array));
 }
 
 std::vector<std::int64_t> VtuReader::read_regions(const Piece& piece) {
@@ -182,7 +206,8 @@ void VtuReader::read_piece(const Piece& piece) {
   if (piece.points == 0 && piece.cells == 0) return;
   const auto points = find_array(piece, "Points", nullptr);
   if (points.attribute("NumberOfComponents").as_int(3) != 3)
-    file_.fail(place_of(points), "Points have {} components; they need 3: write the mesh again", points.attribute("NumberOfComponents").as_int());
+    file_.fail(place_of(points), "Points have {} components; they need 3: write the mesh again",
+               points.attribute("NumberOfComponents").as_int());
   const auto x = read_array<double>(points, 3 * piece.points);
   for (std::size_t i = 0; i < piece.points; ++i)
     raw_.add_node(file_, static_cast<std::int64_t>(first_node + i), {x[3 * i], x[3 * i + 1], x[3 * i + 2]}, place_of(points));
@@ -220,8 +245,8 @@ void VtuReader::read_piece(const Piece& piece) {
       raw_.add_tet(file_, static_cast<std::int64_t>(raw_.tet_tags.size()) + 1, tags.data(), static_cast<int>(size), kVtkOrder,
                    static_cast<std::int32_t>(region), place);
     } else if (const char* solid = solid_name(type); solid != nullptr) {
-      file_.fail(place, "cell {} is of type {}: the mesh holds {}; only tetrahedra (types 10 and 24) are read: mesh the volume with those", c + 1, type,
-                 solid);
+      file_.fail(place, "cell {} is of type {}: the mesh holds {}; only tetrahedra (types 10 and 24) are read: mesh the volume with those",
+                 c + 1, type, solid);
     } else {
       ++raw_.others[fmt::format("cells of VTK type {}", type)];
     }

@@ -15,10 +15,10 @@ using Vec3 = std::array<double, 3>;
 /// Linear (4 nodes) or quadratic (10 nodes) tetrahedra. Node order within an element: corners 0 1 2 3 with
 /// det(x1 - x0, x2 - x0, x3 - x0) > 0, then the mid-side nodes of the edges 01, 12, 02, 03, 13, 23 (VTK's order).
 struct TetMesh {
-  int order = 1;                      // 1 or 2
-  std::vector<Vec3> nodes;            // (N) [m]
-  std::vector<std::int32_t> tets;     // (E, 4) or (E, 10), zero-based
-  std::vector<std::int32_t> regions;  // (E), the file's region tag, 0 where it has none
+  int order = 1;                                               // 1 or 2
+  std::vector<Vec3> nodes;                                     // (N) [m]
+  std::vector<std::int32_t> tets;                              // (E, 4) or (E, 10), zero-based
+  std::vector<std::int32_t> regions;                           // (E), the file's region tag, 0 where it has none
   std::map<std::string, std::vector<std::int32_t>> node_sets;  // named sets of the file, ascending
 
   int nodes_per_tet() const { return order == 1 ? 4 : 10; }

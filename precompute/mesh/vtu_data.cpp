@@ -69,8 +69,8 @@ class ByteStream {
       if (kValues[c] < 0 || padding > 0) return false;
       value[static_cast<std::size_t>(k++)] = kValues[c];
     }
-    const unsigned bits = static_cast<unsigned>(value[0]) << 18 | static_cast<unsigned>(value[1]) << 12 | static_cast<unsigned>(value[2]) << 6 |
-                          static_cast<unsigned>(value[3]);
+    const unsigned bits = static_cast<unsigned>(value[0]) << 18 | static_cast<unsigned>(value[1]) << 12 |
+                          static_cast<unsigned>(value[2]) << 6 | static_cast<unsigned>(value[3]);
     ready_ += static_cast<char>(bits >> 16 & 0xff);
     if (padding < 2) ready_ += static_cast<char>(bits >> 8 & 0xff);
     if (padding < 1) ready_ += static_cast<char>(bits & 0xff);
@@ -93,7 +93,8 @@ std::size_t type_bytes(const std::string& type) {
 }
 
 template <class Stored, class T>
-std::vector<T> convert(std::string_view bytes, const std::string& name, bool swap, std::size_t count, std::size_t place, const Cursor& file) {
+std::vector<T> convert(std::string_view bytes, const std::string& name, bool swap, std::size_t count, std::size_t place,
+                       const Cursor& file) {
   Cursor numbers(bytes, file.name());
   numbers.set_binary(swap);
   std::vector<T> values(count);
@@ -114,19 +115,22 @@ VtuData::VtuData(const Cursor& file, VtuEncoding encoding, std::string_view appe
 
 void VtuData::spend(std::size_t bytes, std::size_t place) {
   if (bytes > budget_)
-    file_.fail(place, "the DataArrays ask for more data than a file of {} bytes can hold; it was damaged: write the mesh again", file_.bytes().size());
+    file_.fail(place, "the DataArrays ask for more data than a file of {} bytes can hold; it was damaged: write the mesh again",
+               file_.bytes().size());
   budget_ -= bytes;
 }
 
-std::string VtuData::decode(const std::string& name, const std::string& format, std::string_view text, std::uint64_t offset, std::size_t expected,
-                            std::size_t place) {
+std::string VtuData::decode(const std::string& name, const std::string& format, std::string_view text, std::uint64_t offset,
+                            std::size_t expected, std::size_t place) {
   const bool appended = format == "appended";
   if (appended && offset >= appended_.size())
-    file_.fail(place, "DataArray '{}' lies at offset {} of the appended data, which ends at {}; the file was cut short: write or copy it again", name,
-               offset, appended_.size());
+    file_.fail(place,
+               "DataArray '{}' lies at offset {} of the appended data, which ends at {}; the file was cut short: write or copy it again",
+               name, offset, appended_.size());
   ByteStream stream(appended ? appended_.substr(static_cast<std::size_t>(offset)) : text, !(appended && encoding_.appended_raw));
   const auto cut_short = [&] {
-    file_.fail(place, "the data of DataArray '{}' end too early or are not valid base64; the file was cut short or damaged: write it again", name);
+    file_.fail(place, "the data of DataArray '{}' end too early or are not valid base64; the file was cut short or damaged: write it again",
+               name);
   };
   const auto header = [&](std::size_t words) {
     std::string bytes;
@@ -136,12 +140,13 @@ std::string VtuData::decode(const std::string& name, const std::string& format, 
     Cursor cursor(bytes, file_.name());
     cursor.set_binary(encoding_.swap_bytes);
     std::vector<std::uint64_t> values(words);
-    for (auto& value : values) value = encoding_.header_bytes == 4 ? cursor.raw<std::uint32_t>("a size") : cursor.raw<std::uint64_t>("a size");
+    for (auto& value : values)
+      value = encoding_.header_bytes == 4 ? cursor.raw<std::uint32_t>("a size") : cursor.raw<std::uint64_t>("a size");
     return values;
   };
   const auto mismatch = [&](std::uint64_t found) {
-    file_.fail(place, "DataArray '{}' holds {} bytes where the counts of the file ask for {}; the file was damaged: write the mesh again", name, found,
-               expected);
+    file_.fail(place, "DataArray '{}' holds {} bytes where the counts of the file ask for {}; the file was damaged: write the mesh again",
+               name, found, expected);
   };
   std::string bytes;
   if (!encoding_.zlib) {
@@ -162,8 +167,10 @@ std::string VtuData::decode(const std::string& name, const std::string& format, 
   const auto packed = header(static_cast<std::size_t>(block_count));
   const std::uint64_t last = sizes[1] == 0 ? sizes[0] : sizes[1];
   // block_count - 1 whole blocks and the last one make `expected`, checked without a product that could overflow.
-  if (last > expected || (block_count > 1 && (sizes[0] == 0 || (expected - last) / (block_count - 1) != sizes[0] ||
-                                              (expected - last) % (block_count - 1) != 0)) || (block_count == 1 && last != expected))
+  if (last > expected ||
+      (block_count > 1 &&
+       (sizes[0] == 0 || (expected - last) / (block_count - 1) != sizes[0] || (expected - last) % (block_count - 1) != 0)) ||
+      (block_count == 1 && last != expected))
     mismatch(last);
   std::uint64_t room = 0;
   for (const auto size : packed) {
@@ -180,7 +187,8 @@ std::string VtuData::decode(const std::string& name, const std::string& format, 
     block.clear();
     if (!stream.take(static_cast<std::size_t>(packed[b]), block)) cut_short();
     uLongf got = want;
-    if (uncompress(reinterpret_cast<Bytef*>(bytes.data() + at), &got, reinterpret_cast<const Bytef*>(block.data()), block.size()) != Z_OK || got != want)
+    if (uncompress(reinterpret_cast<Bytef*>(bytes.data() + at), &got, reinterpret_cast<const Bytef*>(block.data()), block.size()) != Z_OK ||
+        got != want)
       file_.fail(place, "block {} of DataArray '{}' is not valid zlib data; the file was damaged: write or copy it again", b + 1, name);
     at += want;
   }
@@ -195,11 +203,12 @@ std::vector<T> VtuData::read(const std::string& name, const std::string& type, c
   if (width == 0 || (real && std::is_integral_v<T>))
     file_.fail(place, "DataArray '{}' is of type '{}'; it has to be {}: write the mesh again", name, type,
                std::is_integral_v<T> ? "Int8 to UInt64" : "Float32 or Float64");
-  if (count > std::numeric_limits<std::size_t>::max() / width / 8) file_.fail(place, "DataArray '{}' announces {} numbers; write the mesh again", name, count);
+  if (count > std::numeric_limits<std::size_t>::max() / width / 8)
+    file_.fail(place, "DataArray '{}' announces {} numbers; write the mesh again", name, count);
   if (format == "ascii") {
     if (count > text.size() / 2 + 1)
-      file_.fail(place, "DataArray '{}' needs {} numbers and has room for {} at most; the file was cut short or damaged: write it again", name, count,
-                 text.size() / 2 + 1);
+      file_.fail(place, "DataArray '{}' needs {} numbers and has room for {} at most; the file was cut short or damaged: write it again",
+                 name, count, text.size() / 2 + 1);
     spend(count * sizeof(T), place);
     std::vector<T> values(count);
     // The text is a part of the parsed XML and not of the file: errors name the array's line.
@@ -216,7 +225,8 @@ std::vector<T> VtuData::read(const std::string& name, const std::string& type, c
     } catch (const InputError&) {
       file_.fail(place, "number {} of DataArray '{}' is missing or damaged ({} are needed); write the mesh again", done + 1, name, count);
     }
-    if (numbers.skip_space()) file_.fail(place, "DataArray '{}' holds more than the {} numbers it should; write the mesh again", name, count);
+    if (numbers.skip_space())
+      file_.fail(place, "DataArray '{}' holds more than the {} numbers it should; write the mesh again", name, count);
     return values;
   }
   if (format != "binary" && format != "appended")
@@ -238,9 +248,9 @@ std::vector<T> VtuData::read(const std::string& name, const std::string& type, c
   return make(std::uint64_t{});
 }
 
-template std::vector<double> VtuData::read(const std::string&, const std::string&, const std::string&, std::string_view, std::uint64_t, std::size_t,
-                                           std::size_t);
-template std::vector<std::int64_t> VtuData::read(const std::string&, const std::string&, const std::string&, std::string_view, std::uint64_t,
-                                                 std::size_t, std::size_t);
+template std::vector<double> VtuData::read(const std::string&, const std::string&, const std::string&, std::string_view, std::uint64_t,
+                                           std::size_t, std::size_t);
+template std::vector<std::int64_t> VtuData::read(const std::string&, const std::string&, const std::string&, std::string_view,
+                                                 std::uint64_t, std::size_t, std::size_t);
 
 }  // namespace carillon::mesh

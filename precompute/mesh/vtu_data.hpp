@@ -18,8 +18,8 @@ struct VtuEncoding {
   bool appended_raw = false;  // encoding of <AppendedData>
 };
 
-/// Decodes DataArrays of one file. A budget tied to the file's size bounds all that is ever decoded, so that neither many arrays on one block
-/// of data nor a decompression bomb can exhaust the machine.
+/// Decodes DataArrays of one file. A budget tied to the file's size bounds all that is ever decoded, so that neither many arrays on one
+/// block of data nor a decompression bomb can exhaust the machine.
 class VtuData {
  public:
   /// `file`: for messages; its bytes are those of the whole file. `appended`: what follows the underscore of <AppendedData>.
@@ -28,8 +28,8 @@ class VtuData {
   /// The `count` numbers of type `type` ("Float32", "Int64", ...) as double or int64. `place`: of the array in the file.
   /// `text`: inline content (format ascii or binary); `offset`: into the appended data when `format` is "appended".
   template <class T>
-  std::vector<T> read(const std::string& name, const std::string& type, const std::string& format, std::string_view text, std::uint64_t offset,
-                      std::size_t count, std::size_t place);
+  std::vector<T> read(const std::string& name, const std::string& type, const std::string& format, std::string_view text,
+                      std::uint64_t offset, std::size_t count, std::size_t place);
 
  private:
   std::string decode(const std::string& name, const std::string& format, std::string_view text, std::uint64_t offset, std::size_t expected,

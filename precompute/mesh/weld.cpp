@@ -1,4 +1,5 @@
-// Method: nodes are sorted into cells of a grid a thousand times coarser than the tolerance; twins are joined transitively. Twins are welded
+// Method: nodes are sorted into cells of a grid a thousand times coarser than the tolerance; twins are joined transitively. Twins are
+// welded
 //   only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart.
 // Source: own.
 // Deviations: the tolerance is 1e-9 of the diagonal of the box of the nodes in use.
@@ -33,7 +34,8 @@ bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& 
     const Vec3& x = mesh.nodes[i];
     entries.push_back({key_of({cell_of(x[0], low[0]), cell_of(x[1], low[1]), cell_of(x[2], low[2])}), static_cast<std::int32_t>(i)});
   }
-  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.key < b.key || (a.key == b.key && a.node < b.node); });
+  std::sort(entries.begin(), entries.end(),
+            [](const Entry& a, const Entry& b) { return a.key < b.key || (a.key == b.key && a.node < b.node); });
   bool any = false;
   const auto compare = [&](std::int32_t i, std::int32_t j) {
     const Vec3& x = mesh.nodes[static_cast<std::size_t>(i)];
@@ -119,17 +121,19 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
       edges[next[static_cast<std::size_t>(low)]++] = {high, mid, static_cast<std::int32_t>(e)};
       auto& known = edge_of[static_cast<std::size_t>(mid)];
       if (known[0] >= 0 && known != std::array{low, high})
-        throw InputError(fmt::format("{}: node {} is the mid node of two different edges (one of them in element {}); write the quadratic mesh again, in the "
-                                     "node order of its format",
-                                     name, mid + 1, e + 1));
+        throw InputError(fmt::format(
+            "{}: node {} is the mid node of two different edges (one of them in element {}); write the quadratic mesh again, in the "
+            "node order of its format",
+            name, mid + 1, e + 1));
       known = {low, high};
     }
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (std::size_t k = 0; k < 4; ++k)
       if (edge_of[static_cast<std::size_t>(mesh.tet(e)[k])][0] >= 0)
-        throw InputError(fmt::format("{}: node {} is a corner of element {} and the mid node of another; write the quadratic mesh again, in the node order of "
-                                     "its format",
-                                     name, mesh.tet(e)[k] + 1, e + 1));
+        throw InputError(fmt::format(
+            "{}: node {} is a corner of element {} and the mid node of another; write the quadratic mesh again, in the node order of "
+            "its format",
+            name, mesh.tet(e)[k] + 1, e + 1));
   for (std::size_t low = 0; low + 1 < begin.size(); ++low) {
     const auto first = edges.begin() + static_cast<std::ptrdiff_t>(begin[low]);
     const auto last = edges.begin() + static_cast<std::ptrdiff_t>(begin[low + 1]);
@@ -138,9 +142,10 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
       if (edge == first || edge->high != (edge - 1)->high || edge->mid == (edge - 1)->mid) continue;
       const auto before = edge - 1;
       if (twin_of[static_cast<std::size_t>(edge->mid)] != twin_of[static_cast<std::size_t>(before->mid)])
-        throw InputError(fmt::format("{}: elements {} and {} share the edge of nodes {} and {}, but have different mid nodes ({} and {}) on it; write the "
-                                     "quadratic mesh again with one node per edge",
-                                     name, before->tet + 1, edge->tet + 1, low + 1, edge->high + 1, before->mid + 1, edge->mid + 1));
+        throw InputError(fmt::format(
+            "{}: elements {} and {} share the edge of nodes {} and {}, but have different mid nodes ({} and {}) on it; write the "
+            "quadratic mesh again with one node per edge",
+            name, before->tet + 1, edge->tet + 1, low + 1, edge->high + 1, before->mid + 1, edge->mid + 1));
       marked[static_cast<std::size_t>(edge->mid)] = marked[static_cast<std::size_t>(before->mid)] = 1;
     }
   }
@@ -159,7 +164,8 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
       high[k] = std::max(high[k], mesh.nodes[i][k]);
     }
   const double tolerance = 1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-  if (!std::isfinite(tolerance)) throw InputError(fmt::format("{}: the coordinates are too large to compute with; give them in metres", name));
+  if (!std::isfinite(tolerance))
+    throw InputError(fmt::format("{}: the coordinates are too large to compute with; give them in metres", name));
   Parts twins(count);
   const bool any = tolerance > 0.0 && join_twins(mesh, used, low, tolerance, twins);
   std::vector<std::int32_t> identity(count), twin_of(count);
@@ -203,7 +209,8 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
   }
   for (std::size_t i = 0; i < count; ++i) {
     report.welded += stand[i] != identity[i];
-    report.touching_nodes += used[i] != 0 && stand[i] == identity[i] && twin_of[i] != identity[i] && stand[static_cast<std::size_t>(twin_of[i])] != stand[i];
+    report.touching_nodes +=
+        used[i] != 0 && stand[i] == identity[i] && twin_of[i] != identity[i] && stand[static_cast<std::size_t>(twin_of[i])] != stand[i];
   }
   for (auto& node : mesh.tets) node = stand[static_cast<std::size_t>(node)];
   return stand;

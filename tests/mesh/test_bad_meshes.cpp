@@ -29,7 +29,8 @@ std::string vtu(const std::string& root, const std::string& points, const std::s
          ">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\">\n<Points>\n<DataArray type=\"Float64\" "
          "NumberOfComponents=\"3\" format=\"ascii\">" +
          points + "</DataArray>\n</Points>\n<Cells>\n<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">" + connectivity +
-         "</DataArray>\n<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray>\n<DataArray type=\"UInt8\" Name=\"types\" "
+         "</DataArray>\n<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray>\n<DataArray type=\"UInt8\" "
+         "Name=\"types\" "
          "format=\"ascii\">" +
          type + "</DataArray>\n</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
 }
@@ -42,29 +43,51 @@ std::vector<BadFile> bad_files() {
       {"unknown", "a.dat", "hello world\n", {"a.dat:1", "not a mesh file", "hello world", "Medit"}},
       {"surface", "a.stl", "solid box\n", {"a surface", "carillon-mesh"}},
       {"legacy_vtk", "a.vtk", "# vtk DataFile Version 3.0\n", {"legacy VTK", ".vtu"}},
-      {"missing_node", "a.msh", kHead2 + kNodes2 + "$Elements\n1\n17 4 2 0 1 1 2 3 999\n$EndElements\n",
+      {"missing_node",
+       "a.msh",
+       kHead2 + kNodes2 + "$Elements\n1\n17 4 2 0 1 1 2 3 999\n$EndElements\n",
        {"a.msh:13: element 17 refers to node 999, which the file does not define; write the mesh again with all nodes saved"}},
       {"twin_node", "a.msh", kHead2 + "$Nodes\n2\n1 0 0 0\n1 1 0 0\n$EndNodes\n" + kTet2, {"a.msh:7", "node 1 is defined a second time"}},
-      {"twin_sparse_node", "a.msh", kHead2 + "$Nodes\n3\n1 0 0 0\n2000000 1 0 0\n1 1 0 0\n$EndNodes\n" + kTet2, {"a.msh:8", "node 1 is defined a second time"}},
+      {"twin_sparse_node",
+       "a.msh",
+       kHead2 + "$Nodes\n3\n1 0 0 0\n2000000 1 0 0\n1 1 0 0\n$EndNodes\n" + kTet2,
+       {"a.msh:8", "node 1 is defined a second time"}},
       {"nan", "a.msh", kHead2 + "$Nodes\n1\n1 0 nan 0\n$EndNodes\n" + kTet2, {"a.msh:6", "node 1", "nan", "not all finite"}},
       {"infinite", "a.msh", kHead2 + "$Nodes\n1\n1 0 1e999 0\n$EndNodes\n" + kTet2, {"a.msh:6", "inf", "not all finite"}},
       {"word_for_number", "a.msh", kHead2 + "$Nodes\n1\n1 0 zero 0\n$EndNodes\n" + kTet2, {"a.msh:6", "expected a coordinate", "'zero'"}},
-      {"hostile_count", "a.msh", kHead2 + "$Nodes\n999999999999\n1 0 0 0\n$EndNodes\n", {"a.msh:5", "announces 999999999999 nodes", "room for"}},
+      {"hostile_count",
+       "a.msh",
+       kHead2 + "$Nodes\n999999999999\n1 0 0 0\n$EndNodes\n",
+       {"a.msh:5", "announces 999999999999 nodes", "room for"}},
       {"negative_count", "a.msh", kHead2 + "$Nodes\n-7\n$EndNodes\n", {"announces -7 nodes"}},
       {"count_too_small", "a.msh", kHead2 + "$Nodes\n1\n1 0 0 0\n2 1 0 0\n$EndNodes\n", {"a.msh:7", "expected $EndNodes, found '2 1 0 0'"}},
       {"cut_short", "a.msh", kHead2 + "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1", {"a.msh:5", "cut short"}},
       {"no_elements", "a.msh", kHead2 + kNodes2, {"without a section $Elements", "cut short"}},
-      {"hexahedra", "a.msh", kHead2 + kNodes2 + "$Elements\n1\n1 5 2 0 1 1 2 3 4 1 2 3 4\n$EndElements\n", {"a.msh:13", "hexahedra", "only tetrahedra"}},
+      {"hexahedra",
+       "a.msh",
+       kHead2 + kNodes2 + "$Elements\n1\n1 5 2 0 1 1 2 3 4 1 2 3 4\n$EndElements\n",
+       {"a.msh:13", "hexahedra", "only tetrahedra"}},
       {"unknown_type", "a.msh", kHead2 + kNodes2 + "$Elements\n1\n1 444 2 0 1 1 2 3 4\n$EndElements\n", {"a.msh:13", "element type 444"}},
-      {"only_triangles", "a.msh", kHead2 + kNodes2 + "$Elements\n1\n1 2 2 0 1 1 2 3\n$EndElements\n", {"no tetrahedra", "1 triangles", "mesh the volume first"}},
-      {"mixed_orders", "a.msh", kHead2 + kNodes2 + "$Elements\n2\n1 4 0 1 2 3 4\n2 11 0 1 2 3 4 1 2 3 4 1 2\n$EndElements\n",
+      {"only_triangles",
+       "a.msh",
+       kHead2 + kNodes2 + "$Elements\n1\n1 2 2 0 1 1 2 3\n$EndElements\n",
+       {"no tetrahedra", "1 triangles", "mesh the volume first"}},
+      {"mixed_orders",
+       "a.msh",
+       kHead2 + kNodes2 + "$Elements\n2\n1 4 0 1 2 3 4\n2 11 0 1 2 3 4 1 2 3 4 1 2\n$EndElements\n",
        {"a.msh:14", "element 2 is a quadratic tetrahedron among linear ones"}},
       {"old_version", "a.msh", "$MeshFormat\n4 0 8\n$EndMeshFormat\n", {"a.msh:2", "Gmsh format 4", "-format msh41"}},
       {"first_version", "a.msh", "$NOD\n1\n1 0 0 0\n$ENDNOD\n", {"a.msh:1", "Gmsh format 1", "-format msh41"}},
       {"no_byte_order", "a.msh", "$MeshFormat\n4.1 1 8\nabcd\n$EndMeshFormat\n", {"a.msh: byte 20", "byte-order mark"}},
-      {"block_sum", "a.msh", kHead4 + "$Nodes\n1 4 1 4\n3 1 0 2\n1\n2\n0 0 0\n1 0 0\n$EndNodes\n", {"a.msh:5", "announces 4 nodes, but its blocks hold 2"}},
-      {"group_without_node", "a.msh", kHead2 + "$PhysicalNames\n1\n2 5 \"grip\"\n$EndPhysicalNames\n" + kNodes2 +
-                                          "$Elements\n2\n1 2 2 5 1 1 2 77\n2 4 2 0 1 1 2 3 4\n$EndElements\n", {"a.msh:17", "'grip'", "node 77"}},
+      {"block_sum",
+       "a.msh",
+       kHead4 + "$Nodes\n1 4 1 4\n3 1 0 2\n1\n2\n0 0 0\n1 0 0\n$EndNodes\n",
+       {"a.msh:5", "announces 4 nodes, but its blocks hold 2"}},
+      {"group_without_node",
+       "a.msh",
+       kHead2 + "$PhysicalNames\n1\n2 5 \"grip\"\n$EndPhysicalNames\n" + kNodes2 +
+           "$Elements\n2\n1 2 2 5 1 1 2 77\n2 4 2 0 1 1 2 3 4\n$EndElements\n",
+       {"a.msh:17", "'grip'", "node 77"}},
       {"medit_two_dimensions", "a.mesh", "MeshVersionFormatted 2\nDimension 2\n", {"a.mesh:2", "2 dimensions"}},
       {"medit_vertex_zero", "a.mesh", kMedit + "Tetrahedra\n1\n0 1 2 3 0\nEnd\n", {"a.mesh:11", "element 1 refers to node 0"}},
       {"medit_hexahedra", "a.mesh", kMedit + "Hexahedra\n1\n1 2 3 4 1 2 3 4 0\nEnd\n", {"a.mesh:9", "1 hexahedra", "only tetrahedra"}},
@@ -72,8 +95,14 @@ std::vector<BadFile> bad_files() {
       {"vtu_cell_type", "a.vtu", vtu("", kPoints, "0 1 2 3", "14"), {"a.vtu:", "pyramids", "only tetrahedra"}},
       {"vtu_point", "a.vtu", vtu("", kPoints, "0 1 2 4", "10"), {"a.vtu:9", "cell 1 refers to point 4", "0 to 3"}},
       {"vtu_too_few", "a.vtu", vtu("", "0 0 0 1 0 0 0 1 0 0 0", "0 1 2 3", "10"), {"a.vtu:6", "needs 12 numbers", "11 at most"}},
-      {"vtu_word", "a.vtu", vtu("", "0 0 0 1 0 0 0 1 0 0 0 one", "0 1 2 3", "10"), {"a.vtu:6", "number 12 of DataArray 'Points'", "missing or damaged"}},
-      {"vtu_lz4", "a.vtu", vtu(" compressor=\"vtkLZ4DataCompressor\"", kPoints, "0 1 2 3", "10"), {"a.vtu:2", "vtkLZ4DataCompressor", "save with zlib or no compression"}},
+      {"vtu_word",
+       "a.vtu",
+       vtu("", "0 0 0 1 0 0 0 1 0 0 0 one", "0 1 2 3", "10"),
+       {"a.vtu:6", "number 12 of DataArray 'Points'", "missing or damaged"}},
+      {"vtu_lz4",
+       "a.vtu",
+       vtu(" compressor=\"vtkLZ4DataCompressor\"", kPoints, "0 1 2 3", "10"),
+       {"a.vtu:2", "vtkLZ4DataCompressor", "save with zlib or no compression"}},
       {"vtu_xml", "a.vtu", vtu("", kPoints, "0 1 2 3", "10").substr(0, 300), {"a.vtu:", "XML is damaged"}},
       {"vtu_kind", "a.vtu", "<VTKFile type=\"PolyData\">\n</VTKFile>\n", {"a.vtu:1", "'PolyData'", "UnstructuredGrid"}},
   };
@@ -88,7 +117,8 @@ TEST_P(BadMesh, is_refused_in_words_that_help) {
     read_mesh(scratch / GetParam().name);
     FAIL() << "accepted";
   } catch (const InputError& error) {
-    for (const char* word : GetParam().words) EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << "'" << word << "' in: " << error.what();
+    for (const char* word : GetParam().words)
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << "'" << word << "' in: " << error.what();
   }
 }
 
@@ -107,7 +137,8 @@ TEST(bad_files, a_folder_a_pipe_a_device_and_a_missing_file_are_refused_without_
   const ScratchFolder scratch;
   ASSERT_EQ(::mkfifo((scratch / "pipe.msh").c_str(), 0600), 0);
   std::filesystem::create_directory(scratch / "folder.msh");
-  for (const std::filesystem::path& file : {scratch / "pipe.msh", scratch / "folder.msh", std::filesystem::path("/dev/zero"), scratch / "none.msh"})
+  for (const std::filesystem::path& file :
+       {scratch / "pipe.msh", scratch / "folder.msh", std::filesystem::path("/dev/zero"), scratch / "none.msh"})
     EXPECT_NE(refusal(file).find(file.string()), std::string::npos) << refusal(file);
 }
 
@@ -123,9 +154,11 @@ TEST(bad_files, tetgen_pairs_are_refused_with_the_file_that_is_at_fault) {
   EXPECT_NE(attempt(nodes, "1 4 0\n1 1 2 3 9\n").find("t.ele:2: element 1 refers to node 9"), std::string::npos);
   EXPECT_NE(attempt(nodes, "1 8 0\n1 1 2 3 4\n").find("t.ele:1: elements of 8 nodes"), std::string::npos);
   EXPECT_NE(attempt("4 2 0 0\n1 0 0\n", "1 4 0\n1 1 2 3 4\n").find("t.node:1: the nodes have 2 coordinates"), std::string::npos);
-  EXPECT_NE(attempt("99999999 3 0 0\n1 0 0 0\n", "1 4 0\n1 1 2 3 4\n").find("t.node:1: the file announces 99999999 nodes"), std::string::npos);
-  EXPECT_NE(attempt("4 3 0 0\n1 0 0 0\n2 1 0 0\n2 0 1 0\n4 0 0 1\n", "1 4 0\n1 1 2 3 4\n").find("t.node:4: node 2 is defined a second time"),
+  EXPECT_NE(attempt("99999999 3 0 0\n1 0 0 0\n", "1 4 0\n1 1 2 3 4\n").find("t.node:1: the file announces 99999999 nodes"),
             std::string::npos);
+  EXPECT_NE(
+      attempt("4 3 0 0\n1 0 0 0\n2 1 0 0\n2 0 1 0\n4 0 0 1\n", "1 4 0\n1 1 2 3 4\n").find("t.node:4: node 2 is defined a second time"),
+      std::string::npos);
   EXPECT_NE(attempt(nodes + "5 1 1 1\n", "1 4 0\n1 1 2 3 4\n").find("t.node:6: more than the 4 nodes"), std::string::npos);
   std::filesystem::remove(scratch / "t.node");
   EXPECT_NE(refusal(scratch / "t.ele").find("t.node"), std::string::npos);

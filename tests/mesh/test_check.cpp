@@ -162,6 +162,24 @@ TEST(check, a_crack_is_welded_and_counted_and_node_sets_follow) {
   }
 }
 
+TEST(check, a_mesh_whose_elements_each_have_nodes_of_their_own_is_joined_into_one_body) {
+  for (const int order : {1, 2}) {
+    const TetMesh whole = order == 1 ? make_cube(3) : to_quadratic(make_cube(3));
+    TetMesh mesh = whole;
+    mesh.nodes.clear();
+    for (auto& node : mesh.tets) {
+      mesh.nodes.push_back(whole.nodes[static_cast<std::size_t>(node)]);
+      node = static_cast<std::int32_t>(mesh.nodes.size()) - 1;
+    }
+    const CheckReport report = check_mesh(mesh);
+    EXPECT_EQ(mesh.nodes.size(), whole.nodes.size());
+    EXPECT_EQ(report.welded, static_cast<std::int64_t>(whole.tets.size() - whole.nodes.size()));
+    EXPECT_EQ(report.unreferenced, 0);
+    EXPECT_EQ(report.components, 1);
+    EXPECT_EQ(place_tets(mesh), place_tets(whole));
+  }
+}
+
 TEST(check, bodies_that_touch_at_one_place_are_left_apart_and_reported) {
   TetMesh mesh = make_one();
   for (const Vec3& x : {Vec3{1, 0, 0}, Vec3{2, 0, 0}, Vec3{1, 1, 0}, Vec3{1, 0, 1}}) mesh.nodes.push_back(x);
@@ -270,7 +288,8 @@ TEST(check, curved_elements_are_counted_and_folded_ones_straightened) {
   CheckReport report = check_mesh(mesh);
   EXPECT_EQ(report.curved, 1);
   EXPECT_EQ(report.straightened, 0);
-  // A straight edge bulging by b over the faces z = 0 and y = 0: the volume gained is that of the quadratic map, by an independent quadrature.
+  // A straight edge bulging by b over the faces z = 0 and y = 0: the volume gained is that of the quadratic map, by an independent
+  // quadrature.
   EXPECT_GT(report.volume_m3, 1.0 / 6.0);
   mesh.nodes[static_cast<std::size_t>(mesh.tets[4])] = {0.1, 0.9, 0.9};
   report = check_mesh(mesh);
@@ -306,7 +325,9 @@ TEST(boundary, triangles_point_outwards_and_enclose_the_volume) {
     double volume = 0.0;
     std::multiset<std::pair<int, int>> edges;
     for (const auto& t : surface.triangles) {
-      const auto at = [&](int k) { return mesh.nodes[static_cast<std::size_t>(surface.nodes[static_cast<std::size_t>(t[static_cast<std::size_t>(k)])])]; };
+      const auto at = [&](int k) {
+        return mesh.nodes[static_cast<std::size_t>(surface.nodes[static_cast<std::size_t>(t[static_cast<std::size_t>(k)])])];
+      };
       const Vec3 a = at(0), b = at(1), c = at(2);
       volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6.0;
       for (std::size_t k = 0; k < 3; ++k) edges.insert({t[k], t[(k + 1) % 3]});
@@ -314,7 +335,8 @@ TEST(boundary, triangles_point_outwards_and_enclose_the_volume) {
     EXPECT_NEAR(volume, 1.0, 1e-12);
     for (const auto& [i, j] : edges) ASSERT_EQ(edges.count({j, i}), 1U) << "edge " << i << " " << j;
     // Euler: V - E + F = 2 for a ball.
-    EXPECT_EQ(static_cast<long>(surface.nodes.size()) - static_cast<long>(edges.size() / 2) + static_cast<long>(surface.triangles.size()), 2);
+    EXPECT_EQ(static_cast<long>(surface.nodes.size()) - static_cast<long>(edges.size() / 2) + static_cast<long>(surface.triangles.size()),
+              2);
     EXPECT_TRUE(std::is_sorted(surface.nodes.begin(), surface.nodes.end()));
   }
 }
@@ -366,7 +388,8 @@ TEST(speed, a_mesh_of_the_demos_size_is_read_and_checked_within_seconds) {
   check_mesh(mesh);
   const auto end = std::chrono::steady_clock::now();
   EXPECT_EQ(mesh.tet_count(), 178746);
-  const double read_s = std::chrono::duration<double>(middle - begin).count(), check_s = std::chrono::duration<double>(end - middle).count();
+  const double read_s = std::chrono::duration<double>(middle - begin).count(),
+               check_s = std::chrono::duration<double>(end - middle).count();
   RecordProperty("read_s", std::to_string(read_s));
   RecordProperty("check_s", std::to_string(check_s));
   std::printf("read %.3f s, checked %.3f s\n", read_s, check_s);

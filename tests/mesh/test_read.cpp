@@ -45,20 +45,22 @@ TEST_P(EveryFile, holds_the_mesh_that_gmsh_says) {
   if (order == 2) expect_mid_nodes_in_the_middle(mesh);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    fixtures, EveryFile,
-    testing::Values("gmsh22_text_1.msh", "gmsh22_text_2.msh", "gmsh22_binary_1.msh", "gmsh22_binary_2.msh", "gmsh41_text_1.msh", "gmsh41_text_2.msh",
-                    "gmsh41_binary_1.msh", "gmsh41_binary_2.msh", "meshio41_1.msh", "meshio41_2.msh", "medit_1.mesh", "medit_2.mesh", "gmsh_1.mesh",
-                    "medit_gmsh_order_2.mesh", "medit_ordering_2.mesh", "meshio_1.node", "meshio_1.ele", "meshio_ascii_1.vtu", "meshio_ascii_2.vtu",
-                    "meshio_plain_1.vtu", "meshio_plain_2.vtu", "meshio_zlib_1.vtu", "meshio_zlib_2.vtu", "vtk_ascii_1.vtu", "vtk_ascii_2.vtu",
-                    "vtk_inline_1.vtu", "vtk_inline_2.vtu", "vtk_inline64_1.vtu", "vtk_inline64_2.vtu", "vtk_inline_zlib_1.vtu", "vtk_inline_zlib_2.vtu",
-                    "vtk_appended_1.vtu", "vtk_appended_2.vtu", "vtk_appended_zlib64_1.vtu", "vtk_appended_zlib64_2.vtu", "vtk_raw_1.vtu", "vtk_raw_2.vtu",
-                    "vtk_raw_zlib_1.vtu", "vtk_raw_zlib_2.vtu", "vtk_raw64_big_1.vtu", "vtk_raw64_big_2.vtu"),
-    [](const auto& info) {
-      std::string name = info.param;
-      std::replace(name.begin(), name.end(), '.', '_');
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(fixtures, EveryFile,
+                         testing::Values("gmsh22_text_1.msh", "gmsh22_text_2.msh", "gmsh22_binary_1.msh", "gmsh22_binary_2.msh",
+                                         "gmsh41_text_1.msh", "gmsh41_text_2.msh", "gmsh41_binary_1.msh", "gmsh41_binary_2.msh",
+                                         "meshio41_1.msh", "meshio41_2.msh", "medit_1.mesh", "medit_2.mesh", "gmsh_1.mesh",
+                                         "medit_gmsh_order_2.mesh", "medit_ordering_2.mesh", "meshio_1.node", "meshio_1.ele",
+                                         "meshio_ascii_1.vtu", "meshio_ascii_2.vtu", "meshio_plain_1.vtu", "meshio_plain_2.vtu",
+                                         "meshio_zlib_1.vtu", "meshio_zlib_2.vtu", "vtk_ascii_1.vtu", "vtk_ascii_2.vtu", "vtk_inline_1.vtu",
+                                         "vtk_inline_2.vtu", "vtk_inline64_1.vtu", "vtk_inline64_2.vtu", "vtk_inline_zlib_1.vtu",
+                                         "vtk_inline_zlib_2.vtu", "vtk_appended_1.vtu", "vtk_appended_2.vtu", "vtk_appended_zlib64_1.vtu",
+                                         "vtk_appended_zlib64_2.vtu", "vtk_raw_1.vtu", "vtk_raw_2.vtu", "vtk_raw_zlib_1.vtu",
+                                         "vtk_raw_zlib_2.vtu", "vtk_raw64_big_1.vtu", "vtk_raw64_big_2.vtu"),
+                         [](const auto& info) {
+                           std::string name = info.param;
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
 
 class GmshFile : public testing::TestWithParam<std::string> {};
 
@@ -75,13 +77,17 @@ TEST_P(GmshFile, gives_its_physical_groups_as_node_sets_and_its_volume_tag_as_re
 }
 
 INSTANTIATE_TEST_SUITE_P(fixtures, GmshFile,
-                         testing::Values("gmsh22_text_1.msh", "gmsh22_text_2.msh", "gmsh22_binary_1.msh", "gmsh22_binary_2.msh", "gmsh41_text_1.msh",
-                                         "gmsh41_text_2.msh", "gmsh41_binary_1.msh", "gmsh41_binary_2.msh"),
+                         testing::Values("gmsh22_text_1.msh", "gmsh22_text_2.msh", "gmsh22_binary_1.msh", "gmsh22_binary_2.msh",
+                                         "gmsh41_text_1.msh", "gmsh41_text_2.msh", "gmsh41_binary_1.msh", "gmsh41_binary_2.msh"),
                          [](const auto& info) { return info.param.substr(0, info.param.size() - 4); });
 
 TEST(read, node_sets_and_regions_come_out_of_the_other_formats_too) {
-  for (const auto& [file, set, order] : {std::tuple{"vtk_ascii_1.vtu", "clamp", 1}, {"vtk_raw_zlib_2.vtu", "clamp:3", 2}, {"meshio_zlib_2.vtu", "clamp", 2},
-                                         {"medit_1.mesh", "ref:3", 1}, {"medit_ordering_2.mesh", "ref:3", 2}, {"meshio_1.node", "marker:3", 1}}) {
+  for (const auto& [file, set, order] : {std::tuple{"vtk_ascii_1.vtu", "clamp", 1},
+                                         {"vtk_raw_zlib_2.vtu", "clamp:3", 2},
+                                         {"meshio_zlib_2.vtu", "clamp", 2},
+                                         {"medit_1.mesh", "ref:3", 1},
+                                         {"medit_ordering_2.mesh", "ref:3", 2},
+                                         {"meshio_1.node", "marker:3", 1}}) {
     const TetMesh mesh = read_mesh(fixture(file));
     ASSERT_TRUE(mesh.node_sets.contains(set)) << file;
     EXPECT_LT(find_distance(place_nodes(mesh, mesh.node_sets.at(set)), read_truth(order).groups.at("clamp")), 1e-11) << file;
@@ -149,6 +155,21 @@ TEST(read, a_gmsh_2_element_of_two_physical_groups_is_one_element) {
   EXPECT_EQ(mesh.node_sets.at("half"), (std::vector<std::int32_t>{1, 2, 3, 4}));
 }
 
+TEST(read, parametric_nodes_partitioned_entities_and_foreign_sections_of_gmsh_4_are_understood) {
+  const std::string text =
+      "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Comments\nanything $Nodes\n$EndComments\n"
+      "$PhysicalNames\n1\n2 5 \"grip\"\n$EndPhysicalNames\n"
+      "$Entities\n0 0 1 1\n1 0 0 0 1 1 0 0 0\n1 0 0 0 1 1 1 0 1 1\n$EndEntities\n"
+      "$PartitionedEntities\n2\n0\n0 0 1 1\n11 2 1 1 1 0 0 0 1 1 0 1 5 0\n21 3 1 2 1 2 0 0 0 1 1 1 1 8 0\n$EndPartitionedEntities\n"
+      "$Nodes\n2 4 1 4\n2 11 1 3\n1\n2\n3\n0 0 0 .1 .2\n1 0 0 .3 .4\n0 1 0 .5 .6\n3 21 0 1\n4\n0 0 1\n$EndNodes\n"
+      "$Elements\n2 2 1 2\n2 11 2 1\n1 1 2 3\n3 21 4 1\n2 1 2 3 4\n$EndElements\n"
+      "$Periodic\n0\n$EndPeriodic\n$NodeData\n1\n\"T\"\n$EndNodeData\n";
+  const TetMesh mesh = parse_mesh(std::as_bytes(std::span(text)), "parts.msh", MeshFormat::kGmsh);
+  EXPECT_NEAR(calc_volume(mesh), 1.0 / 6.0, 1e-15);
+  EXPECT_EQ(mesh.regions, std::vector<std::int32_t>{8});
+  EXPECT_EQ(mesh.node_sets.at("grip"), (std::vector<std::int32_t>{0, 1, 2}));
+}
+
 TEST(read, a_gmsh_file_of_the_other_byte_order_gives_the_same_mesh) {
   // Version 2.2 binary, written big-endian by hand.
   std::string text = "$MeshFormat\n2.2 1 8\n";
@@ -172,9 +193,13 @@ TEST(read, a_gmsh_file_of_the_other_byte_order_gives_the_same_mesh) {
 }
 
 TEST(read, every_truncation_of_every_format_is_an_error_or_the_whole_mesh_and_never_a_crash) {
-  for (const auto& [file, format] : {std::pair{"gmsh22_text_1.msh", MeshFormat::kGmsh}, {"gmsh22_binary_1.msh", MeshFormat::kGmsh},
-                                     {"gmsh41_text_1.msh", MeshFormat::kGmsh}, {"gmsh41_binary_1.msh", MeshFormat::kGmsh},
-                                     {"medit_1.mesh", MeshFormat::kMedit}, {"vtk_ascii_1.vtu", MeshFormat::kVtu}, {"vtk_raw_zlib_1.vtu", MeshFormat::kVtu},
+  for (const auto& [file, format] : {std::pair{"gmsh22_text_1.msh", MeshFormat::kGmsh},
+                                     {"gmsh22_binary_1.msh", MeshFormat::kGmsh},
+                                     {"gmsh41_text_1.msh", MeshFormat::kGmsh},
+                                     {"gmsh41_binary_1.msh", MeshFormat::kGmsh},
+                                     {"medit_1.mesh", MeshFormat::kMedit},
+                                     {"vtk_ascii_1.vtu", MeshFormat::kVtu},
+                                     {"vtk_raw_zlib_1.vtu", MeshFormat::kVtu},
                                      {"vtk_appended_zlib64_1.vtu", MeshFormat::kVtu}}) {
     const std::string text = read_text(fixture(file));
     std::size_t refused = 0;

@@ -12,7 +12,9 @@ namespace carillon::mesh {
 
 namespace {
 // Coordinates that differ in the last digits must sort alike: they are rounded to a picometre first.
-Vec3 rounded(const Vec3& x) { return {std::round(x[0] * 1e12) * 1e-12 + 0.0, std::round(x[1] * 1e12) * 1e-12 + 0.0, std::round(x[2] * 1e12) * 1e-12 + 0.0}; }
+Vec3 rounded(const Vec3& x) {
+  return {std::round(x[0] * 1e12) * 1e-12 + 0.0, std::round(x[1] * 1e12) * 1e-12 + 0.0, std::round(x[2] * 1e12) * 1e-12 + 0.0};
+}
 }  // namespace
 
 std::filesystem::path fixture(const std::string& name) { return std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/mesh/data" / name; }

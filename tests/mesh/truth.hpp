@@ -12,7 +12,7 @@ namespace carillon::mesh {
 
 struct Truth {
   std::size_t nodes = 0;
-  std::vector<std::vector<Vec3>> tets;             // the nodes of each, sorted; the elements sorted
+  std::vector<std::vector<Vec3>> tets;              // the nodes of each, sorted; the elements sorted
   std::map<std::string, std::vector<Vec3>> groups;  // sorted
 };
 
