@@ -23,7 +23,10 @@ using SimTK::Transform;
 using Point = SimTK::Vec3;
 
 constexpr double kSink = 2e-5;          // m; how far a resting body sinks into its contact under its own weight
-constexpr double kLongestStep = 2e-3;   // s; also the distance of the recorded poses
+constexpr double kRolling = 2e-3;       // rolling resistance arm over the size of the smaller body; hard bodies on hard floors: 1e-3 to 5e-3
+constexpr double kLongestStep = 2e-3;   // s
+constexpr double kContactStep = 5e-4;   // s; while something in touch moves by more than kContactDepth
+constexpr double kContactDepth = 5e-6;  // m
 
 Point to_vec(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
 
@@ -181,6 +184,7 @@ void Engine::set_resting(const std::vector<TouchPoint>& touches) {
     const double mass = 1.0 / inverse_mass / sharing[{t.a, t.b}];
     p.stiffness_n_m = mass * omega * omega;
     p.damping_n_s_m = 2.0 * mass * omega;  // critical
+    p.rolling_arm_m = kRolling * 10.0 * spot_radius_m(t.a, t.b);
     p.friction = make_impact_point(t).friction;
     points.push_back(p);
   }
@@ -207,13 +211,14 @@ State Engine::calc_advanced(const State& state, double step_s) {
   }
 }
 
-double Engine::calc_largest_step(const Snapshot& now) const {
+double Engine::calc_largest_step(const Snapshot& now, bool in_touch) const {
   double step = kLongestStep;
   double thinnest = SimTK::Infinity;
   for (const Body& body : bodies_) thinnest = std::min(thinnest, body.surface->thickness_m());
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const double speed = now.mobiles[i].velocity.norm() + now.mobiles[i].spin.norm() * bodies_[i].surface->size_m();
     if (speed > 0.0) step = std::min(step, 0.25 * thinnest / speed);
+    if (in_touch && speed > 0.0) step = std::min(step, std::max(kContactStep, kContactDepth / speed));
   }
   return std::max(step, 2e-6);
 }

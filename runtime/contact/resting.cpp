@@ -1,5 +1,6 @@
 // Method: at each point a spring and a damper that only push, f = max(0, k d + c d' g(d)), with g rising to 1 within kFullDepth so that the force
-//   begins without a jump; friction -mu f u / max(|u|, kCreep), so that a body on a slope creeps by less than kCreep.
+//   begins without a jump; friction -mu f u / max(|u|, kCreep), so that a body on a slope creeps by less than kCreep; rolling resistance
+//   -b f w / max(|w|, kSlowSpin), without which a rounded body rocks for ever.
 // Source: K. Hunt, E. Crossley (1975) for a damping that grows with depth; regularised Coulomb friction as in Simbody's own contacts.
 // Deviations: the points are found by the caller once a step, not at every evaluation.
 #include "runtime/contact/resting.hpp"
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double kFullDepth = 4e-6;  // m; a fifth of the depth under the body's own weight
 constexpr double kCreep = 2e-3;      // m/s
+constexpr double kSlowSpin = 0.05;   // rad/s; below this the rolling resistance fades
 
 }  // namespace
 
@@ -34,6 +36,10 @@ void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::Sp
     const Vec3 force = push * t.normal - (p.friction * push / std::max(slide.norm(), kCreep)) * slide;
     a.applyForceToBodyPoint(state, in_a, force, body_forces);
     b.applyForceToBodyPoint(state, in_b, -force, body_forces);
+    const Vec3 roll = a.getBodyAngularVelocity(state) - b.getBodyAngularVelocity(state);
+    const Vec3 moment = (-p.rolling_arm_m * push / std::max(roll.norm(), kSlowSpin)) * roll;
+    a.applyBodyTorque(state, moment, body_forces);
+    b.applyBodyTorque(state, -moment, body_forces);
   }
 }
 

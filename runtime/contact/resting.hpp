@@ -18,9 +18,10 @@ struct RestingPoint {
   double stiffness_n_m = 0.0;
   double damping_n_s_m = 0.0;
   double friction = 0.0;
+  double rolling_arm_m = 0.0;  // rolling resistance: moment per normal force
 };
 
-/// Simbody force element: spring, damper and regularised Coulomb friction at a list of points that is changed only between steps.
+/// Simbody force element: spring, damper and regularised Coulomb friction and rolling resistance at a list of points that is changed only between steps.
 class RestingForce : public SimTK::Force::Custom::Implementation {
  public:
   explicit RestingForce(const SimTK::SimbodyMatterSubsystem& matter) : matter_(matter) {}

@@ -27,7 +27,6 @@ using SimTK::Transform;
 using Point = SimTK::Vec3;
 
 constexpr double kSlowest = 0.01;         // m/s; a touch slower than this is not an impact (a fall from 5 um)
-constexpr double kContactStep = 5e-4;     // s; while something touches
 constexpr double kTogether = 1e-4;        // s; touches nearer in time than this are one impact (a Hertz contact lasts about as long)
 constexpr double kTouchDepth = 3e-7;      // m; how well the first instant of a touch is found
 constexpr double kTouchTime = 2e-7;       // s; the same in time
@@ -55,11 +54,11 @@ class Simulator {
   Simulation run(const std::function<void(double)>& progress);
 
  private:
-  void record_poses(bool always);
+  void record_poses(bool fixed_as_well);
   std::vector<OldPoint> find_old(const Snapshot& now, const std::vector<TouchPoint>& touches) const;
   bool is_old(const TouchPoint& touch, const Snapshot& now, double approach) const;
   void remember(const Snapshot& now, const std::vector<TouchPoint>& touches);
-  std::vector<TouchPoint> find_fresh(const Snapshot& now) const;
+  std::vector<TouchPoint> find_fresh(const Snapshot& now, double faster_than) const;
   Step calc_step(double step_s);
   void strike();
   void emit(const std::vector<ImpactPoint>& points, const std::vector<TouchPoint>& touches, const Snapshot& before);
@@ -110,45 +109,47 @@ void Simulator::remember(const Snapshot& now, const std::vector<TouchPoint>& tou
   for (const TouchPoint& t : touches) recent_.push_back({t.a, t.b, ~now.poses[t.a] * t.where, time});
 }
 
-std::vector<TouchPoint> Simulator::find_fresh(const Snapshot& now) const {
+/// Touches that were not there when the step began and approach faster than that.
+std::vector<TouchPoint> Simulator::find_fresh(const Snapshot& now, double faster_than) const {
   std::vector<TouchPoint> fresh;
   for (const TouchPoint& t : engine_.find_touches(now.poses)) {
     const double approach = calc_approach(engine_, now, t);
-    if (approach > kSlowest && !is_old(t, now, approach)) fresh.push_back(t);
+    if (approach > faster_than && !is_old(t, now, approach)) fresh.push_back(t);
   }
   return fresh;
 }
 
-/// One step, or less when a fresh touch comes in between: then up to its first instant.
+/// One step, or less when a fresh touch comes in between: then up to its first instant. It is an impact if it is fast even there (a body set
+/// down with no gap gains speed within the step).
 Step Simulator::calc_step(double step_s) {
-  double low = 0.0, step = step_s, creep = 2e-6;
-  double high = SimTK::Infinity;
-  State touching;
-  for (int attempt = 0; attempt < 80; ++attempt) {
-    State state = engine_.calc_advanced(state_, step);
+  double low = 0.0, high = SimTK::Infinity, step = step_s, creep = 2e-6;
+  Step touch;
+  for (int attempt = 0; attempt < 80 && high - low > kTouchTime; ++attempt) {
+    const State state = engine_.calc_advanced(state_, step);
     ++result_.steps;
     const Snapshot now = engine_.calc_snapshot(state);
-    const auto fresh = find_fresh(now);
+    const auto fresh = find_fresh(now, attempt == 0 ? kSlowest : 0.0);
+    if (fresh.empty() && attempt == 0) return {state, false};
     if (fresh.empty()) {
-      if (high == SimTK::Infinity) return {state, false};
       low = step;
       step = std::min(low + creep, 0.5 * (low + high));
       creep *= 8;
-    } else {
-      double deepest = 0.0, earlier = 0.0;
-      for (const TouchPoint& t : fresh) {
-        deepest = std::max(deepest, t.depth_m);
-        earlier = std::max(earlier, t.depth_m / calc_approach(engine_, now, t));
-      }
-      high = step;
-      touching = state;
-      if (deepest <= kTouchDepth) return {touching, true};
-      step = high - earlier + 0.5 * kTouchTime;
-      if (step <= low || step >= high) step = 0.5 * (low + high);
+      continue;
     }
-    if (high - low <= kTouchTime) break;
+    double deepest = 0.0, earlier = 0.0, fastest = 0.0;
+    for (const TouchPoint& t : fresh) {
+      const double approach = calc_approach(engine_, now, t);
+      deepest = std::max(deepest, t.depth_m);
+      earlier = std::max(earlier, t.depth_m / approach);
+      fastest = std::max(fastest, approach);
+    }
+    high = step;
+    touch = {state, fastest > kSlowest};
+    if (deepest <= kTouchDepth) break;
+    step = high - earlier + 0.5 * kTouchTime;
+    if (step <= low || step >= high) step = 0.5 * (low + high);
   }
-  return {touching, true};
+  return touch;
 }
 
 /// Solves the impact at the present instant and notes its pulses.
@@ -252,12 +253,13 @@ void Simulator::emit_spot(const std::vector<const ImpactPoint*>& points, double 
   }
 }
 
-void Simulator::record_poses(bool always) {
+void Simulator::record_poses(bool fixed_as_well) {
   const double now_s = state_.getTime();
   const Snapshot now = engine_.calc_snapshot(state_);
   for (std::size_t i = 0; i < now.poses.size(); ++i) {
     auto& path = result_.poses[i];
-    if (!always && (engine_.is_fixed(static_cast<int>(i)) || now_s - path.back().time_s < kPoseInterval * (1 - 1e-9))) continue;
+    if (engine_.is_fixed(static_cast<int>(i)) && !fixed_as_well) continue;
+    if (!path.empty() && path.back().time_s == now_s) continue;
     const auto q = now.poses[i].R().convertRotationToQuaternion();
     const Point& p = now.poses[i].p();
     path.push_back({now_s, {p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}});
@@ -269,37 +271,36 @@ Simulation Simulator::run(const std::function<void(double)>& progress) {
   result_.poses.resize(engine_.world().bodies.size());
   record_poses(true);
   double reported = 0.0;
-  while (duration_s_ - state_.getTime() > 1e-9) {
+  std::int64_t next_pose = 1;
+  while (duration_s_ - state_.getTime() > kTouchTime) {
     const Snapshot now = engine_.calc_snapshot(state_);
     const auto touches = engine_.find_touches(now.poses);
     old_ = find_old(now, touches);
     remember(now, touches);
     engine_.set_resting(touches);
-    double step = std::min(engine_.calc_largest_step(now), duration_s_ - state_.getTime());
-    if (!touches.empty()) step = std::min(step, kContactStep);
+    // To the next pose at most, which are on a grid.
+    while (static_cast<double>(next_pose) * kPoseInterval <= state_.getTime() + kTouchTime) ++next_pose;
+    const double until = std::min(duration_s_, static_cast<double>(next_pose) * kPoseInterval);
+    const double step = std::min(until - state_.getTime(), engine_.calc_largest_step(now, !touches.empty()));
+    bool impact = false;
     if (stuck_ > 30) {
       // Impacts that leave each other no time (a body wedged in): let the soft force have it for a moment.
       state_ = engine_.calc_advanced(state_, std::min(step, kTogether));
       stuck_ = 0;
     } else {
-      Step next = calc_step(step);
-      stuck_ = next.impact && next.state.getTime() - state_.getTime() < 1e-6 ? stuck_ + 1 : 0;
+      const Step next = calc_step(step);
+      impact = next.impact;
+      stuck_ = impact && next.state.getTime() - state_.getTime() < 1e-6 ? stuck_ + 1 : 0;
       state_ = next.state;
-      if (next.impact) strike();
+      if (impact) strike();
     }
-    record_poses(false);
+    if (impact || state_.getTime() > until - kTouchTime) record_poses(false);
     const double fraction = state_.getTime() / duration_s_;
     if (progress && fraction >= reported + 0.01) progress(reported = std::min(fraction, 1.0));
   }
-  if (duration_s_ > 0.0) {
-    if (result_.poses.size() && state_.getTime() > 0.0) {
-      for (auto& path : result_.poses) {
-        if (path.size() > 1 && path.back().time_s == state_.getTime()) path.pop_back();
-      }
-      record_poses(true);
-    }
-  }
-  std::stable_sort(result_.impulses.begin(), result_.impulses.end(), [](const Impulse& x, const Impulse& y) { return x.time_s < y.time_s; });
+  record_poses(true);
+  const auto earlier = [](const Impulse& x, const Impulse& y) { return x.time_s < y.time_s; };
+  std::stable_sort(result_.impulses.begin(), result_.impulses.end(), earlier);
   result_.seconds_cpu = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   if (progress) progress(1.0);
   return std::move(result_);

@@ -22,6 +22,8 @@ using Node = SimTK::ContactGeometry::TriangleMesh::OBBTreeNode;
 
 constexpr double kFlat = 0.02;  // rad; how far below the plane a neighbour may point: a flat face that lands nearly flat lands with all of itself
 
+constexpr double kBrim = 1e-4;  // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
+
 /// Does vertex v carry against a plane with this outward normal (frame of the surface)?
 bool carries(const Surface& surface, int v, const Vec3& normal) {
   for (const int w : surface.neighbours(v)) {
@@ -57,21 +59,47 @@ std::set<int> find_vertices(const Surface& surface, const std::set<int>& faces) 
   return vertices;
 }
 
+/// A face of `theirs` that vertex v of `mine` (at x, frame of theirs) has gone through, if there is one on which it carries. The nearest face is
+/// not always the one: on a box that stands flush on another, the corners are nearer to the side than to the top.
+bool find_carrying_face(const Surface& mine, int v, const Surface& theirs, const Vec3& x, const SimTK::Rotation& R_theirs_mine,
+                        const std::set<int>& their_faces, TouchPoint& touch) {
+  bool inside = false;
+  int face = 0;
+  SimTK::Vec2 uv;
+  const auto& mesh = theirs.mesh();
+  const Vec3 nearest = mesh.findNearestPoint(x, inside, face, uv);
+  const double brim = kBrim * mine.size_m();
+  if (!inside && (x - nearest).norm() > brim) return false;
+  if (inside && carries(mine, v, ~R_theirs_mine * Vec3(mesh.getFaceNormal(face)))) {
+    touch.plane_point = nearest;
+    touch.plane_normal = Vec3(mesh.getFaceNormal(face));
+    return true;
+  }
+  double least = 0.05 * mine.size_m();
+  bool found = false;
+  for (const int f : their_faces) {
+    const Vec3 n(mesh.getFaceNormal(f));
+    const double depth = dot(n, mesh.getVertexPosition(mesh.getFaceVertex(f, 0)) - x);
+    if (depth <= 0.0 || depth >= least) continue;
+    const Vec3 on_plane = x + depth * n;
+    if ((mesh.findNearestPointToFace(on_plane, f, uv) - on_plane).norm() > brim || !carries(mine, v, ~R_theirs_mine * n)) continue;
+    least = depth;
+    touch.plane_point = on_plane;
+    touch.plane_normal = n;
+    found = true;
+  }
+  return found;
+}
+
 /// Vertices of `mine` inside `theirs`.
 void add_vertex_touches(TouchPoint base, int kind, const Surface& mine, const Surface& theirs, const Transform& X_theirs_mine,
-                        const std::set<int>& faces, std::vector<TouchPoint>& out) {
+                        const std::set<int>& faces, const std::set<int>& their_faces, std::vector<TouchPoint>& out) {
   for (const int v : find_vertices(mine, faces)) {
-    const Vec3 x = X_theirs_mine * mine.vertex(v);
-    bool inside = false;
-    UnitVec3 normal;
-    const Vec3 nearest = theirs.mesh().findNearestPoint(x, inside, normal);
-    if (!inside || !carries(mine, v, ~X_theirs_mine.R() * Vec3(normal))) continue;
     TouchPoint t = base;
+    if (!find_carrying_face(mine, v, theirs, X_theirs_mine * mine.vertex(v), X_theirs_mine.R(), their_faces, t)) continue;
     t.feature = {kind, v, 0};
     t.plane_on_b = kind == 0;
     t.station = mine.vertex(v);
-    t.plane_point = nearest;
-    t.plane_normal = Vec3(normal);
     out.push_back(t);
   }
 }
@@ -174,8 +202,8 @@ std::vector<TouchPoint> find_touches(int a, const Surface& sa, const Transform& 
   TouchPoint base;
   base.a = a;
   base.b = b;
-  add_vertex_touches(base, 0, sa, sb, X_ba, faces_a, out);
-  add_vertex_touches(base, 1, sb, sa, ~X_ba, faces_b, out);
+  add_vertex_touches(base, 0, sa, sb, X_ba, faces_a, faces_b, out);
+  add_vertex_touches(base, 1, sb, sa, ~X_ba, faces_b, faces_a, out);
   add_ridge_touches(base, sa, sb, X_ba, faces_a, faces_b, out);
   for (TouchPoint& t : out) place_touch(t, X_a, X_b);
   return out;
@@ -209,14 +237,25 @@ double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, 
       for (int k = 0; k < 3; ++k) {
         const Vec3 p = X * mine.vertex(mine.mesh().getFaceVertex(f, k));
         const Vec3 d = X * mine.vertex(mine.mesh().getFaceVertex(f, (k + 1) % 3)) - p;
-        double distance = SimTK::Infinity;
+        const double length = d.norm();
+        const UnitVec3 along(d);
+        double enter = SimTK::Infinity, leave = SimTK::Infinity;
         UnitVec3 normal;
-        if (!theirs.mesh().intersectsRay(p, UnitVec3(d), distance, normal) || distance > d.norm()) continue;
-        const double along = std::min(distance, d.norm() - distance);
-        const double depth = along * std::abs(dot(Vec3(normal), d)) / d.norm();
-        if (depth > deepest) {
+        if (!theirs.mesh().intersectsRay(p, along, enter, normal) || enter > length) continue;
+        if (dot(Vec3(normal), d) > 0.0) {  // it began inside
+          leave = enter;
+          enter = 0.0;
+        } else {
+          UnitVec3 other;
+          const double past = enter + 1e-9 * length;
+          if (theirs.mesh().intersectsRay(p + past * Vec3(along), along, leave, other)) leave += past;
+        }
+        const Vec3 middle = p + 0.5 * (enter + std::min(leave, length)) * Vec3(along);
+        bool inside = false;
+        const double depth = (theirs.mesh().findNearestPoint(middle, inside, normal) - middle).norm();
+        if (inside && depth > deepest) {
           deepest = depth;
-          where = X_theirs * (p + d * (distance / d.norm()));
+          where = X_theirs * middle;
         }
       }
     }
