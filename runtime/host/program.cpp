@@ -88,6 +88,16 @@ std::map<fs::path, std::unique_ptr<bank::Bank>> read_banks(Scene& scene) {
   return banks;
 }
 
+contact::Simulation simulate(const Scene& scene, const contact::WorldSpec& world, bool quiet) {
+  try {
+    return contact::simulate(world, scene.duration_s, Progress("physics", quiet));
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
+  } catch (const SolveError& error) {
+    throw SolveError(fmt::format("{}: {}", scene.file.string(), error.what()));
+  }
+}
+
 void print_summary(const Scene& scene, const Sound& sound, const Figures& figures) {
   fmt::print("bodies             {}\n", figures.bodies);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
@@ -154,7 +164,7 @@ void run(const ProgramOptions& options) {
   Figures figures;
   figures.bodies = scene.bodies.size();
   auto started = Clock::now();
-  const contact::Simulation simulation = contact::simulate(world, scene.duration_s, Progress("physics", options.quiet));
+  const contact::Simulation simulation = simulate(scene, world, options.quiet);
   figures.physics_s = get_seconds_since(started);
   started = Clock::now();
   const Sound sound = calc_sound(scene, body_banks, simulation, scene.sample_rate_hz, Progress("sound", options.quiet));

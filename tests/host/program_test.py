@@ -185,6 +185,9 @@ class RenderProgram(unittest.TestCase):
         self.assert_refused(render(scene, "-o", out), 2, "key.json:", "grond", "ground")
         self.assert_refused(render(self.root / "nowhere.json", "-o", out), 2, "nowhere.json")
         self.assert_refused(render(self.root, "-o", out), 2, str(self.root))
+        scene = self.scene("overlap.json", bodies=[{"name": n, "bank": "cube.h5", "position_m": [x, x, 1], "rotation_deg": [x * 300, 0, 0]}
+                                                for n, x in (("one", 0), ("two", 0.03))])
+        self.assert_refused(render(scene, "-o", out), 2, "overlap.json", "one", "two")
         self.assertFalse(out.exists())
 
     def test_bad_outputs_are_found_before_the_simulation(self):
