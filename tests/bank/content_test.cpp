@@ -73,6 +73,25 @@ TEST(Faults, ASaneBankHasNone) {
   EXPECT_EQ(find_faults(example::make_bank(5, 40)), std::vector<std::string>{});
 }
 
+TEST(Faults, AHollowBodyWithItsInnerSkinHasNone) {
+  Bank bank = example::make_bank(2, 3);
+  const std::vector<Vec3> outer = bank.vertices_m;
+  const auto skin = bank.triangles;
+  const auto count = static_cast<std::int32_t>(outer.size());
+  for (const Vec3& x : outer) {
+    Vec3 inner;
+    for (int k = 0; k < 3; ++k) inner[k] = (x[k] + bank.rigid.centre_m[k]) / 2.0;
+    bank.vertices_m.push_back(inner);
+  }
+  for (const auto& t : skin) bank.triangles.push_back({t[0] + count, t[2] + count, t[1] + count});
+  bank.rigid.volume_m3 *= 1.0 - 1.0 / 8.0;
+  bank.rigid.mass_kg *= 1.0 - 1.0 / 8.0;
+  for (double& moment : bank.rigid.inertia_kg_m2) moment *= 1.0 - 1.0 / 32.0;
+  bank.counts.nodes = 2 * count;
+  quantise_shapes(bank, example::calc_shapes(bank));
+  EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
+}
+
 struct Spoiled {
   const char* name;
   std::function<void(Bank&)> spoil;
