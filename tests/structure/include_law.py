@@ -40,7 +40,7 @@ LAW = {
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
-    "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "json", "cli", "cgal", "openvdb"]),
+    "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "json", "cli", "eigen", "cgal", "openvdb"]),
     "precompute/petsc": (["runtime/config"], ["fmt", "mpi", "petsc"]),
     "precompute/fem": (["runtime/config", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc"], ["fmt", "mpi", "petsc", "eigen"]),
     "precompute/eigen": (["runtime/config", "partition", "precompute/petsc"], ["fmt", "mpi", "petsc", "mumps", "cholmod", "eigen"]),
