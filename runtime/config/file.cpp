@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 
@@ -71,13 +72,15 @@ std::string read_file(const fs::path& file, std::string_view what, std::uint64_t
 }
 
 void write_file(const fs::path& file, std::string_view bytes) {
-  const fs::path temporary = folder_of(file) / fmt::format(".{}.tmp.{}", file.filename().string(), ::getpid());
+  static std::atomic<unsigned> count{0};  // two threads that write one name must not share a temporary file
+  const fs::path temporary = folder_of(file) / fmt::format(".{}.tmp.{}.{}", file.filename().string(), ::getpid(), count++);
   const auto refuse = [&](int error) {
     ::unlink(temporary.c_str());
     throw SystemError(
         fmt::format("{}: cannot write: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(error)));
   };
-  Descriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  ::unlink(temporary.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
+  Descriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (fd.get() < 0) refuse(errno);
   std::size_t done = 0;
   while (done < bytes.size()) {
