@@ -71,7 +71,7 @@ class VtuReader {
   void parse_xml();
   VtuEncoding read_encoding(const pugi::xml_node& root) const;
   std::size_t place_of(const pugi::xml_node& node) const;
-  std::size_t read_size(const pugi::xml_node& node, const char* key) const;
+  std::size_t read_size(const pugi::xml_node& node, const char* key, std::int64_t most = INT32_MAX) const;
   pugi::xml_node find_array(const Piece& piece, const char* parent, const char* name) const;
   template <class T>
   std::vector<T> read_array(const pugi::xml_node& array, std::size_t count);
@@ -145,13 +145,13 @@ VtuEncoding VtuReader::read_encoding(const pugi::xml_node& root) const {
   return encoding;
 }
 
-std::size_t VtuReader::read_size(const pugi::xml_node& node, const char* key) const {
+std::size_t VtuReader::read_size(const pugi::xml_node& node, const char* key, std::int64_t most) const {
   const std::string text = node.attribute(key).as_string();
   Cursor number(text, file_.name());
   try {
-    return static_cast<std::size_t>(number.text_int(key, 0, INT32_MAX));
+    return static_cast<std::size_t>(number.text_int(key, 0, most));
   } catch (const InputError&) {
-    file_.fail(place_of(node), "{} is {}; it has to be a whole number from 0 to 2147483647", key, quote_excerpt(text));
+    file_.fail(place_of(node), "{} is {}; it has to be a whole number from 0 to {}: write the mesh again", key, quote_excerpt(text), most);
   }
 }
 
@@ -166,8 +166,7 @@ pugi::xml_node VtuReader::find_array(const Piece& piece, const char* parent, con
 template <class T>
 std::vector<T> VtuReader::read_array(const pugi::xml_node& array, std::size_t count) {
   const std::string format = array.attribute("format").as_string("ascii");
-  // as_ullong stops at the first character that is no digit; an absent offset is beyond every file.
-  const std::uint64_t offset = array.attribute("offset").as_ullong(std::numeric_limits<std::uint64_t>::max());
+  const std::uint64_t offset = format == "appended" ? read_size(array, "offset", INT64_MAX) : 0;
   return data_->read<T>(array.attribute("Name").as_string("Points"), array.attribute("type").as_string(), format, array.child_value(),
                         offset, count, place_of(array));
 }
