@@ -14,6 +14,7 @@ namespace carillon::mesher {
 struct DelaunaySizes {
   double edge_m = 0;      // about the length of the edges
   double distance_m = 0;  // farthest that a boundary face's middle may lie from the true surface
+  std::size_t most_nodes = 0;  // refinement stops there with whatever it has
 };
 
 /// One mesh in the making: refine makes it anew for given sizes, optimise removes its slivers.

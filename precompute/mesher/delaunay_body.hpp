@@ -39,9 +39,12 @@ class Mesh3Body : public DelaunayBody {
     const double radius = kRadiusPerEdge * sizes.edge_m;
     const Criteria criteria(p::edge_size = sizes.edge_m, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
                             p::cell_radius_edge_ratio = 2, p::cell_size = radius);
-    if (has_curves_) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria);
+    // A bound on the nodes ends what would otherwise go on for ever: balls between curves that nearly touch.
+    CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
+    if (has_curves_) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
     insert_first_points(sizes.edge_m);
-    CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold());
+    CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
+                        p::mesh_3_options(p::maximal_number_of_vertices = sizes.most_nodes, p::pointer_to_error_code = &unused));
     return extract();
   }
 

@@ -12,6 +12,7 @@
 #include "precompute/mesher/distance_field.hpp"
 #include "precompute/mesher/inset_curves.hpp"
 #include "precompute/mesher/nearest.hpp"
+#include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
@@ -162,8 +163,31 @@ std::unique_ptr<DelaunayBody> make_delaunay(const Body& body, const SurfaceOptio
   return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.mended.surface, curves);
 }
 
-DelaunaySizes calc_sizes(const Body& body, double edge_m) {
-  return {edge_m, body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m};
+DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m) {
+  const double distance = body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m;
+  // Far more than any body needs at this edge length, so that only a runaway meets it.
+  const double most = 5000 + 8 * std::max(body.model.calc_nodes(edge_m), static_cast<double>(options.nodes.value_or(0)));
+  return {edge_m, distance, static_cast<std::size_t>(std::min(most, 3 * kMostNodes))};
+}
+
+/// The point of the body's nearest skin.
+Vec3 project(const Body& body, Vec3 p) {
+  if (!body.field) return body.nearest->find(p);
+  const DistanceField& field = *body.field;
+  const double level = field.calc_distance(p) < -0.5 * body.wall_m && body.wall_m > 0 ? -body.wall_m : 0;
+  for (int n = 0; n < 3; ++n) {
+    Vec3 gradient{};
+    for (int c = 0; c < 3; ++c) {
+      Vec3 low = p, high = p;
+      low[c] -= 0.5 * field.voxel_m;
+      high[c] += 0.5 * field.voxel_m;
+      gradient[c] = (field.calc_distance(high) - field.calc_distance(low)) / field.voxel_m;
+    }
+    const double square = dot(gradient, gradient);
+    if (square < 0.1) break;  // on the skeleton of the body, where no skin is nearest
+    p = p - ((field.calc_distance(p) - level) / square) * gradient;
+  }
+  return p;
 }
 
 /// Makes meshes with make(edge) until the count is within kCountAim, then returns the best edge; the last mesh made is the one of that
@@ -185,9 +209,10 @@ mesh::TetMesh search_edge(const SurfaceOptions& options, CountModel model, doubl
     // The model, scaled to the last count, says where to go; the bracket keeps it from leaving what is known.
     (count > target ? low : high) = edge_m;
     model.factor *= count / model.calc_nodes(edge_m);
+    const bool bracketed = low > 0 && high < 1e300;
+    if (attempt + 1 == kMostAttempts || (bracketed && high / low < 1.004)) break;
     edge_m = model.find_edge(target);
-    if (high < 1e300 && low > 0 && !(edge_m > low * 1.002 && edge_m < high / 1.002)) edge_m = std::sqrt(low * high);
-    if (high < 1e300 && low > 0 && high / low < 1.004) break;
+    if (bracketed && !(edge_m > low * 1.002 && edge_m < high / 1.002)) edge_m = std::sqrt(low * high);
   }
   if (best_error > kCountTolerance)
     throw InputError(fmt::format(
@@ -195,12 +220,10 @@ mesh::TetMesh search_edge(const SurfaceOptions& options, CountModel model, doubl
         100 * best_error, fewest > target ? "more" : "less or more",
         fewest > target ? fmt::format("the body's shape{} needs at least about {:.0f}", options.wall_m ? " and wall" : "", fewest)
                         : std::string("try another count")));
-  if (edge_m != best_edge || true) {
-    edge_m = best_edge;
-    mesh = make(edge_m);
-    ++report.attempts;
-  }
-  return mesh;
+  if (edge_m == best_edge) return mesh;
+  edge_m = best_edge;
+  ++report.attempts;
+  return make(edge_m);
 }
 
 /// The linear mesh by Delaunay refinement.
@@ -211,7 +234,7 @@ mesh::TetMesh make_delaunay_mesh(const Body& body, const SurfaceOptions& options
       edge_m = first_edge;
       auto delaunay = phases.run("finding sharp edges", [&] { return make_delaunay(body, options, edge_m, keep_sharp, report); });
       mesh::TetMesh mesh = phases.run("refining", [&] {
-        const auto make = [&](double edge) { return delaunay->refine(calc_sizes(body, edge)); };
+        const auto make = [&](double edge) { return delaunay->refine(calc_sizes(body, options, edge)); };
         if (options.nodes) return search_edge(options, body.model, edge_m, report, make);
         ++report.attempts;
         return make(edge_m);
@@ -313,7 +336,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
-  if (body.wall_m > 0) body.nearest.emplace(surface);
+  body.nearest.emplace(surface);
   if (body.wall_m > 0 || !body.mended.clean || report.method == Method::kStuffing)
     body.field = phases.run("computing distances", [&] { return make_field(body, options, edge); });
   report.expected_volume_m3 = body.field ? calc_volume(*body.field, body.wall_m) : report.input_volume_m3;
@@ -336,6 +359,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     if (linear.tets.empty())
       throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
                                    options.surface.string(), edge));
+    better_flat_elements(linear, kSliverDeg, [&](const Vec3& p) { return project(body, p); });
     measure_mesh(linear, body, report);
     if (!(report.volume_m3 > 0.6 * report.expected_volume_m3))
       throw InputError(

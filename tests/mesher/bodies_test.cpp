@@ -1,0 +1,184 @@
+// Meshes of bodies whose volume, wall and edges are known in closed form.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "precompute/mesh/check.hpp"
+#include "precompute/mesher/surface.hpp"
+#include "tests/mesher/surfaces.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+using namespace testing;
+
+/// Volume by the determinant, independent of the report's.
+double calc_volume_of(const mesh::TetMesh& m) {
+  double sum = 0;
+  for (std::int64_t e = 0; e < m.tet_count(); ++e) {
+    const auto t = m.tet(e);
+    double a[3][3];
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) a[r][c] = m.nodes[t[r + 1]][c] - m.nodes[t[0]][c];
+    const double det = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) - a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+                       a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
+    EXPECT_GT(det, 0) << "element " << e;
+    sum += det / 6;
+  }
+  return sum;
+}
+
+/// Every face of one element only is on the boundary; every edge of such faces must have exactly two of them. All nodes are used.
+void expect_sound(const mesh::TetMesh& m) {
+  std::map<std::array<std::int32_t, 3>, std::array<int, 1>> faces;
+  std::set<std::int32_t> used;
+  for (std::int64_t e = 0; e < m.tet_count(); ++e) {
+    const auto t = m.tet(e);
+    used.insert(t.begin(), t.end());
+    for (int skip = 0; skip < 4; ++skip) {
+      std::array<std::int32_t, 3> f{};
+      for (int c = 0, n = 0; c < 4; ++c)
+        if (c != skip) f[n++] = t[c];
+      std::sort(f.begin(), f.end());
+      ++faces[f][0];
+    }
+  }
+  std::map<std::array<std::int32_t, 2>, int> edges;
+  for (const auto& [f, count] : faces) {
+    ASSERT_LE(count[0], 2);
+    if (count[0] == 1) ++edges[{f[0], f[1]}], ++edges[{f[1], f[2]}], ++edges[{f[0], f[2]}];
+  }
+  for (const auto& [edge, count] : edges) EXPECT_EQ(count, 2) << edge[0] << " " << edge[1];
+  EXPECT_EQ(used.size(), m.nodes.size());
+  EXPECT_EQ(m.regions.size(), static_cast<std::size_t>(m.tet_count()));
+  mesh::TetMesh copy = m;
+  const auto check = mesh::check_mesh(copy, "the mesher's");
+  EXPECT_EQ(check.reoriented + check.unreferenced + check.welded, 0);
+}
+
+void expect_count(const mesh::TetMesh& m, std::int64_t target) {
+  EXPECT_NEAR(static_cast<double>(m.nodes.size()), static_cast<double>(target), 0.1 * static_cast<double>(target));
+}
+
+TEST(bodies, sphere_of_an_off_file_converges_to_its_volume) {
+  const auto path = write_text("sphere.off", to_off(make_sphere(0.05, 5)));
+  const double exact = 4 * std::numbers::pi / 3 * std::pow(0.05, 3);
+  double last = 1;
+  for (const std::int64_t nodes : {500, 3000}) {
+    SurfaceReport report;
+    const auto m = mesh_surface({.surface = path, .nodes = nodes}, report);
+    expect_sound(m);
+    expect_count(m, nodes);
+    const double error = std::abs(calc_volume_of(m) / exact - 1);
+    EXPECT_LT(error, last / 2);
+    EXPECT_GT(report.min_dihedral_deg, 8);
+    EXPECT_EQ(report.sharp_curves, 0);
+    last = error;
+  }
+  EXPECT_LT(last, 0.02);
+}
+
+TEST(bodies, cube_keeps_its_twelve_edges_and_eight_corners) {
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = write_text("cube.obj", to_obj(make_box(1, 1, 1))), .nodes = 3000}, report);
+  expect_sound(m);
+  expect_count(m, 3000);
+  EXPECT_NEAR(calc_volume_of(m), 1, 1e-3);
+  int corners = 0, on_edges = 0;
+  for (const auto& p : m.nodes) {
+    int at_sides = 0;
+    for (const double x : p) at_sides += std::abs(x) < 1e-9 || std::abs(x - 1) < 1e-9;
+    corners += at_sides == 3;
+    on_edges += at_sides == 2;
+  }
+  EXPECT_EQ(corners, 8);
+  EXPECT_GT(on_edges, 12 * 5);
+  EXPECT_EQ(report.sharp_curves, 12);
+  EXPECT_NEAR(report.sharp_edges_m, 12, 1e-9);
+}
+
+TEST(bodies, hollow_cube_keeps_the_edges_of_both_skins) {
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = write_text("cube2.obj", to_obj(make_box(1, 1, 1))), .wall_m = 0.1, .nodes = 2500}, report);
+  expect_sound(m);
+  expect_count(m, 2500);
+  EXPECT_NEAR(calc_volume_of(m), 1 - 0.8 * 0.8 * 0.8, 2e-3);
+  int inner_corners = 0;
+  for (const auto& p : m.nodes) {
+    int at = 0;
+    for (const double x : p) at += std::abs(x - 0.1) < 1e-3 || std::abs(x - 0.9) < 1e-3;
+    inner_corners += at == 3;
+  }
+  EXPECT_GE(inner_corners, 8);
+  EXPECT_NEAR(report.wall_mean_m, 0.1, 1e-3);
+}
+
+TEST(bodies, hollow_sphere_has_the_wall_and_the_volume_of_two_spheres) {
+  const auto path = write_text("hollow.off", to_off(make_sphere(0.05, 5)));
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = path, .wall_m = 0.008, .nodes = 3000}, report);
+  expect_sound(m);
+  expect_count(m, 3000);
+  const double exact = 4 * std::numbers::pi / 3 * (std::pow(0.05, 3) - std::pow(0.042, 3));
+  EXPECT_NEAR(calc_volume_of(m) / exact, 1, 0.02);
+  for (const auto& p : m.nodes) {
+    const double r = std::hypot(p[0], p[1], p[2]);
+    EXPECT_GT(r, 0.042 - 1e-4);
+    EXPECT_LT(r, 0.05 + 1e-4);
+  }
+  EXPECT_NEAR(report.wall_mean_m, 0.008, 1e-4);
+  EXPECT_NEAR(report.wall_min_m, 0.008, 2e-4);
+}
+
+TEST(bodies, stuffing_fills_a_hollow_sphere_within_the_count) {
+  const auto path = write_text("stuffed.off", to_off(make_sphere(0.05, 4)));
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = path, .wall_m = 0.01, .nodes = 3000, .method = Method::kStuffing}, report);
+  expect_sound(m);
+  expect_count(m, 3000);
+  const double exact = 4 * std::numbers::pi / 3 * (std::pow(0.05, 3) - std::pow(0.04, 3));
+  EXPECT_NEAR(calc_volume_of(m) / exact, 1, 0.05);
+  EXPECT_GT(report.min_dihedral_deg, 5);
+}
+
+TEST(bodies, second_order_counts_the_mid_side_nodes_and_puts_them_in_the_middle) {
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = write_text("cube3.off", to_off(make_box(0.3, 0.1, 0.2))), .nodes = 4000, .order = 2}, report);
+  EXPECT_EQ(m.order, 2);
+  expect_sound(m);
+  expect_count(m, 4000);
+  constexpr int kEnds[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+  for (std::int64_t e = 0; e < m.tet_count(); ++e)
+    for (int k = 0; k < 6; ++k)
+      for (int c = 0; c < 3; ++c)
+        ASSERT_NEAR(m.nodes[m.tet(e)[4 + k]][c], 0.5 * (m.nodes[m.tet(e)[kEnds[k][0]]][c] + m.nodes[m.tet(e)[kEnds[k][1]]][c]), 1e-15);
+}
+
+TEST(bodies, the_same_input_gives_the_same_mesh) {
+  const SurfaceOptions options{.surface = write_text("twice.off", to_off(make_sphere(0.05, 3))), .wall_m = 0.01, .nodes = 1200};
+  SurfaceReport first, second;
+  const auto a = mesh_surface(options, first), b = mesh_surface(options, second);
+  EXPECT_EQ(a.nodes, b.nodes);
+  EXPECT_EQ(a.tets, b.tets);
+}
+
+TEST(bodies, hollow_bunny_is_one_piece_with_a_closed_boundary) {
+  const std::filesystem::path bunny = "/usr/share/glmark2/models/bunny.obj";
+  if (!std::filesystem::exists(bunny)) GTEST_SKIP() << "glmark2-data is not installed";
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = bunny, .wall_m = 0.005, .height_m = 0.13, .nodes = 4000}, report);
+  expect_sound(m);
+  expect_count(m, 4000);
+  EXPECT_NEAR(report.extent_m[1], 0.13, 1e-9);
+  EXPECT_NEAR(calc_volume_of(m) / report.expected_volume_m3, 1, 0.03);
+  EXPECT_GT(report.min_dihedral_deg, 5);
+  mesh::TetMesh copy = m;
+  EXPECT_EQ(mesh::check_mesh(copy, "bunny").components, 1);
+}
+
+}  // namespace
+}  // namespace carillon::mesher

@@ -1,0 +1,168 @@
+// What the mesher reads, mends and refuses.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/mesher/surface.hpp"
+#include "runtime/config/error.hpp"
+#include "tests/mesher/surfaces.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+using namespace testing;
+
+TEST(input, five_formats_give_the_same_body) {
+  const Polygons box = make_box(0.5, 0.25, 0.125);  // exact in single precision
+  const std::pair<const char*, std::string> files[] = {{"box.off", to_off(box)},        {"box.obj", to_obj(box)},         {"box.PLY", to_ply(box)},
+                                                       {"box_ascii.stl", to_stl(box)},  {"box_bin.stl", to_binary_stl(box)}, {"box_bin.ply", to_binary_ply(box)}};
+  for (const auto& [name, text] : files) {
+    SCOPED_TRACE(name);
+    SurfaceReport report;
+    const auto m = mesh_surface({.surface = write_text(name, text), .nodes = 600}, report);
+    EXPECT_EQ(report.input_vertices, 8);
+    EXPECT_EQ(report.input_triangles, 12);
+    EXPECT_EQ(report.sharp_curves, 12);
+    EXPECT_NEAR(report.input_volume_m3, 0.5 * 0.25 * 0.125, 1e-9);
+    EXPECT_NEAR(static_cast<double>(m.nodes.size()), 600, 60);
+  }
+}
+
+TEST(input, height_is_measured_along_the_chosen_axis_and_scale_multiplies) {
+  const auto path = write_text("tall.obj", to_obj(make_box(1, 2, 4)));
+  SurfaceReport report;
+  mesh_surface({.surface = path, .height_m = 0.2, .nodes = 400}, report);
+  EXPECT_NEAR(report.scale, 0.1, 1e-12);
+  mesh_surface({.surface = path, .height_m = 0.2, .up = Axis::kZ, .nodes = 400}, report);
+  EXPECT_NEAR(report.scale, 0.05, 1e-12);
+  mesh_surface({.surface = path, .scale = 0.001, .nodes = 400}, report);
+  EXPECT_NEAR(report.extent_m[2], 0.004, 1e-12);
+}
+
+TEST(input, a_hole_is_closed_and_said_so) {
+  Polygons box = make_box(1, 1, 1);
+  box.faces.pop_back();
+  SurfaceReport report;
+  mesh_surface({.surface = write_text("hole.off", to_off(box)), .nodes = 500}, report);
+  EXPECT_EQ(report.holes_closed, 1);
+  EXPECT_NEAR(report.volume_m3, 1, 1e-3);
+}
+
+TEST(input, mixed_orientation_duplicate_and_degenerate_triangles_are_mended) {
+  Polygons box = make_box(1, 1, 1);
+  for (const int f : {1, 4, 9}) std::swap(box.faces[f][0], box.faces[f][1]);
+  box.faces.push_back(box.faces[0]);
+  box.faces.push_back({0, 0, 3});
+  SurfaceReport report;
+  mesh_surface({.surface = write_text("mixed.off", to_off(box)), .nodes = 500}, report);
+  EXPECT_EQ(report.removed_triangles, 2);
+  EXPECT_EQ(report.flipped_triangles, 3);
+  EXPECT_NEAR(report.volume_m3, 1, 1e-3);
+}
+
+TEST(input, an_inside_out_surface_is_turned) {
+  Polygons box = make_box(1, 1, 1);
+  for (auto& f : box.faces) std::swap(f[0], f[1]);
+  SurfaceReport report;
+  mesh_surface({.surface = write_text("inside_out.off", to_off(box)), .nodes = 500}, report);
+  EXPECT_EQ(report.flipped_triangles, 12);
+  EXPECT_NEAR(report.volume_m3, 1, 1e-3);
+}
+
+TEST(input, two_boxes_that_pass_through_each_other_are_one_body) {
+  Polygons both = make_box(1, 1, 1);
+  for (auto p : make_box(1, 1, 1).points) both.points.push_back({p[0] + 0.5, p[1] + 0.25, p[2] + 0.25});
+  for (auto f : make_box(1, 1, 1).faces) {
+    for (int& v : f) v += 8;
+    both.faces.push_back(f);
+  }
+  SurfaceReport report;
+  mesh_surface({.surface = write_text("both.off", to_off(both)), .nodes = 3000}, report);
+  EXPECT_NEAR(report.volume_m3, 2 - 0.5 * 0.75 * 0.75, 0.04);
+}
+
+TEST(input, a_closed_cavity_stays_hollow) {
+  Polygons both = make_box(1, 1, 1);
+  for (auto p : make_box(0.5, 0.5, 0.5).points) both.points.push_back({p[0] + 0.25, p[1] + 0.25, p[2] + 0.25});
+  for (auto f : make_box(1, 1, 1).faces) {
+    std::swap(f[0], f[1]);
+    for (int& v : f) v += 8;
+    both.faces.push_back(f);
+  }
+  SurfaceReport report;
+  mesh_surface({.surface = write_text("cavity.off", to_off(both)), .nodes = 2000}, report);
+  EXPECT_NEAR(report.volume_m3, 1 - 0.125, 0.01);
+}
+
+TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
+  const std::string box = to_off(make_box(1, 1, 1));
+  Polygons open = make_box(1, 1, 1);
+  open.faces.resize(10);
+  Polygons sheet;
+  sheet.points = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  sheet.faces = {{0, 1, 2}, {0, 2, 3}};
+  std::string with_nan = box;
+  with_nan.replace(with_nan.find("\n1 0 0"), 6, "\n1e40 0 0");
+  std::string bad_index = box;
+  bad_index.replace(bad_index.rfind("1 7 5"), 5, "1 7 55");
+  struct Case {
+    const char* name;
+    std::string content;
+    SurfaceOptions options;
+    const char* words;
+  };
+  const auto surface = [](auto change) {
+    SurfaceOptions o;
+    o.nodes = 500;
+    change(o);
+    return o;
+  };
+  const auto plain = surface([](auto&) {});
+  const Case cases[] = {
+      {"b.step", box, plain, "not from '.step'"},
+      {"empty.off", "", plain, "the file is empty"},
+      {"text.obj", "no surface here\n", plain, "no triangles in it"},
+      {"points.off", "OFF\n1 0 0\n0 0 0\n", plain, "no triangles in it"},
+      {"huge.off", "OFF\n900000000000 12 0\n0 0 0\n", plain, "the header promises 900000000000 vertices"},
+      {"huge.ply", "ply\nformat ascii 1.0\nelement vertex 99999999\nproperty float x\nend_header\n", plain, "the header promises 99999999 vertex"},
+      {"no.ply", "plop\n", plain, "line 1 is not 'ply'"},
+      {"cut.stl", to_binary_stl(make_box(1, 1, 1)).substr(0, 300), plain, "the header promises 12 triangles"},
+      {"index.off", bad_index, plain, "index.off"},
+      {"large.off", with_nan, plain, "must be a finite number"},
+      {"flat.off", to_off(sheet), plain, "the surface is flat"},
+      {"open.off", to_off(open), plain, "a closed surface is needed"},
+      {"thick.off", box, surface([](auto& o) { o.wall_m = 0.6; }), "leaves no hollow"},
+      {"wall.off", box, surface([](auto& o) { o.wall_m = -1; }), "wall is -1"},
+      {"height.off", box, surface([](auto& o) { o.height_m = 1, o.scale = 2; }), "height and scale exclude each other"},
+      {"both.off", box, surface([](auto& o) { o.edge_m = 0.1; }), "edge and nodes exclude each other"},
+      {"few.off", box, surface([](auto& o) { o.nodes = 2; }), "nodes is 2"},
+      {"many.off", box, surface([](auto& o) { o.nodes = 4000000000; }), "nodes is 4000000000"},
+      {"long.off", box, surface([](auto& o) { o.nodes.reset(), o.edge_m = 5; }), "longer than the body"},
+      {"short.off", box, surface([](auto& o) { o.nodes.reset(), o.edge_m = 1e-5; }), "ask for longer ones"},
+      {"order.off", box, surface([](auto& o) { o.order = 3; }), "order is 3"},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.name);
+    SurfaceOptions options = c.options;
+    options.surface = write_text(c.name, c.content);
+    SurfaceReport report;
+    try {
+      mesh_surface(options, report);
+      ADD_FAILURE() << "was meshed";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(c.words), std::string::npos) << error.what();
+    }
+  }
+  SurfaceReport report;
+  try {
+    mesh_surface({.surface = "/nowhere/at/all.obj"}, report);
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("there is no such file"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace carillon::mesher

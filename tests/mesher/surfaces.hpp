@@ -1,0 +1,149 @@
+// Surfaces whose volumes are known, and files of them.
+#pragma once
+
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace carillon::mesher::testing {
+
+struct Polygons {
+  std::vector<std::array<double, 3>> points;
+  std::vector<std::vector<int>> faces;
+};
+
+/// A box from the origin, twelve triangles facing outward.
+inline Polygons make_box(double x, double y, double z) {
+  Polygons box;
+  for (int n = 0; n < 8; ++n) box.points.push_back({n & 1 ? x : 0, n & 2 ? y : 0, n & 4 ? z : 0});
+  box.faces = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return box;
+}
+
+/// An octahedron divided `levels` times, its points on the sphere.
+inline Polygons make_sphere(double radius, int levels) {
+  Polygons s;
+  s.points = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+  s.faces = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  for (int level = 0; level < levels; ++level) {
+    std::map<std::array<int, 2>, int> middles;
+    const auto middle = [&](int a, int b) {
+      const auto [found, fresh] = middles.try_emplace(a < b ? std::array{a, b} : std::array{b, a}, static_cast<int>(s.points.size()));
+      if (fresh) {
+        std::array<double, 3> p;
+        for (int c = 0; c < 3; ++c) p[c] = s.points[a][c] + s.points[b][c];
+        const double length = std::hypot(p[0], p[1], p[2]);
+        for (double& x : p) x /= length;
+        s.points.push_back(p);
+      }
+      return found->second;
+    };
+    std::vector<std::vector<int>> faces;
+    for (const auto& f : s.faces) {
+      const int ab = middle(f[0], f[1]), bc = middle(f[1], f[2]), ca = middle(f[2], f[0]);
+      faces.insert(faces.end(), {{f[0], ab, ca}, {ab, f[1], bc}, {ca, bc, f[2]}, {ab, bc, ca}});
+    }
+    s.faces = faces;
+  }
+  for (auto& p : s.points)
+    for (double& x : p) x *= radius;
+  return s;
+}
+
+inline std::filesystem::path get_path(const std::string& name) {
+  const auto folder = std::filesystem::temp_directory_path() / ("carillon_mesher_test_" + std::to_string(static_cast<long>(::getpid())));
+  std::filesystem::create_directories(folder);
+  return folder / name;
+}
+
+inline std::filesystem::path write_text(const std::string& name, const std::string& text) {
+  const auto path = get_path(name);
+  std::ofstream(path, std::ios::binary) << text;
+  return path;
+}
+
+inline std::string to_text(double x) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.17g", x);
+  return buffer;
+}
+
+inline std::string to_off(const Polygons& s) {
+  std::string out = "OFF\n" + std::to_string(s.points.size()) + " " + std::to_string(s.faces.size()) + " 0\n";
+  for (const auto& p : s.points) out += to_text(p[0]) + " " + to_text(p[1]) + " " + to_text(p[2]) + "\n";
+  for (const auto& f : s.faces) {
+    out += std::to_string(f.size());
+    for (const int v : f) out += " " + std::to_string(v);
+    out += "\n";
+  }
+  return out;
+}
+
+inline std::string to_obj(const Polygons& s) {
+  std::string out = "# a body\no body\n";
+  for (const auto& p : s.points) out += "v " + to_text(p[0]) + " " + to_text(p[1]) + " " + to_text(p[2]) + "\n";
+  for (const auto& f : s.faces) {
+    out += "f";
+    for (const int v : f) out += " " + std::to_string(v + 1);
+    out += "\n";
+  }
+  return out;
+}
+
+inline std::string to_ply(const Polygons& s) {
+  std::string out = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(s.points.size()) +
+                    "\nproperty double x\nproperty double y\nproperty double z\nelement face " + std::to_string(s.faces.size()) +
+                    "\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string off = to_off(s);
+  return out + off.substr(off.find('\n', 4) + 1);
+}
+
+inline std::string to_stl(const Polygons& s) {
+  std::string out = "solid body\n";
+  for (const auto& f : s.faces) {
+    out += "facet normal 0 0 0\nouter loop\n";
+    for (const int v : f) out += "vertex " + to_text(s.points[v][0]) + " " + to_text(s.points[v][1]) + " " + to_text(s.points[v][2]) + "\n";
+    out += "endloop\nendfacet\n";
+  }
+  return out + "endsolid body\n";
+}
+
+template <class T>
+void append(std::string& out, T value) {
+  out.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+inline std::string to_binary_stl(const Polygons& s) {
+  std::string out(80, ' ');
+  append(out, static_cast<std::uint32_t>(s.faces.size()));
+  for (const auto& f : s.faces) {
+    for (int n = 0; n < 3; ++n) append(out, 0.0f);
+    for (const int v : f)
+      for (const double x : s.points[v]) append(out, static_cast<float>(x));
+    append(out, std::uint16_t{0});
+  }
+  return out;
+}
+
+inline std::string to_binary_ply(const Polygons& s) {
+  std::string out = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(s.points.size()) +
+                    "\nproperty float x\nproperty float y\nproperty float z\nelement face " + std::to_string(s.faces.size()) +
+                    "\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const auto& p : s.points)
+    for (const double x : p) append(out, static_cast<float>(x));
+  for (const auto& f : s.faces) {
+    append(out, static_cast<std::uint8_t>(f.size()));
+    for (const int v : f) append(out, static_cast<std::int32_t>(v));
+  }
+  return out;
+}
+
+}  // namespace carillon::mesher::testing
