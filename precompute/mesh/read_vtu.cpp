@@ -53,6 +53,12 @@ const char* solid_name(std::int64_t type) {
   }
 }
 
+/// Points, lines and surface cells, which a volume mesh may carry.
+bool is_surface_cell(std::int64_t type) {
+  return (type >= 0 && type <= 9) || (type >= 21 && type <= 23) || type == 28 || type == 30 || (type >= 34 && type <= 36) ||
+         (type >= 68 && type <= 70) || (type >= 75 && type <= 77);
+}
+
 bool is_integer(const std::string& type) { return type.starts_with("Int") || type.starts_with("UInt"); }
 
 class VtuReader {
@@ -246,6 +252,8 @@ void VtuReader::read_piece(const Piece& piece) {
     } else if (const char* solid = solid_name(type); solid != nullptr) {
       file_.fail(place, "cell {} is of type {}: the mesh holds {}; only tetrahedra (types 10 and 24) are read: mesh the volume with those",
                  c + 1, type, solid);
+    } else if (!is_surface_cell(type)) {
+      file_.fail(place, "cell {} is of type {}, which VTK does not know; the file was damaged: write the mesh again", c + 1, type);
     } else {
       ++raw_.others[fmt::format("cells of VTK type {}", type)];
     }

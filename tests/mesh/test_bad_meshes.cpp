@@ -93,6 +93,7 @@ std::vector<BadFile> bad_files() {
       {"medit_hexahedra", "a.mesh", kMedit + "Hexahedra\n1\n1 2 3 4 1 2 3 4 0\nEnd\n", {"a.mesh:9", "1 hexahedra", "only tetrahedra"}},
       {"medit_count", "a.mesh", kMedit + "Tetrahedra\n2\n1 2 3 4 0\nEnd\n", {"a.mesh:12", "a vertex of a tetrahedron", "'End'"}},
       {"vtu_cell_type", "a.vtu", vtu("", kPoints, "0 1 2 3", "14"), {"a.vtu:", "pyramids", "only tetrahedra"}},
+      {"vtu_no_such_type", "a.vtu", vtu("", kPoints, "0 1 2 3", "200"), {"a.vtu:9", "cell 1 is of type 200"}},
       {"vtu_point", "a.vtu", vtu("", kPoints, "0 1 2 4", "10"), {"a.vtu:9", "cell 1 refers to point 4", "0 to 3"}},
       {"vtu_too_few", "a.vtu", vtu("", "0 0 0 1 0 0 0 1 0 0 0", "0 1 2 3", "10"), {"a.vtu:6", "needs 12 numbers", "11 at most"}},
       {"vtu_word",
