@@ -1,5 +1,6 @@
-// Method:     Residuals and Gram matrix with matrix-matrix products over blocks of columns.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 15.9 (a residual bounds the error of its eigenvalue).
+// Method:     Residuals and Gram matrix with matrix-matrix products; orthonormalisation by the Newton-Schulz step of the polar factor.
+// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 15.9 (a residual bounds the error of its eigenvalue); Higham,
+//             Functions of Matrices, 2008, section 8.3 (polar factor).
 // Deviations: none.
 #include "precompute/eigen/check_modes.hpp"
 
@@ -18,6 +19,7 @@ namespace {
 using petsc::check;
 
 constexpr double kTieTolerance = 1e-6;
+constexpr double kRoundOff = 100;
 
 // A dense matrix's own rows, column-major.
 struct LocalColumns {
@@ -93,23 +95,56 @@ ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<doub
   }
   petsc::MatHandle k_shapes;
   check(MatMatMult(stiffness, shapes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, k_shapes.out()));
-  const LocalColumns k_phi(k_shapes);
-  const LocalColumns m_phi(m_shapes);
-  std::vector<double> squares(2 * modes, 0.0);
-  for (std::size_t j = 0; j < modes; ++j) {
-    const double* k = k_phi.column(static_cast<PetscInt>(j));
-    const double* m = m_phi.column(static_cast<PetscInt>(j));
-    for (PetscInt i = 0; i < k_phi.rows; ++i) {
-      const double rest = k[i] - lambda[j] * m[i];
-      squares[2 * j] += rest * rest;
-      squares[2 * j + 1] += m[i] * m[i];
+  petsc::VecHandle diagonal;
+  check(MatCreateVecs(stiffness, nullptr, diagonal.out()));
+  check(MatGetDiagonal(stiffness, diagonal));
+  const PetscScalar* weight = nullptr;
+  check(VecGetArrayRead(diagonal, &weight));
+  std::vector<double> squares(3 * modes, 0.0);
+  {
+    const LocalColumns k_phi(k_shapes);
+    const LocalColumns m_phi(m_shapes);
+    const LocalColumns phi(shapes);
+    for (std::size_t j = 0; j < modes; ++j) {
+      const auto c = static_cast<PetscInt>(j);
+      for (PetscInt i = 0; i < k_phi.rows; ++i) {
+        const double rest = k_phi.column(c)[i] - lambda[j] * m_phi.column(c)[i];
+        const double term = weight[i] * phi.column(c)[i];
+        squares[3 * j] += rest * rest;
+        squares[3 * j + 1] += m_phi.column(c)[i] * m_phi.column(c)[i];
+        squares[3 * j + 2] += term * term;
+      }
     }
   }
+  check(VecRestoreArrayRead(diagonal, &weight));
   MPI_Allreduce(MPI_IN_PLACE, squares.data(), static_cast<int>(squares.size()), MPI_DOUBLE, MPI_SUM, comm);
   for (std::size_t j = 0; j < modes; ++j) {
-    errors.residual.push_back(std::sqrt(squares[2 * j]) / (lambda[j] * std::sqrt(squares[2 * j + 1])));
+    const double scale = lambda[j] * std::sqrt(squares[3 * j + 1]);
+    errors.residual.push_back(std::sqrt(squares[3 * j]) / scale);
+    errors.floor.push_back(kRoundOff * PETSC_MACHINE_EPSILON * std::sqrt(squares[3 * j + 2]) / scale);
   }
   return errors;
+}
+
+void orthonormalise_shapes(Mat mass, Mat shapes) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(mass), &comm));
+  petsc::MatHandle m_shapes;
+  check(MatMatMult(mass, shapes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, m_shapes.out()));
+  const LocalColumns phi(shapes);
+  const LocalColumns work(m_shapes);
+  std::vector<double> step = calc_gram(comm, phi, work);
+  const auto modes = static_cast<std::size_t>(phi.columns);
+  for (std::size_t i = 0; i < step.size(); ++i) step[i] *= -0.5;
+  for (std::size_t i = 0; i < modes; ++i) step[i * modes + i] += 1.5;
+  for (PetscInt j = 0; j < phi.columns; ++j) std::copy_n(phi.column(j), phi.rows, work.column(j));
+  PetscBLASInt m = phi.rows;
+  PetscBLASInt n = phi.columns;
+  PetscBLASInt lda = std::max(work.stride, 1);
+  PetscBLASInt ldc = std::max(phi.stride, 1);
+  double one = 1;
+  double zero = 0;
+  if (m > 0) BLASgemm_("N", "N", &m, &n, &n, &one, work.values, &lda, step.data(), &n, &zero, phi.values, &ldc);
 }
 
 void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {

@@ -11,11 +11,17 @@ namespace carillon::eigen {
 
 struct ModeErrors {
   std::vector<double> residual;  // (modes) ||K phi - lambda M phi||_2 / (lambda ||M phi||_2)
-  double orthonormality = 0;     // max |phi_i^T M phi_j - delta_ij|
+  /// (modes) residual that rounding of K phi alone explains: kRoundOff epsilon ||diag(K) phi||_2 / (lambda ||M phi||_2)
+  std::vector<double> floor;
+  double orthonormality = 0;  // max |phi_i^T M phi_j - delta_ij|
 };
 
 /// Normalises each column to phi^T M phi = 1 and measures residuals and orthonormality. shapes: (3n, modes) dense. Collective.
 ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<double>& lambda, Mat shapes);
+
+/// Phi <- Phi (3 I - Phi^T M Phi) / 2: one step towards the nearest M-orthonormal set, which squares the error. Columns must be M-normal.
+/// Collective.
+void orthonormalise_shapes(Mat mass, Mat shapes);
 
 /// Turns each column so that its entry of largest magnitude is positive; among entries as large to 1e-6 the one whose node comes first by
 /// x, y, z decides, so that the partition has no say. Collective.

@@ -33,7 +33,8 @@ class CholmodFactor final : public ShiftedFactor {
   }
 
   bool factorise(double sigma) override {
-    if (sigma >= 0) throw SolveError(fmt::format("CHOLMOD was asked for K - sigma M at sigma = {:.9g}, which is not positive definite.", sigma));
+    if (sigma >= 0)
+      throw SolveError(fmt::format("CHOLMOD was asked for K - sigma M at sigma = {:.9g}, which is not positive definite.", sigma));
     MatFactorInfo info;
     check(MatFactorInfoInitialize(&info));
     info.fill = 5;

@@ -25,7 +25,8 @@ std::vector<double> gather_dense(Mat matrix, PetscInt n) {
     const PetscInt* columns = nullptr;
     const PetscScalar* values = nullptr;
     check(MatGetRow(matrix, row, &count, &columns, &values));
-    for (PetscInt k = 0; k < count; ++k) dense[static_cast<std::size_t>(columns[k]) * static_cast<std::size_t>(n) + static_cast<std::size_t>(row)] = values[k];
+    for (PetscInt k = 0; k < count; ++k)
+      dense[static_cast<std::size_t>(columns[k]) * static_cast<std::size_t>(n) + static_cast<std::size_t>(row)] = values[k];
     check(MatRestoreRow(matrix, row, &count, &columns, &values));
   }
   MPI_Comm comm = MPI_COMM_NULL;

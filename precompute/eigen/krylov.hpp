@@ -20,14 +20,14 @@ struct KrylovRequest {
   Mat mass = nullptr;
   ShiftedFactor* factor = nullptr;  // already factorised at sigma
   double sigma = 0;
-  PetscInt wanted = 0;              // the eigenvalues nearest sigma, those of the deflated space not counted
-  double tolerance = 1e-10;         // of the Ritz residual, relative to theta = 1 / (lambda - sigma)
-  std::vector<Vec> deflated;        // M-orthonormal, the run stays M-orthogonal to them
+  PetscInt wanted = 0;                                   // the eigenvalues nearest sigma, those of the deflated space not counted
+  double tolerance = 1e-10;                              // of the Ritz residual, relative to theta = 1 / (lambda - sigma)
+  std::vector<Vec> deflated;                             // M-orthonormal, the run stays M-orthogonal to them
   std::function<void(std::int64_t converged)> progress;  // may be empty
 };
 
 struct KrylovResult {
-  Pairs pairs;                  // at least `wanted` if it converged; nearest sigma first
+  Pairs pairs;  // at least `wanted` if it converged; nearest sigma first
   std::int64_t solves = 0;
   double solve_seconds = 0;
 };

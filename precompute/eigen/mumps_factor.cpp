@@ -167,7 +167,8 @@ MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t
     s.mumps.perm_in = s.permutation.data();
   }
   const int code = s.call(kJobAnalyse);
-  if (lacks_memory(code)) throw SystemError("Out of memory in the analysis of K - sigma M. Take a coarser mesh or more ranks on more machines.");
+  if (lacks_memory(code))
+    throw SystemError("Out of memory in the analysis of K - sigma M. Take a coarser mesh or more ranks on more machines.");
   if (code < 0) throw SolveError(fmt::format("MUMPS cannot analyse K - sigma M: code {}, {}.", code, s.infog(2)));
 
   PetscInt first = 0;
@@ -201,8 +202,8 @@ bool MumpsFactor::factorise(double sigma) {
     }
     throw SolveError(fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: code {}, {}.", sigma, code, s.infog(2)));
   }
-  throw SolveError(fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: its workspace never sufficed (code {}).", sigma,
-                               s.infog(1)));
+  throw SolveError(
+      fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: its workspace never sufficed (code {}).", sigma, s.infog(1)));
 }
 
 void MumpsFactor::State::prepare_solution() {

@@ -1,9 +1,9 @@
 // Method:     A rigid motion of component c is u(x) = sum_j a_j b_j(x), with three translations b = e_i and three rotations
-//             b = p_i x (x - x_c) / R about the centre x_c, along the principal axes p_i of its nodes. Held nodes demand H a = 0 (H: 3 rows per
-//             held node, 6 columns); the null space of H comes from its singular value decomposition. The motions are then made
+//             b = p_i x (x - x_c) / R about the centre x_c, along the principal axes p_i of its nodes. Held nodes demand H a = 0 (H: 3 rows
+//             per held node, 6 columns); the null space of H comes from its singular value decomposition. The motions are then made
 //             M-orthonormal by Gram-Schmidt, twice.
-// Source:     Geradin, Rixen, Mechanical Vibrations, 3rd ed. 2015, section 2.2 (rigid body modes); Golub, Van Loan, section 2.4 (null space).
-// Deviations: none.
+// Source:     Geradin, Rixen, Mechanical Vibrations, 3rd ed. 2015, section 2.2 (rigid body modes); Golub, Van Loan, section 2.4 (null
+// space). Deviations: none.
 #include "precompute/eigen/rigid_modes.hpp"
 
 #include <fmt/core.h>
@@ -54,7 +54,8 @@ std::vector<Body> calc_bodies(MPI_Comm comm, const NodeLayout& nodes) {
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
   const auto for_each_node = [&](auto&& visit) {
-    for (std::size_t i = 0; i < nodes.position.size(); ++i) visit(static_cast<std::size_t>(nodes.component[i]), to_vector(nodes.position[i]));
+    for (std::size_t i = 0; i < nodes.position.size(); ++i)
+      visit(static_cast<std::size_t>(nodes.component[i]), to_vector(nodes.position[i]));
     if (rank != 0) return;  // Every rank knows the held nodes; one of them counts them.
     for (std::size_t c = 0; c < std::min(count, nodes.held.size()); ++c) {
       for (const Vec3& x : nodes.held[c]) visit(c, to_vector(x));
@@ -90,7 +91,8 @@ Motions calc_admissible_motions(const Body& body, const std::vector<Vec3>& held)
   if (held.empty()) return Motions::Identity(6, 6);
   // H^T H would square the condition; H R with H = Q R is as small and keeps it.
   Eigen::MatrixXd constraints(3 * static_cast<Eigen::Index>(held.size()), 6);
-  for (std::size_t i = 0; i < held.size(); ++i) constraints.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = calc_basis(body, to_vector(held[i]));
+  for (std::size_t i = 0; i < held.size(); ++i)
+    constraints.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = calc_basis(body, to_vector(held[i]));
   Eigen::Matrix<double, Eigen::Dynamic, 6> small = constraints;
   if (constraints.rows() > 6) {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints);
@@ -109,20 +111,33 @@ double calc_dot(Vec a, Vec b) {
   return dot;
 }
 
-// M-orthonormalises `candidate` against `basis`, the motions of the same component; false if nothing is left of it.
-bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& basis) {
-  check(MatMult(mass, candidate, work));
-  const double before = std::sqrt(std::max(calc_dot(candidate, work), 0.0));
-  if (!(before > 0)) return false;
+double calc_mass_norm(Mat mass, Vec vector, Vec work) {
+  check(MatMult(mass, vector, work));
+  return std::sqrt(std::max(calc_dot(vector, work), 0.0));
+}
+
+// Sets `motion` to the displacements of component c under the combination a of its basis motions.
+void fill_motion(const NodeLayout& nodes, std::int32_t c, const Body& body, const Eigen::Matrix<double, 6, 1>& a, Vec motion) {
+  PetscScalar* values = nullptr;
+  check(VecZeroEntries(motion));
+  check(VecGetArray(motion, &values));
+  for (std::size_t i = 0; i < nodes.position.size(); ++i) {
+    if (nodes.component[i] == c) Eigen::Map<Vector3>(values + 3 * i) = calc_basis(body, to_vector(nodes.position[i])) * a;
+  }
+  check(VecRestoreArray(motion, &values));
+}
+
+// M-orthonormalises `candidate` against `basis`, the motions of the same component; false if nothing is left of it beside `unit`, the norm
+// of a translation.
+bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& basis, double unit) {
   for (int pass = 0; pass < 2; ++pass) {
     for (Vec other : basis) {
       check(MatMult(mass, candidate, work));
       check(VecAXPY(candidate, -calc_dot(other, work), other));
     }
   }
-  check(MatMult(mass, candidate, work));
-  const double after = std::sqrt(std::max(calc_dot(candidate, work), 0.0));
-  if (!(after > kLineTolerance * before)) return false;
+  const double after = calc_mass_norm(mass, candidate, work);
+  if (!(after > kLineTolerance * unit)) return false;
   check(VecScale(candidate, 1 / after));
   return true;
 }
@@ -137,9 +152,10 @@ void check_stress_free(Mat stiffness, Vec motion, Vec work, Vec diagonal, std::i
   check(VecNorm(work, NORM_2, &scale));
   constexpr double kForceTolerance = 1e-6;
   if (!(force <= kForceTolerance * scale)) {
-    throw SolveError(fmt::format("A rigid motion of component {} meets elastic forces ({:.2g} of the largest possible): the stiffness matrix and "
-                                 "the node layout are not of the same body, or held nodes are missing from the layout.",
-                                 component, force / scale));
+    throw SolveError(
+        fmt::format("A rigid motion of component {} meets elastic forces ({:.2g} of the largest possible): the stiffness matrix and "
+                    "the node layout are not of the same body, or held nodes are missing from the layout.",
+                    component, force / scale));
   }
 }
 
@@ -161,17 +177,12 @@ std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const No
     Body& body = bodies[static_cast<std::size_t>(c)];
     const auto& held = static_cast<std::size_t>(c) < nodes.held.size() ? nodes.held[static_cast<std::size_t>(c)] : none;
     body.motions = calc_admissible_motions(body, held);
+    fill_motion(nodes, c, body, Eigen::Matrix<double, 6, 1>::Unit(0), candidate);
+    const double unit = calc_mass_norm(mass, candidate, work);
     std::vector<Vec> of_component;
     for (Eigen::Index j = 0; j < body.motions.cols(); ++j) {
-      PetscScalar* values = nullptr;
-      check(VecZeroEntries(candidate));
-      check(VecGetArray(candidate, &values));
-      for (std::size_t i = 0; i < nodes.position.size(); ++i) {
-        if (nodes.component[i] != c) continue;
-        Eigen::Map<Vector3>(values + 3 * i) = calc_basis(body, to_vector(nodes.position[i])) * body.motions.col(j);
-      }
-      check(VecRestoreArray(candidate, &values));
-      if (!orthonormalise(mass, candidate, work, of_component)) continue;
+      fill_motion(nodes, c, body, body.motions.col(j), candidate);
+      if (!orthonormalise(mass, candidate, work, of_component, unit)) continue;
       check_stress_free(stiffness, candidate, work, diagonal, c);
       petsc::VecHandle kept;
       check(VecDuplicate(candidate, kept.out()));

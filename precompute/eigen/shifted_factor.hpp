@@ -31,7 +31,8 @@ class ShiftedFactor {
 /// L D L^T with pivoting for any sigma. It also counts: the negative pivots of the last factorise are the eigenvalues below sigma.
 class MumpsFactor final : public ShiftedFactor {
  public:
-  /// Analyses the union of both patterns. elimination_position: on rank 0, per node the place in the elimination order; empty: MUMPS orders.
+  /// Analyses the union of both patterns. elimination_position: on rank 0, per node the place in the elimination order; empty: MUMPS
+  /// orders.
   MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
   ~MumpsFactor() override;
 

@@ -1,4 +1,5 @@
-// Method:     1. The rigid modes are built in closed form and deflated. 2. The inertia of K - lambda M at both ends of the band says how many
+// Method:     1. The rigid modes are built in closed form and deflated. 2. The inertia of K - lambda M at both ends of the band says how
+// many
 //             modes it holds. 3. Krylov-Schur with shift-invert finds them, in slices when they are many; what a run leaves out is sought
 //             again with everything found deflated, until the count is met. 4. Residuals and orthonormality are measured from K and M.
 // Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994 (counts and slices);
@@ -35,6 +36,7 @@ constexpr double kEdgeNudge = 1e-6;        // Counts are taken this far outside 
 constexpr double kEdgeTolerance = 1e-9;    // A mode this close to an end of the band (relative to lambda) is in it.
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
 constexpr int kRounds = 4;                 // Krylov runs per slice until its count is met.
+constexpr double kOrthonormal = 1e-11;     // Good enough without another step of orthonormalisation.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -119,8 +121,11 @@ class BandSolver {
   std::int64_t run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t wanted, double tolerance);
   void collect(const DensePairs* dense);
   void finish();
+  void refine(ModeErrors& errors);
   void report(Phase phase, std::int64_t done) const;
-  double to_hz(double scaled_lambda) const { return std::sqrt(std::max(scaling_.from_scaled(scaled_lambda), 0.0)) / (2 * std::numbers::pi); }
+  double to_hz(double scaled_lambda) const {
+    return std::sqrt(std::max(scaling_.from_scaled(scaled_lambda), 0.0)) / (2 * std::numbers::pi);
+  }
 
   const Problem& problem_;
   const Options& options_;
@@ -129,7 +134,7 @@ class BandSolver {
   int size_ = 1;
   PetscInt n_ = 0;
   Scaling scaling_;
-  double low_ = 0;   // scaled lambda, the band's ends
+  double low_ = 0;  // scaled lambda, the band's ends
   double high_ = 0;
   std::vector<petsc::VecHandle> rigid_;
   std::unique_ptr<MumpsFactor> counter_;
@@ -140,9 +145,11 @@ class BandSolver {
 void check_input(const Problem& problem, const Options& options) {
   if (problem.stiffness == nullptr || problem.mass == nullptr) throw InputError("The eigenproblem lacks its stiffness or mass matrix.");
   if (!(options.high_hz > options.low_hz) || !(options.low_hz >= 0) || !std::isfinite(options.high_hz)) {
-    throw InputError(fmt::format("The band {} .. {} Hz is empty or negative: give two frequencies, the lower one first.", options.low_hz, options.high_hz));
+    throw InputError(fmt::format("The band {} .. {} Hz is empty or negative: give two frequencies, the lower one first.", options.low_hz,
+                                 options.high_hz));
   }
-  if (options.max_modes && *options.max_modes < 1) throw InputError(fmt::format("max_modes is {}: it must be at least 1.", *options.max_modes));
+  if (options.max_modes && *options.max_modes < 1)
+    throw InputError(fmt::format("max_modes is {}: it must be at least 1.", *options.max_modes));
   if (!(options.tolerance > 0) || options.tolerance > 1e-2) {
     throw InputError(fmt::format("The tolerance {} is out of range: take one between 1e-14 and 1e-2.", options.tolerance));
   }
@@ -160,11 +167,12 @@ void check_input(const Problem& problem, const Options& options) {
     check(MatGetSize(problem.stiffness, &n, nullptr));
     const NodeLayout& nodes = problem.nodes;
     if (static_cast<std::size_t>(rows) != 3 * nodes.position.size() || nodes.position.size() != nodes.component.size()) {
-      throw InputError(fmt::format("The node layout has {} positions and {} components for {} rows of the stiffness matrix.", nodes.position.size(),
-                                   nodes.component.size(), rows));
+      throw InputError(fmt::format("The node layout has {} positions and {} components for {} rows of the stiffness matrix.",
+                                   nodes.position.size(), nodes.component.size(), rows));
     }
     for (const std::int32_t c : nodes.component) {
-      if (c < 0 || c >= nodes.component_count) throw InputError(fmt::format("Component {} is none of the layout's {}.", c, nodes.component_count));
+      if (c < 0 || c >= nodes.component_count)
+        throw InputError(fmt::format("Component {} is none of the layout's {}.", c, nodes.component_count));
     }
     const std::size_t order = nodes.elimination_position.size();
     int rank = 0;
@@ -186,7 +194,8 @@ BandSolver::BandSolver(const Problem& problem, const Options& options)
 }
 
 void BandSolver::report(Phase phase, std::int64_t done) const {
-  if (options_.progress && rank_ == 0) options_.progress({phase, done, std::min(modes_.band_count, options_.max_modes.value_or(modes_.band_count))});
+  if (options_.progress && rank_ == 0)
+    options_.progress({phase, done, std::min(modes_.band_count, options_.max_modes.value_or(modes_.band_count))});
 }
 
 Modes BandSolver::solve() {
@@ -221,7 +230,9 @@ void BandSolver::solve_dense_band() {
   modes_.factor = {};
   modes_.factor.solver = "LAPACK dsygv (dense)";
   modes_.factor.ordering = "none";
-  const auto count_under = [&](double lambda) { return std::lower_bound(pairs.lambda.begin(), pairs.lambda.end(), lambda) - pairs.lambda.begin(); };
+  const auto count_under = [&](double lambda) {
+    return std::lower_bound(pairs.lambda.begin(), pairs.lambda.end(), lambda) - pairs.lambda.begin();
+  };
   modes_.count_below_low = count_under(low_ * (1 - kEdgeTolerance));
   modes_.band_count = count_under(high_ * (1 + kEdgeTolerance)) - modes_.count_below_low;
   modes_.mechanism_count = count_under(low_ * 1e-4) - modes_.rigid_count;
@@ -237,9 +248,10 @@ std::int64_t BandSolver::count_below(double lambda) {
     if (counter_->factorise(lambda)) return counter_->get_negative_pivots();
     lambda *= 1 + kEdgeNudge * 0.1;
   }
-  throw SolveError(fmt::format("K - sigma M is singular all around {:.6g} Hz: the mesh has nodes without mass or stiffness, or the mass matrix is "
-                               "not positive definite.",
-                               to_hz(lambda)));
+  throw SolveError(
+      fmt::format("K - sigma M is singular all around {:.6g} Hz: the mesh has nodes without mass or stiffness, or the mass matrix is "
+                  "not positive definite.",
+                  to_hz(lambda)));
 }
 
 Slice BandSolver::count_band() {
@@ -251,9 +263,10 @@ Slice BandSolver::count_band() {
   band.below_low = count_below(band.low);
   modes_.count_below_low = band.below_low;
   if (band.below_low < modes_.rigid_count || band.count() < 0) {
-    throw SolveError(fmt::format("The inertia counts {} eigenvalues below {:.6g} Hz and {} below {:.6g} Hz beside {} rigid modes: K or M is not "
-                                 "what a body has. Look for inverted elements.",
-                                 band.below_low, to_hz(band.low), band.below_high, to_hz(band.high), modes_.rigid_count));
+    throw SolveError(
+        fmt::format("The inertia counts {} eigenvalues below {:.6g} Hz and {} below {:.6g} Hz beside {} rigid modes: K or M is not "
+                    "what a body has. Look for inverted elements.",
+                    band.below_low, to_hz(band.low), band.below_high, to_hz(band.high), modes_.rigid_count));
   }
   if (band.below_low > modes_.rigid_count) modes_.mechanism_count = count_below(low_ * 1e-4) - modes_.rigid_count;
   modes_.band_count = band.count();
@@ -364,7 +377,7 @@ void BandSolver::solve_slice(const Slice& slice, bool is_only) {
     sigma = -2.5e-3 * slice.high;
     wanted = from_bottom;
   } else if (starts_at_bottom) {
-    sigma = std::lerp(slice.low, slice.high, 0.4);
+    sigma = std::lerp(slice.low, slice.high, 0.5);
     wanted = from_bottom;
   }
   std::unique_ptr<ShiftedFactor> cholmod;
@@ -400,14 +413,18 @@ void BandSolver::collect(const DensePairs* dense) {
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
   const std::int64_t expected = std::min(modes_.band_count, options_.max_modes.value_or(modes_.band_count));
-  if (dense == nullptr && static_cast<std::int64_t>(order.size()) < expected) {
-    throw SolveError(fmt::format("The band {:.6g} .. {:.6g} Hz holds {} modes by the inertia of K - lambda M, and {} of them converged. Take a "
-                                 "looser tolerance, or a band in smaller parts.",
-                                 options_.low_hz, options_.high_hz, modes_.band_count, order.size()));
+  const auto converged = static_cast<std::int64_t>(order.size());
+  if (dense == nullptr && (converged < expected || (!options_.max_modes && converged > expected))) {
+    throw SolveError(
+        fmt::format("The band {:.6g} .. {:.6g} Hz holds {} modes by the inertia of K - lambda M, and {} converged. Take a looser "
+                    "tolerance, or solve the band in parts.",
+                    options_.low_hz, options_.high_hz, modes_.band_count, converged));
   }
   std::erase_if(order, [&](std::size_t i) { return lambda[i] < low_ * (1 - kEdgeTolerance) || lambda[i] > high_ * (1 + kEdgeTolerance); });
-  if (options_.max_modes && static_cast<std::int64_t>(order.size()) > *options_.max_modes) order.resize(static_cast<std::size_t>(*options_.max_modes));
-  if (dense == nullptr && static_cast<std::int64_t>(order.size()) < expected) modes_.band_count = static_cast<std::int64_t>(order.size());
+  // The counts were taken a little outside the band.
+  const auto within = static_cast<std::int64_t>(order.size());
+  if (dense == nullptr && (within < expected || !options_.max_modes)) modes_.band_count = within;
+  if (options_.max_modes && within > *options_.max_modes) order.resize(static_cast<std::size_t>(*options_.max_modes));
   if (order.empty()) return;
 
   PetscInt rows = 0;
@@ -435,9 +452,64 @@ void BandSolver::collect(const DensePairs* dense) {
   found_ = {};
 }
 
+// Inverse iteration for the modes whose residual is too large, then one step of orthonormalisation for all.
+void BandSolver::refine(ModeErrors& errors) {
+  const auto is_bad = [&](std::size_t j) { return !(errors.residual[j] <= std::max(options_.tolerance, errors.floor[j])); };
+  std::vector<std::size_t> bad;
+  for (std::size_t j = 0; j < errors.residual.size(); ++j) {
+    if (is_bad(j)) bad.push_back(j);
+  }
+  if (bad.empty()) return;
+  if (counter_ == nullptr) counter_ = std::make_unique<MumpsFactor>(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
+  double sigma = std::lerp(low_, high_, 0.5);
+  while (!counter_->factorise(sigma)) sigma *= 1 + 1e-5;
+  ++modes_.factor.factorisations;
+  petsc::VecHandle right;
+  petsc::VecHandle work;
+  check(MatCreateVecs(problem_.stiffness, right.out(), work.out()));
+  for (const std::size_t j : bad) {
+    Vec column = nullptr;
+    check(MatDenseGetColumnVec(modes_.shapes, static_cast<PetscInt>(j), &column));
+    check(MatMult(problem_.mass, column, right));
+    counter_->solve(right, column);
+    ++modes_.factor.solves;
+    PetscScalar stiffness = 0;
+    PetscScalar mass = 0;
+    check(MatMult(problem_.stiffness, column, work));
+    check(VecDot(column, work, &stiffness));
+    check(MatMult(problem_.mass, column, work));
+    check(VecDot(column, work, &mass));
+    check(VecScale(column, 1 / std::sqrt(mass)));
+    check(MatDenseRestoreColumnVec(modes_.shapes, static_cast<PetscInt>(j), &column));
+    modes_.lambda[j] = stiffness / mass;
+  }
+  counter_.reset();
+  orthonormalise_shapes(problem_.mass, modes_.shapes);
+  errors = normalise_and_measure(problem_.stiffness, problem_.mass, modes_.lambda, modes_.shapes);
+  for (const std::size_t j : bad) {
+    if (is_bad(j)) {
+      throw SolveError(
+          fmt::format("Mode {} at {:.6g} Hz has the relative residual {:.2g}, above the tolerance {:.2g} and above what rounding "
+                      "explains ({:.2g}). Take a looser tolerance, or mend the thinnest elements of the mesh.",
+                      j, to_hz(modes_.lambda[j]), errors.residual[j], options_.tolerance, errors.floor[j]));
+    }
+  }
+}
+
 void BandSolver::finish() {
   if (modes_.lambda.empty()) return;
-  const ModeErrors errors = normalise_and_measure(problem_.stiffness, problem_.mass, modes_.lambda, modes_.shapes);
+  ModeErrors errors = normalise_and_measure(problem_.stiffness, problem_.mass, modes_.lambda, modes_.shapes);
+  if (errors.orthonormality > kOrthonormal) {  // Modes of different slices, or of different runs.
+    orthonormalise_shapes(problem_.mass, modes_.shapes);
+    errors = normalise_and_measure(problem_.stiffness, problem_.mass, modes_.lambda, modes_.shapes);
+  }
+  refine(errors);
+  constexpr double kDependent = 1e-6;
+  if (!(errors.orthonormality < kDependent)) {
+    throw SolveError(
+        fmt::format("The modes that converged are not M-orthogonal (error {:.2g}): some are the same. Solve the band in parts.",
+                    errors.orthonormality));
+  }
   modes_.residual = errors.residual;
   modes_.orthonormality_error = errors.orthonormality;
   orient_shapes(modes_.shapes, problem_.nodes.position);

@@ -30,7 +30,8 @@ struct NodeLayout {
   std::vector<std::int32_t> elimination_position;
 };
 
-/// K phi = lambda M phi. Rows come in blocks of three (x, y, z) per free node; K and M have the same row distribution, whole nodes on a rank.
+/// K phi = lambda M phi. Rows come in blocks of three (x, y, z) per free node; K and M have the same row distribution, whole nodes on a
+/// rank.
 struct Problem {
   Mat stiffness = nullptr;  // K [N/m], (3n, 3n), AIJ, symmetric positive semidefinite, both triangles stored
   Mat mass = nullptr;       // M [kg], (3n, 3n), AIJ, symmetric positive definite, diagonal or in K's pattern
@@ -53,7 +54,7 @@ struct Progress {
 };
 
 struct Options {
-  double low_hz = 20;     // both ends belong to the band
+  double low_hz = 20;  // both ends belong to the band
   double high_hz = 20e3;
   std::optional<std::int64_t> max_modes;  // the lowest so many of the band
   double tolerance = 1e-8;                // bound on every mode's relative residual
@@ -64,21 +65,21 @@ struct Options {
 /// Own seconds of the stages (wall clock, the slowest rank).
 struct Seconds {
   double rigid = 0;
-  double analyse = 0;          // elimination order and symbolic factorisation
-  double factor = 0;           // every numeric factorisation, those of the counts included
-  double iterate = 0;          // Krylov-Schur, solves and orthogonalisation included
-  double solve = 0;            // of iterate: triangular solves
-  double check = 0;            // residuals, orthonormality, signs
+  double analyse = 0;  // elimination order and symbolic factorisation
+  double factor = 0;   // every numeric factorisation, those of the counts included
+  double iterate = 0;  // Krylov-Schur, solves and orthogonalisation included
+  double solve = 0;    // of iterate: triangular solves
+  double check = 0;    // residuals, orthonormality, signs
   double total = 0;
 };
 
 struct FactorStatistics {
-  std::string solver;         // "MUMPS 5.5.1 LDL^T", "CHOLMOD LL^T", "LAPACK (dense)"
-  std::string ordering;       // "METIS nested dissection (given)", "PORD", ...
-  std::int64_t entries = 0;   // stored entries of the factor, all ranks; 0 if the solver does not tell
-  double flops = 0;           // of one numeric factorisation; 0 if unknown
+  std::string solver;        // "MUMPS 5.5.1 LDL^T", "CHOLMOD LL^T", "LAPACK (dense)"
+  std::string ordering;      // "METIS nested dissection (given)", "PORD", ...
+  std::int64_t entries = 0;  // stored entries of the factor, all ranks; 0 if the solver does not tell
+  double flops = 0;          // of one numeric factorisation; 0 if unknown
   std::int64_t factorisations = 0;
-  std::int64_t solves = 0;    // right-hand sides
+  std::int64_t solves = 0;  // right-hand sides
 };
 
 struct Modes {
@@ -97,7 +98,8 @@ struct Modes {
   Seconds seconds;
 };
 
-/// Solves K phi = lambda M phi for all modes with low_hz <= f <= high_hz, f = sqrt(lambda) / (2 pi), ascending. Collective on K's communicator.
+/// Solves K phi = lambda M phi for all modes with low_hz <= f <= high_hz, f = sqrt(lambda) / (2 pi), ascending. Collective on K's
+/// communicator.
 ///
 /// A band without a mode is an answer (empty lambda). K and M are rescaled by powers of two while the solve runs and are bit for bit the
 /// same afterwards. Equations: docs/equations.md, eigenproblem.

@@ -23,9 +23,8 @@ PetscErrorCode record_error(MPI_Comm, int line, const char* function, const char
   if (type == PETSC_ERROR_INITIAL || recorded_error.empty()) {
     const char* general = nullptr;
     (void)PetscErrorMessage(code, &general, nullptr);
-    recorded_error = fmt::format("{}: {} ({}, {}:{})", general != nullptr ? general : "PETSc error",
-                                 message != nullptr ? message : "", function != nullptr ? function : "?",
-                                 file != nullptr ? file : "?", line);
+    recorded_error = fmt::format("{}: {} ({}, {}:{})", general != nullptr ? general : "PETSc error", message != nullptr ? message : "",
+                                 function != nullptr ? function : "?", file != nullptr ? file : "?", line);
   }
   return code;
 }

@@ -1,0 +1,137 @@
+// Bodies whose eigenvalues are known in closed form.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/petsc/session.hpp"
+#include "tests/eigen/spring_network.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+using test::Network;
+using test::to_hz;
+
+constexpr double kRate = 4e6;  // [N/m]
+constexpr double kMass = 0.5;  // [kg]
+
+// side^3 free masses between held walls, coupled to their neighbours alike in x, y and z:
+// lambda = 4 k/m sum_d sin^2(pi j_d / (2 (side + 1))), j_d = 1 ... side, each three times. Symmetry makes up to 18 of them equal.
+Network make_cube_between_walls(int side) {
+  Network network;
+  const int width = side + 2;
+  const auto index = [&](int x, int y, int z) { return (z * width + y) * width + x; };
+  for (int z = 0; z < width; ++z) {
+    for (int y = 0; y < width; ++y) {
+      for (int x = 0; x < width; ++x) {
+        network.nodes.push_back({0.1 * x, 0.1 * y, 0.1 * z});
+        network.mass_kg.push_back(kMass);
+        network.component.push_back(0);
+        const std::array<int, 3> at{x, y, z};
+        if (std::any_of(at.begin(), at.end(), [&](int i) { return i == 0 || i == width - 1; })) network.held.push_back(index(x, y, z));
+        if (x + 1 < width) network.springs.push_back({index(x, y, z), index(x + 1, y, z), kRate, true});
+        if (y + 1 < width) network.springs.push_back({index(x, y, z), index(x, y + 1, z), kRate, true});
+        if (z + 1 < width) network.springs.push_back({index(x, y, z), index(x, y, z + 1), kRate, true});
+      }
+    }
+  }
+  return network;
+}
+
+std::vector<double> calc_cube_eigenvalues(int side) {
+  std::vector<double> lambda;
+  const auto square = [&](int j) {
+    const double s = std::sin(std::numbers::pi * j / (2.0 * (side + 1)));
+    return s * s;
+  };
+  for (int a = 1; a <= side; ++a) {
+    for (int b = 1; b <= side; ++b) {
+      for (int c = 1; c <= side; ++c) lambda.insert(lambda.end(), 3, 4 * kRate / kMass * (square(a) + square(b) + square(c)));
+    }
+  }
+  std::sort(lambda.begin(), lambda.end());
+  return lambda;
+}
+
+// Compares with the closed form's eigenvalues of the band.
+void expect_band(const Modes& modes, const std::vector<double>& all, const Options& options) {
+  std::vector<double> expected;
+  for (const double lambda : all) {
+    if (to_hz(lambda) >= options.low_hz * (1 - 1e-12) && to_hz(lambda) <= options.high_hz * (1 + 1e-12)) expected.push_back(lambda);
+  }
+  ASSERT_EQ(modes.lambda.size(), expected.size());
+  EXPECT_EQ(modes.band_count, static_cast<std::int64_t>(expected.size()));
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(modes.lambda[i] / expected[i], 1.0, 1e-9) << i;
+  for (const double residual : modes.residual) EXPECT_LE(residual, options.tolerance);
+  EXPECT_LT(modes.orthonormality_error, 1e-10);
+}
+
+TEST(SolveModes, gives_a_molecule_of_four_masses_its_six_vibrations) {
+  Network network;  // A regular tetrahedron of springs: lambda = k/m twice, 2 k/m three times, 4 k/m once.
+  network.nodes = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  network.mass_kg.assign(4, kMass);
+  network.component.assign(4, 0);
+  for (int a = 0; a < 4; ++a) {
+    for (int b = a + 1; b < 4; ++b) network.springs.push_back({a, b, kRate, false});
+  }
+  const test::System system = test::make_system(network);
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = 2e3;
+  const Modes modes = solve_modes(system.problem, options);
+  const double unit = kRate / kMass;
+  expect_band(modes, {unit, unit, 2 * unit, 2 * unit, 2 * unit, 4 * unit}, options);
+  EXPECT_EQ(modes.rigid_count, 6);
+  EXPECT_EQ(modes.count_below_low, 6);
+  EXPECT_EQ(modes.mechanism_count, 0);
+}
+
+TEST(SolveModes, finds_every_copy_of_repeated_eigenvalues) {
+  const test::System system = test::make_system(make_cube_between_walls(8));
+  const std::vector<double> all = calc_cube_eigenvalues(8);
+  Options options;
+  options.low_hz = 10;
+  options.high_hz = to_hz(0.5 * (all[170] + *std::upper_bound(all.begin(), all.end(), all[170] * (1 + 1e-9))));
+  expect_band(solve_modes(system.problem, options), all, options);
+}
+
+TEST(SolveModes, counts_a_mode_on_the_end_of_the_band_as_in_it) {
+  const test::System system = test::make_system(make_cube_between_walls(8));
+  const std::vector<double> all = calc_cube_eigenvalues(8);
+  Options options;  // Both ends hit clusters of equal eigenvalues exactly.
+  options.low_hz = to_hz(all[3]);
+  options.high_hz = to_hz(all[60]);
+  for (const auto how : {Factorisation::kAutomatic, Factorisation::kMumps}) {
+    options.factorisation = how;
+    const Modes modes = solve_modes(system.problem, options);
+    expect_band(modes, all, options);
+    EXPECT_EQ(modes.count_below_low, 3);
+  }
+}
+
+TEST(SolveModes, joins_slices_without_a_gap_or_a_double) {
+  const test::System system = test::make_system(make_cube_between_walls(11));  // 3993 unknowns
+  const std::vector<double> all = calc_cube_eigenvalues(11);
+  Options options;
+  options.low_hz = 10;
+  options.high_hz = to_hz(0.5 * (all[700] + *std::upper_bound(all.begin(), all.end(), all[700] * (1 + 1e-9))));
+  options.factorisation = Factorisation::kMumps;
+  expect_band(solve_modes(system.problem, options), all, options);
+}
+
+TEST(SolveModes, solves_a_band_high_in_the_spectrum_from_its_middle) {
+  const test::System system = test::make_system(make_cube_between_walls(11));
+  const std::vector<double> all = calc_cube_eigenvalues(11);
+  Options options;
+  options.low_hz = to_hz(all[400]) * 1.0001;
+  options.high_hz = to_hz(all[450]) * 1.0001;
+  expect_band(solve_modes(system.problem, options), all, options);
+}
+
+}  // namespace
+}  // namespace carillon::eigen

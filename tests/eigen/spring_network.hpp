@@ -1,0 +1,45 @@
+// Point masses and springs as eigenproblems: bodies whose answers are known without finite elements.
+#pragma once
+
+#include <vector>
+
+#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/petsc/handle.hpp"
+
+namespace carillon::eigen::test {
+
+struct Spring {
+  int a = 0;
+  int b = 0;
+  double rate = 1;            // [N/m]
+  bool is_isotropic = false;  // false: along the line a-b, as a spring; true: the same in x, y and z (a scalar lattice three times)
+};
+
+struct Network {
+  std::vector<Vec3> nodes;
+  std::vector<double> mass_kg;
+  std::vector<Spring> springs;
+  std::vector<int> component;
+  std::vector<int> held;  // nodes that do not move
+};
+
+/// A network as distributed matrices, free nodes in their order, split evenly.
+struct System {
+  petsc::MatHandle stiffness;
+  petsc::MatHandle mass;
+  Problem problem;
+};
+System make_system(const Network& network);
+
+/// All eigenvalues by LAPACK's dsyev of M^-1/2 K M^-1/2, ascending, from the network itself; the same on every rank.
+std::vector<double> calc_all_eigenvalues(const Network& network);
+
+/// nx x ny x nz masses, axial springs along edges and face diagonals: a free elastic block. Slightly irregular, so that no eigenvalues
+/// coincide.
+Network make_block(int nx, int ny, int nz, Vec3 origin = {0, 0, 0}, double spacing = 1);
+/// Both networks side by side, without contact.
+Network join(const Network& a, const Network& b);
+
+double to_hz(double lambda);
+
+}  // namespace carillon::eigen::test

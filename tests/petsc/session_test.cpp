@@ -1,0 +1,135 @@
+#include "precompute/petsc/session.hpp"
+
+#include <gtest/gtest.h>
+#include <petscmat.h>
+
+#include <limits>
+#include <type_traits>
+#include <vector>
+
+#include "precompute/petsc/handle.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::petsc {
+namespace {
+
+int find_rank() {
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  return rank;
+}
+
+int find_size() {
+  int size = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &size);
+  return size;
+}
+
+template <typename Error, typename Call>
+std::string catch_message(Call&& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+TEST(Session, takes_no_options_from_the_command_line_or_the_environment) {
+  PetscBool is_set = PETSC_TRUE;
+  check(PetscOptionsHasName(nullptr, nullptr, "-carillon_leak", &is_set));
+  EXPECT_FALSE(is_set);
+}
+
+TEST(Check, turns_a_petsc_error_into_an_exception_with_its_words) {
+  MatHandle mat;
+  check(MatCreateSeqAIJ(PETSC_COMM_SELF, 2, 2, 1, nullptr, mat.out()));
+  const std::string text = catch_message<SolveError>([&] { check(MatSetValue(mat, 7, 0, 1.0, INSERT_VALUES)); });
+  EXPECT_NE(text.find("out of range"), std::string::npos) << text;
+  EXPECT_NE(text.find('7'), std::string::npos) << text;
+}
+
+TEST(Check, calls_a_missing_file_an_error_of_the_system) {
+  FILE* file = nullptr;
+  const std::string text = catch_message<SystemError>([&] { check(PetscFOpen(PETSC_COMM_SELF, "/no/such/file", "r", &file)); });
+  EXPECT_NE(text.find("/no/such/file"), std::string::npos) << text;
+}
+
+TEST(Check, forgets_an_error_once_it_was_thrown) {
+  MatHandle mat;
+  check(MatCreateSeqAIJ(PETSC_COMM_SELF, 2, 2, 1, nullptr, mat.out()));
+  EXPECT_THROW(check(MatSetValue(mat, 7, 0, 1.0, INSERT_VALUES)), SolveError);
+  const std::string text = catch_message<SolveError>([&] { check(MatSetValue(mat, 0, 9, 1.0, INSERT_VALUES)); });
+  EXPECT_EQ(text.find('7'), std::string::npos) << text;
+}
+
+TEST(AllOk, is_false_everywhere_when_one_rank_fails) {
+  EXPECT_TRUE(all_ok(MPI_COMM_WORLD, true));
+  EXPECT_FALSE(all_ok(MPI_COMM_WORLD, find_rank() != find_size() - 1));
+}
+
+TEST(Agree, throws_the_same_text_on_every_rank) {
+  const bool is_last = find_rank() == find_size() - 1;
+  EXPECT_EQ(catch_message<InputError>([&] { agree(MPI_COMM_WORLD, is_last ? std::string("line 3 is bad") : std::string()); }),
+            "line 3 is bad");
+  EXPECT_NO_THROW(agree(MPI_COMM_WORLD, std::string()));
+}
+
+TEST(Agree, lets_the_lowest_failing_rank_speak) {
+  EXPECT_EQ(catch_message<InputError>([&] { agree(MPI_COMM_WORLD, "rank " + std::to_string(find_rank())); }), "rank 0");
+}
+
+TEST(RunAgreed, keeps_the_kind_of_the_error) {
+  const bool is_last = find_rank() == find_size() - 1;
+  EXPECT_EQ(catch_message<SolveError>([&] {
+              run_agreed(MPI_COMM_WORLD, [&] {
+                if (is_last) throw SolveError("lost modes");
+              });
+            }),
+            "lost modes");
+  EXPECT_THROW(run_agreed(MPI_COMM_WORLD, [] { throw std::bad_alloc(); }), SystemError);
+  EXPECT_NO_THROW(run_agreed(MPI_COMM_WORLD, [] {}));
+}
+
+TEST(Handle, owns_one_reference_and_moves_it) {
+  static_assert(!std::is_copy_constructible_v<VecHandle>);
+  Vec plain = nullptr;
+  check(VecCreateSeq(PETSC_COMM_SELF, 3, &plain));
+  check(PetscObjectReference(reinterpret_cast<PetscObject>(plain)));
+  PetscInt references = 0;
+  {
+    VecHandle first(plain);
+    VecHandle second(std::move(first));
+    EXPECT_EQ(first.get(), nullptr);
+    EXPECT_EQ(second.get(), plain);
+  }
+  check(PetscObjectGetReference(reinterpret_cast<PetscObject>(plain), &references));
+  EXPECT_EQ(references, 1);
+  check(VecDestroy(&plain));
+}
+
+TEST(ToPetscInt, refuses_what_does_not_fit) {
+  EXPECT_EQ(to_petsc_int(2'000'000'000), 2'000'000'000);
+  if constexpr (sizeof(PetscInt) == 4) {
+    EXPECT_THROW(to_petsc_int(std::int64_t{1} << 31), SystemError);
+  }
+}
+
+TEST(PeakMemory, grows_with_what_is_touched_and_sums_over_ranks) {
+  const std::int64_t before = get_peak_memory_bytes();
+  constexpr std::size_t kBytes = 64u << 20;
+  std::vector<char> block(kBytes);
+  for (std::size_t i = 0; i < kBytes; i += 512) block[i] = static_cast<char>(i);
+  EXPECT_GE(get_peak_memory_bytes(), std::max<std::int64_t>(before, kBytes));
+  const PeakMemory peak = find_peak_memory(MPI_COMM_WORLD);
+  EXPECT_GE(peak.sum_bytes, find_size() * static_cast<std::int64_t>(kBytes));
+  EXPECT_LE(peak.max_bytes, peak.sum_bytes);
+}
+
+TEST(Blas, has_a_name_that_agrees_with_its_verdict) {
+  EXPECT_EQ(blas_is_reference(), blas_name().find("reference") != std::string::npos) << blas_name();
+  EXPECT_NE(blas_name().find(".so"), std::string::npos) << blas_name();
+}
+
+}  // namespace
+}  // namespace carillon::petsc
