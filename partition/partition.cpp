@@ -33,8 +33,8 @@ Graph make_graph(std::vector<std::pair<std::int32_t, std::int32_t>>& pairs, std:
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   if (pairs.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
-    throw InputError(fmt::format("the mesh is too large: its graph has {} entries, 32-bit indices end at 2147483647; use a coarser mesh",
-                                 pairs.size()));
+    throw InputError(
+        fmt::format("the mesh is too large: its graph has {} entries, 32-bit indices end at 2147483647; use a coarser mesh", pairs.size()));
   Graph graph;
   graph.offsets.assign(static_cast<std::size_t>(vertices) + 1, 0);
   graph.neighbours.reserve(pairs.size());
@@ -182,9 +182,9 @@ std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
   std::vector<std::int32_t> vertex_at(vertices);
   // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
   Graph copy = graph;
-  check_metis(METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(),
-                           position.data()),
-              "METIS_NodeND");
+  check_metis(
+      METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(), position.data()),
+      "METIS_NodeND");
   return position;
 }
 

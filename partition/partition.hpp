@@ -1,4 +1,5 @@
-// Graphs cut into parts: which rank gets which tetrahedra, and in which order a factorisation eliminates nodes. METIS inside; no MPI, no PETSc.
+// Graphs cut into parts: which rank gets which tetrahedra, and in which order a factorisation eliminates nodes. METIS inside; no MPI, no
+// PETSc.
 #pragma once
 
 #include <cstdint>

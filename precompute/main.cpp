@@ -42,8 +42,9 @@ void print_start(const petsc::Session& session, bool quiet) {
                petsc::blas_name());
   std::fflush(stdout);
   if (petsc::blas_is_reference())
-    fmt::print(stderr, "carillon-precompute: warning: this is the reference BLAS, about 14 times slower than OpenBLAS; "
-                       "apt-get install libopenblas0-serial\n");
+    fmt::print(stderr,
+               "carillon-precompute: warning: this is the reference BLAS, about 14 times slower than OpenBLAS; "
+               "apt-get install libopenblas0-serial\n");
 }
 
 }  // namespace
@@ -54,8 +55,10 @@ int main(int argc, char** argv) {
     petsc::pin_blas_threads();
     MPI_Comm failures = MPI_COMM_NULL;
     MPI_Comm_dup(MPI_COMM_WORLD, &failures);
-    CLI::App app("Computes the vibration modes of a solid body and writes them as a mode bank.\n"
-                 "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json", "carillon-precompute");
+    CLI::App app(
+        "Computes the vibration modes of a solid body and writes them as a mode bank.\n"
+        "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json",
+        "carillon-precompute");
     std::string job;
     bool quiet = false;
     app.add_option("JOB", job, "job file (JSON with // comments)")->required();

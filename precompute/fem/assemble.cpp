@@ -134,13 +134,14 @@ std::vector<Vec3> find_positions(const LocalMesh& local, std::int32_t e) {
 [[noreturn]] void fail_element(const LocalMesh& local, std::int32_t e) {
   const auto x = find_positions(local, e);
   // Elements and nodes are counted from 1, as the mesh check does.
-  throw InputError(fmt::format("element {} of the mesh (first node {} at {:.6g} {:.6g} {:.6g} m) is inside out or flat: its Jacobian is not "
-                               "positive everywhere{}",
-                               local.tet_in_mesh[e] + 1, local.node_in_mesh[local.tets[static_cast<std::size_t>(e) * local.nodes_per_tet()]] + 1,
-                               x[0][0], x[0][1], x[0][2],
-                               local.order == 1 ? "; remesh there"
-                                                : "; a mid-side node lies too far from the middle of its edge: straighten that edge or "
-                                                  "remesh there with smaller elements"));
+  throw InputError(
+      fmt::format("element {} of the mesh (first node {} at {:.6g} {:.6g} {:.6g} m) is inside out or flat: its Jacobian is not "
+                  "positive everywhere{}",
+                  local.tet_in_mesh[e] + 1, local.node_in_mesh[local.tets[static_cast<std::size_t>(e) * local.nodes_per_tet()]] + 1,
+                  x[0][0], x[0][1], x[0][2],
+                  local.order == 1 ? "; remesh there"
+                                   : "; a mid-side node lies too far from the middle of its edge: straighten that edge or "
+                                     "remesh there with smaller elements"));
 }
 
 }  // namespace

@@ -153,8 +153,7 @@ Piece pack(const mesh::TetMesh& mesh, const Plan& plan, const std::vector<std::i
   for (const std::int32_t e : elements)
     for (const std::int32_t node : mesh.tet(e)) touch(node);
   const auto kind = [&](std::int32_t node) { return plan.owner[node] != rank ? 2 : plan.held[node] ? 1 : 0; };
-  std::sort(touched.begin(), touched.end(),
-            [&](std::int32_t a, std::int32_t b) { return std::pair(kind(a), a) < std::pair(kind(b), b); });
+  std::sort(touched.begin(), touched.end(), [&](std::int32_t a, std::int32_t b) { return std::pair(kind(a), a) < std::pair(kind(b), b); });
   const auto count = [&](int wanted) {
     return static_cast<std::int32_t>(std::count_if(touched.begin(), touched.end(), [&](std::int32_t v) { return kind(v) == wanted; }));
   };
@@ -221,8 +220,7 @@ void share_facts(MPI_Comm comm, Distribution& out) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
-  std::array<std::int64_t, 6> numbers{out.nodes,          out.tets, out.free_nodes, out.components, out.report.edge_cut,
-                                      out.report.contiguous};
+  std::array<std::int64_t, 6> numbers{out.nodes, out.tets, out.free_nodes, out.components, out.report.edge_cut, out.report.contiguous};
   MPI_Bcast(numbers.data(), static_cast<int>(numbers.size()), MPI_INT64_T, 0, comm);
   out.nodes = numbers[0];
   out.tets = numbers[1];

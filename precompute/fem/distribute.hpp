@@ -47,10 +47,10 @@ struct PartitionReport {
 struct Distribution {
   LocalMesh local;
   PartitionReport report;
-  std::int64_t nodes = 0;       // of the whole mesh, those that a tetrahedron uses
+  std::int64_t nodes = 0;  // of the whole mesh, those that a tetrahedron uses
   std::int64_t tets = 0;
-  std::int64_t free_nodes = 0;  // of all ranks
-  std::int32_t components = 0;  // connected through common nodes
+  std::int64_t free_nodes = 0;            // of all ranks
+  std::int32_t components = 0;            // connected through common nodes
   std::vector<std::vector<Vec3>> held_m;  // per component the positions of its held nodes, the same on every rank; empty when none is held
   std::vector<std::int32_t> row_of_node;  // rank 0 only: (N) row of each node of the mesh, -1: held or unused
   std::vector<std::int32_t> elimination_position;  // rank 0 only: (free nodes), by row; empty unless asked for

@@ -249,8 +249,7 @@ void calc_straight_t10(std::span<const Vec3> b_corner, double volume, const spec
     add_stiffness(b, material.lame_lambda_pa(), material.lame_mu_pa(), rule_of_degree_2()[q].weight * volume, out);
   }
   for (int i = 0; i < kMaxNodes; ++i)
-    for (int j = 0; j < kMaxNodes; ++j)
-      out.mass[i * kMaxNodes + j] = material.density_kg_m3 * volume * straight_mass_420(i, j) / 420.0;
+    for (int j = 0; j < kMaxNodes; ++j) out.mass[i * kMaxNodes + j] = material.density_kg_m3 * volume * straight_mass_420(i, j) / 420.0;
 }
 
 }  // namespace

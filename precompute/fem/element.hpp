@@ -25,8 +25,8 @@ struct ElementMatrices {
 struct ElementMoments {
   double volume_m3 = 0.0;
   double mass_kg = 0.0;
-  Vec3 first_kg_m{};                      // integral rho x
-  std::array<double, 9> second_kg_m2{};   // (3, 3) integral rho x x^T
+  Vec3 first_kg_m{};                     // integral rho x
+  std::array<double, 9> second_kg_m2{};  // (3, 3) integral rho x x^T
 };
 
 /// Calculates K and M of the element with node positions x, (4) or (10) in the order of mesh::TetMesh. Mid-side nodes are used where they

@@ -32,9 +32,9 @@ constexpr std::uint64_t kMaxJobBytes = 16 << 20;
 struct MeshFacts {
   mesh::CheckReport check;
   std::int64_t held_nodes = 0;
-  std::vector<Vec3> vertices_m;         // of the surface, in the order of the mesh
-  std::vector<Triangle> triangles;      // of vertices
-  std::vector<std::int32_t> row;        // of each vertex, -1: held
+  std::vector<Vec3> vertices_m;     // of the surface, in the order of the mesh
+  std::vector<Triangle> triangles;  // of vertices
+  std::vector<std::int32_t> row;    // of each vertex, -1: held
 };
 
 /// One run as it grows.
@@ -119,8 +119,8 @@ fem::Distribution distribute_mesh(Run& run, MeshFacts& facts) {
   run.stations.end();
 
   run.stations.begin("partition", "METIS k-way on the dual graph");
-  const bool with_order = run.job.factorisation == spec::Factorisation::mumps ||
-                          (run.job.factorisation == spec::Factorisation::automatic && run.ranks > 1);
+  const bool with_order =
+      run.job.factorisation == spec::Factorisation::mumps || (run.job.factorisation == spec::Factorisation::automatic && run.ranks > 1);
   fem::Distribution pieces = fem::distribute(run.comm, mesh, held, with_order);
   for (std::int32_t& row : facts.row) row = pieces.row_of_node[row];
   pieces.row_of_node = {};
@@ -155,13 +155,18 @@ class ProgressLines {
     phase_ = progress.phase;
     tenth_ = tenth;
     switch (progress.phase) {
-      case eigen::Phase::kRigid: return stations_.say("rigid motions in closed form");
-      case eigen::Phase::kAnalyse: return stations_.say("elimination order");
-      case eigen::Phase::kCount: return stations_.say("counting the modes of the band");
-      case eigen::Phase::kFactor: return stations_.say("factorising K - sigma M");
-      case eigen::Phase::kIterate: return stations_.say(
-          fmt::format("{} of {} modes", std::min(progress.modes_done, progress.modes_wanted), progress.modes_wanted));
-      case eigen::Phase::kCheck: return stations_.say("residuals and orthogonality");
+      case eigen::Phase::kRigid:
+        return stations_.say("rigid motions in closed form");
+      case eigen::Phase::kAnalyse:
+        return stations_.say("elimination order");
+      case eigen::Phase::kCount:
+        return stations_.say("counting the modes of the band");
+      case eigen::Phase::kFactor:
+        return stations_.say("factorising K - sigma M");
+      case eigen::Phase::kIterate:
+        return stations_.say(fmt::format("{} of {} modes", std::min(progress.modes_done, progress.modes_wanted), progress.modes_wanted));
+      case eigen::Phase::kCheck:
+        return stations_.say("residuals and orthogonality");
     }
   }
 
@@ -318,14 +323,15 @@ RunSummary run_job(MPI_Comm comm, const fs::path& job_file, bool quiet) {
   run.job = read_shared_job(comm, run.rank, job_file);
   check_outputs(run);
   if (run.job.element == spec::Element::T4 && run.job.material.poisson_ratio > 0.45)
-    warn(run.rank, fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
-                               run.job.material.poisson_ratio));
+    warn(run.rank,
+         fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
+                     run.job.material.poisson_ratio));
 
   MeshFacts facts;
   fem::Distribution pieces = distribute_mesh(run, facts);
-  run.stations.begin("assembly", fmt::format("{} unknowns, {}, {} mass", 3 * pieces.free_nodes,
-                                             run.job.element == spec::Element::T4 ? "T4" : "T10",
-                                             run.job.mass == spec::Mass::lumped ? "lumped" : "consistent"));
+  run.stations.begin("assembly",
+                     fmt::format("{} unknowns, {}, {} mass", 3 * pieces.free_nodes, run.job.element == spec::Element::T4 ? "T4" : "T10",
+                                 run.job.mass == spec::Mass::lumped ? "lumped" : "consistent"));
   const fem::System system = fem::assemble(comm, pieces.local, run.job.material, run.job.mass);
   const fem::RigidBody body = fem::calc_rigid_body(comm, pieces.local, run.job.material.density_kg_m3);
   run.stations.end();

@@ -142,11 +142,11 @@ TEST_P(Assembly, needs_no_memory_beyond_its_preallocation_and_wastes_none) {
 TEST_P(Assembly, gives_symmetric_matrices) {
   const auto x = sample(system, pieces.local, [](const Vec3& p) { return Vec3{std::sin(40 * p[0]), std::cos(31 * p[1]), p[2]}; });
   const auto y = sample(system, pieces.local, [](const Vec3& p) { return Vec3{std::cos(17 * p[2]), p[0] * p[1], std::exp(9 * p[1])}; });
-  for (const Mat matrix : {system.stiffness.get(), system.mass.get()})
-    EXPECT_NEAR(product(matrix, x, y) / product(matrix, y, x), 1, 1e-10);
+  for (const Mat matrix : {system.stiffness.get(), system.mass.get()}) EXPECT_NEAR(product(matrix, x, y) / product(matrix, y, x), 1, 1e-10);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Assembly, testing::Combine(testing::Values(1, 2), testing::Values(spec::Mass::consistent, spec::Mass::lumped)),
+INSTANTIATE_TEST_SUITE_P(All, Assembly,
+                         testing::Combine(testing::Values(1, 2), testing::Values(spec::Mass::consistent, spec::Mass::lumped)),
                          [](const auto& info) {
                            return std::string(std::get<0>(info.param) == 1 ? "T4_" : "T10_") +
                                   (std::get<1>(info.param) == spec::Mass::consistent ? "consistent" : "lumped");
@@ -213,7 +213,8 @@ TEST(Distribution, numbers_two_separate_bodies_and_lists_the_held_nodes_of_each)
   ASSERT_EQ(pieces.held_m[1].size(), 2u);
   EXPECT_EQ(pieces.held_m[1][0], (Vec3{1, 0, 0}));
   EXPECT_EQ(pieces.nodes, static_cast<std::int64_t>(both.nodes.size()) - 1);
-  for (std::size_t i = 0; i < pieces.local.nodes_m.size(); ++i) EXPECT_EQ(pieces.local.component[i], pieces.local.nodes_m[i][0] >= 1 ? 1 : 0);
+  for (std::size_t i = 0; i < pieces.local.nodes_m.size(); ++i)
+    EXPECT_EQ(pieces.local.component[i], pieces.local.nodes_m[i][0] >= 1 ? 1 : 0);
 }
 
 TEST(Distribution, fails_on_every_rank_with_one_message_when_nothing_can_move) {

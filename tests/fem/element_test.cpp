@@ -84,8 +84,7 @@ double integrate(int n, const std::function<double(const Vector3d&)>& f) {
   const auto gauss = make_gauss(n);
   for (const auto& [u, wu] : gauss)
     for (const auto& [v, wv] : gauss)
-      for (const auto& [w, ww] : gauss)
-        sum += wu * wv * ww * (1 - w) * (1 - w) * (1 - v) * f({u * (1 - v) * (1 - w), v * (1 - w), w});
+      for (const auto& [w, ww] : gauss) sum += wu * wv * ww * (1 - w) * (1 - w) * (1 - v) * f({u * (1 - v) * (1 - w), v * (1 - w), w});
   return sum;
 }
 
@@ -212,9 +211,8 @@ TEST(QuadraticElement, agrees_with_a_slow_quadrature_of_another_make) {
         const Matrix3d j = place.slope(p);
         return j.determinant() * energy_density(field.slope(p) * j.inverse());
       });
-      const double kinetic = integrate(10, [&](const Vector3d& p) {
-        return place.slope(p).determinant() * kMaterial.density_kg_m3 * field.at(p).squaredNorm();
-      });
+      const double kinetic = integrate(
+          10, [&](const Vector3d& p) { return place.slope(p).determinant() * kMaterial.density_kg_m3 * field.at(p).squaredNorm(); });
       // Straight: both rules are exact. Curved: the stiffness integrand is rational, the rule of degree 5 is near.
       EXPECT_NEAR(0.5 * u.dot(stiffness(element) * u), strain_energy, (bulge == 0 ? 1e-11 : 2e-3) * strain_energy);
       double quadratic_form = 0;
@@ -287,7 +285,8 @@ TEST(Moments, of_a_curved_element_agree_with_a_slow_quadrature) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR(moments.second_kg_m2[3 * r + c],
-                  integrate(8, [&](const Vector3d& p) { return 2700 * place.at(p)[r] * place.at(p)[c] * place.slope(p).determinant(); }), 1e-10);
+                  integrate(8, [&](const Vector3d& p) { return 2700 * place.at(p)[r] * place.at(p)[c] * place.slope(p).determinant(); }),
+                  1e-10);
 }
 
 }  // namespace

@@ -25,7 +25,8 @@ petsc::MatHandle make_shapes(PetscInt modes) {
   PetscInt first = 0, end = 0;
   petsc::check(MatGetOwnershipRange(shapes, &first, &end));
   for (PetscInt row = first; row < end; ++row)
-    for (PetscInt column = 0; column < modes; ++column) petsc::check(MatSetValue(shapes, row, column, value_at(row, column), INSERT_VALUES));
+    for (PetscInt column = 0; column < modes; ++column)
+      petsc::check(MatSetValue(shapes, row, column, value_at(row, column), INSERT_VALUES));
   petsc::check(MatAssemblyBegin(shapes, MAT_FINAL_ASSEMBLY));
   petsc::check(MatAssemblyEnd(shapes, MAT_FINAL_ASSEMBLY));
   return shapes;
@@ -71,7 +72,8 @@ TEST(Stations, take_the_seconds_of_the_slowest_rank_and_the_memory_of_all) {
 }
 
 TEST(Record, names_every_library_with_a_version) {
-  for (const auto& [name, version] : find_versions()) EXPECT_NE(version.find_first_of("0123456789"), std::string::npos) << name << ": " << version;
+  for (const auto& [name, version] : find_versions())
+    EXPECT_NE(version.find_first_of("0123456789"), std::string::npos) << name << ": " << version;
   EXPECT_EQ(find_versions().size(), 6u);
   const std::string id = git_id();
   EXPECT_TRUE(id == "unknown" || id.find_first_not_of("0123456789abcdef") == std::string::npos || id.ends_with("-dirty")) << id;

@@ -55,7 +55,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"no_json", 1, [](const Folder& f) { f.write("job.json", "{ \"mesh\": "); }, {"job.json:1"}},
         BadCase{"no_mesh", 2, [](const Folder& f) { std::filesystem::remove(f / "mesh.msh"); }, {"mesh.msh"}},
         BadCase{"no_mesh_format", 2, [](const Folder& f) { f.write("mesh.msh", "this is no mesh\n"); }, {"mesh.msh"}},
-        BadCase{"flat_element", 2,
+        BadCase{"flat_element",
+                2,
                 [](const Folder& f) {
                   mesh::TetMesh flat;
                   flat.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
@@ -65,15 +66,22 @@ INSTANTIATE_TEST_SUITE_P(
                 },
                 {"mesh.msh"}},
         BadCase{"more_ranks_than_elements", 7, [](const Folder&) {}, {"6 tetrahedra", "7 ranks", "at most 6"}},
-        BadCase{"unknown_node_set", 2, [](const Folder& f) { f.write_job({}, R"("fixed": "x-mim",)"); }, {"job.json", "fixed", "x-mim", "x-min"}},
-        BadCase{"empty_box", 1,
+        BadCase{"unknown_node_set",
+                2,
+                [](const Folder& f) { f.write_job({}, R"("fixed": "x-mim",)"); },
+                {"job.json", "fixed", "x-mim", "x-min"}},
+        BadCase{"empty_box",
+                1,
                 [](const Folder& f) { f.write_job({}, R"("fixed": {"box_m": {"min": [5, 5, 5], "max": [6, 6, 6]}},)"); },
                 {"job.json", "fixed"}},
-        BadCase{"everything_held", 2,
-                [](const Folder& f) { f.write_job({}, R"("element": "T4", "fixed": {"box_m": {"min": [-1, -1, -1], "max": [1, 1, 1]}},)"); },
-                {"holds every node"}},
+        BadCase{
+            "everything_held",
+            2,
+            [](const Folder& f) { f.write_job({}, R"("element": "T4", "fixed": {"box_m": {"min": [-1, -1, -1], "max": [1, 1, 1]}},)"); },
+            {"holds every node"}},
         BadCase{"bank_in_place_of_a_folder", 2, [](const Folder& f) { std::filesystem::create_directory(f / "out.bank"); }, {"out.bank"}},
-        BadCase{"bank_below_a_file", 1,
+        BadCase{"bank_below_a_file",
+                1,
                 [](const Folder& f) {
                   std::string job = f.read("job.json");
                   job.replace(job.find("out.bank"), 8, "mesh.msh/out.bank");

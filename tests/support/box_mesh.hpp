@@ -19,8 +19,8 @@ inline mesh::TetMesh make_box(std::array<int, 3> cells, std::array<double, 3> si
   for (int k = 0; k <= cells[2]; ++k)
     for (int j = 0; j <= cells[1]; ++j)
       for (int i = 0; i <= cells[0]; ++i)
-        box.nodes.push_back({origin_m[0] + size_m[0] * i / cells[0], origin_m[1] + size_m[1] * j / cells[1],
-                             origin_m[2] + size_m[2] * k / cells[2]});
+        box.nodes.push_back(
+            {origin_m[0] + size_m[0] * i / cells[0], origin_m[1] + size_m[1] * j / cells[1], origin_m[2] + size_m[2] * k / cells[2]});
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> middle;
   box.order = order;
   for (int k = 0; k < cells[2]; ++k)
