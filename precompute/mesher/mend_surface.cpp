@@ -13,6 +13,7 @@
 #include <unordered_map>
 
 #include "precompute/mesher/repair.hpp"
+#include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "runtime/config/error.hpp"
 

@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "precompute/mesh/tet_mesh.hpp"
-#include "precompute/mesher/surface.hpp"
 
 namespace carillon::mesher {
+
+struct SurfaceReport;  // of surface.hpp, which the slow CGAL files need not see
 
 using mesh::Vec3;
 using Triangle = std::array<std::int32_t, 3>;
