@@ -79,13 +79,27 @@ std::vector<std::int32_t> find_patches(const EdgeFaces& edges, std::size_t face_
   return patch;
 }
 
-/// Drops triangles with a repeated corner, and all but the first of those with the same three corners. Returns how many.
-std::int64_t drop_useless(std::vector<Triangle>& triangles) {
+/// Drops triangles with a repeated corner, and of those with the same three corners all but the first; with `cancel` those that face
+/// opposite ways go in pairs first (two sides of a fold). Returns how many went.
+std::int64_t drop_useless(std::vector<Triangle>& triangles, bool cancel) {
+  const auto calc_key = [](Triangle t, int& turn) {
+    turn = 1;  // the parity of the permutation that sorts the corners: which way the triangle faces
+    for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}, std::pair{0, 1}})
+      if (t[i] > t[j]) std::swap(t[i], t[j]), turn = -turn;
+    return t;
+  };
+  int turn = 0;
+  std::map<Triangle, int> net;
+  for (const Triangle& t : triangles) {
+    int& sum = net[calc_key(t, turn)];
+    sum += turn;
+  }
   std::map<Triangle, int> seen;
   const auto useless = [&](const Triangle& t) {
-    Triangle key = t;
-    std::sort(key.begin(), key.end());
-    return key[0] == key[1] || key[1] == key[2] || !seen.try_emplace(key, 1).second;
+    const Triangle key = calc_key(t, turn);
+    if (key[0] == key[1] || key[1] == key[2]) return true;
+    if (cancel && net[key] * turn <= 0) return true;
+    return !seen.try_emplace(key, 1).second;
   };
   return static_cast<std::int64_t>(std::erase_if(triangles, useless));
 }
@@ -261,9 +275,9 @@ void weld(TriangleSurface& surface, double tolerance) {
 }
 
 /// Closes the surface by joining, orienting and filling. False if that is not enough.
-bool close_surface(TriangleSurface& surface, double tolerance, SurfaceReport& report) {
+bool close_surface(TriangleSurface& surface, double tolerance, bool cancel, SurfaceReport& report) {
   weld(surface, tolerance);
-  report.removed_triangles = drop_useless(surface.triangles);
+  report.removed_triangles = drop_useless(surface.triangles, cancel);
   if (surface.triangles.empty()) return false;
   report.input_vertices = static_cast<std::int64_t>(surface.points.size());
   bool whole = false;
@@ -285,10 +299,10 @@ MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path&
     throw InputError(fmt::format("{}: {}; a closed surface is needed: close its openings, or give the sheet a thickness, in a modeller",
                                  path.string(), what));
   };
-  for (const double tolerance : {0.0, 1e-6 * diagonal}) {
+  for (const auto& [tolerance, cancel] : {std::pair{0.0, false}, std::pair{0.0, true}, std::pair{1e-6 * diagonal, false}, std::pair{1e-6 * diagonal, true}}) {
     TriangleSurface candidate = surface;
     SurfaceReport attempt = report;
-    if (!close_surface(candidate, tolerance, attempt)) continue;
+    if (!close_surface(candidate, tolerance, cancel, attempt)) continue;
     orient_outward(candidate, attempt);
     if (!(calc_volume(candidate) > 1e-9 * diagonal * calc_area(candidate))) continue;
     report = attempt;
@@ -297,7 +311,7 @@ MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path&
   // No closed surface in it as it is: wrap it. A wrap that slips inside through an opening is a thin sheet around the
   // triangles, of hardly any volume within its offset; then only a coarser one can help.
   weld(surface, 0);
-  report.removed_triangles = drop_useless(surface.triangles);
+  report.removed_triangles = drop_useless(surface.triangles, false);
   report.input_vertices = static_cast<std::int64_t>(surface.points.size());
   if (surface.triangles.empty()) refuse_open("all its triangles are degenerate");
   const double area = calc_area(surface);
