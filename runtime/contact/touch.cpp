@@ -91,12 +91,33 @@ bool find_carrying_face(const Surface& mine, int v, const Surface& theirs, const
   return found;
 }
 
+/// A cheap look at the faces near the cut alone: may x (frame of `theirs`) be inside? Simbody's search over the whole mesh takes milliseconds
+/// for a point that many faces are about equally far from, so only the few points that pass come to it.
+bool may_be_inside(const Surface& theirs, const std::set<int>& their_faces, const Vec3& x, double brim) {
+  const auto& mesh = theirs.mesh();
+  double least = SimTK::Infinity;
+  bool inside = false;
+  for (const int f : their_faces) {
+    SimTK::Vec2 uv;
+    const Vec3 d = x - mesh.findNearestPointToFace(x, f, uv);
+    const double dist2 = d.normSqr();
+    if (dist2 > least) continue;
+    // Where two faces are equally near, inside either will do.
+    inside = (dist2 == least && inside) || dot(d, Vec3(mesh.getFaceNormal(f))) < 0.0;
+    least = dist2;
+  }
+  const double reach = 0.1 * theirs.size_m();
+  return (inside && least < reach * reach) || least < brim * brim;
+}
+
 /// Vertices of `mine` inside `theirs`.
 void add_vertex_touches(TouchPoint base, int kind, const Surface& mine, const Surface& theirs, const Transform& X_theirs_mine,
                         const std::set<int>& faces, const std::set<int>& their_faces, std::vector<TouchPoint>& out) {
   for (const int v : find_vertices(mine, faces)) {
     TouchPoint t = base;
-    if (!find_carrying_face(mine, v, theirs, X_theirs_mine * mine.vertex(v), X_theirs_mine.R(), their_faces, t)) continue;
+    const Vec3 x = X_theirs_mine * mine.vertex(v);
+    if (!may_be_inside(theirs, their_faces, x, kBrim * mine.size_m())) continue;
+    if (!find_carrying_face(mine, v, theirs, x, X_theirs_mine.R(), their_faces, t)) continue;
     t.feature = {kind, v, 0};
     t.plane_on_b = kind == 0;
     t.station = mine.vertex(v);
