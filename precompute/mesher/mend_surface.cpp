@@ -185,10 +185,12 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
     Polyline polygon;
     for (const std::int32_t v : loop) polygon.push_back(surface.points[static_cast<std::size_t>(v)]);
     if (loop.size() == 2) continue;  // an edge there and back closes itself
-    const std::vector<Triangle> fill = fill_polygon(polygon);
+    std::vector<Triangle> fill = fill_polygon(polygon);
+    if (fill.empty())  // a crack of no width: any triangles between its sides do
+      for (std::int32_t c = 1; c + 1 < static_cast<std::int32_t>(loop.size()); ++c) fill.push_back({0, c, c + 1});
     const double patch_area = calc_area({polygon, fill});
     filled += patch_area;
-    if (fill.empty() || patch_area > kLargestHole * (area + patch_area) || filled > kLargestHolesTogether * (area + filled)) return false;
+    if (patch_area > kLargestHole * (area + patch_area) || filled > kLargestHolesTogether * (area + filled)) return false;
     for (const Triangle& t : fill)
       fresh.push_back({loop[static_cast<std::size_t>(t[0])], loop[static_cast<std::size_t>(t[1])], loop[static_cast<std::size_t>(t[2])]});
   }
