@@ -22,6 +22,7 @@ using Node = SimTK::ContactGeometry::TriangleMesh::OBBTreeNode;
 
 constexpr double kFlat = 0.02;  // rad; how far below the plane a neighbour may point: a flat face that lands nearly flat lands with all of itself
 
+constexpr double kSunk = 2e-3;  // of the size
 constexpr double kBrim = 1e-4;  // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
 
 /// Does vertex v carry against a plane with this outward normal (frame of the surface)?
@@ -70,7 +71,9 @@ bool find_carrying_face(const Surface& mine, int v, const Surface& theirs, const
   const Vec3 nearest = mesh.findNearestPoint(x, inside, face, uv);
   const double brim = kBrim * mine.size_m();
   if (!inside && (x - nearest).norm() > brim) return false;
-  if (inside && carries(mine, v, ~R_theirs_mine * Vec3(mesh.getFaceNormal(face)))) {
+  // A vertex that has sunk in counts whatever its neighbours do: something touched that none of the two tests knows.
+  const bool sunk = (x - nearest).norm() > kSunk * mine.size_m();
+  if (inside && (sunk || carries(mine, v, ~R_theirs_mine * Vec3(mesh.getFaceNormal(face))))) {
     touch.plane_point = nearest;
     touch.plane_normal = Vec3(mesh.getFaceNormal(face));
     return true;
