@@ -12,8 +12,8 @@ namespace carillon::mesher {
 
 /// What the elements must satisfy, in metres.
 struct DelaunaySizes {
-  double edge_m = 0;      // about the length of the edges
-  double distance_m = 0;  // farthest that a boundary face's middle may lie from the true surface
+  double edge_m = 0;           // about the length of the edges
+  double distance_m = 0;       // farthest that a boundary face's middle may lie from the true surface
   std::size_t most_nodes = 0;  // refinement stops there with whatever it has
 };
 

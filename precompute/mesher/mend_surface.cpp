@@ -301,7 +301,8 @@ MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path&
     throw InputError(fmt::format("{}: {}; a closed surface is needed: close its openings, or give the sheet a thickness, in a modeller",
                                  path.string(), what));
   };
-  for (const auto& [tolerance, cancel] : {std::pair{0.0, false}, std::pair{0.0, true}, std::pair{1e-6 * diagonal, false}, std::pair{1e-6 * diagonal, true}}) {
+  for (const auto& [tolerance, cancel] :
+       {std::pair{0.0, false}, std::pair{0.0, true}, std::pair{1e-6 * diagonal, false}, std::pair{1e-6 * diagonal, true}}) {
     TriangleSurface candidate = surface;
     SurfaceReport attempt = report;
     if (!close_surface(candidate, tolerance, cancel, attempt)) continue;

@@ -27,7 +27,8 @@ double calc_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
   std::array<Vec3, 4> p, normal;
   for (int c = 0; c < 4; ++c) p[c] = mesh.nodes[tet[c]];
   if (!(dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) > 0)) return -1;
-  for (int f = 0; f < 4; ++f) normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
+  for (int f = 0; f < 4; ++f)
+    normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
   double worst = 180;
   for (int i = 0; i < 4; ++i)
     for (int j = i + 1; j < 4; ++j) {
@@ -41,7 +42,9 @@ std::vector<Place> find_places(const mesh::TetMesh& mesh) {
   std::vector<Place> places(mesh.nodes.size(), Place::kInside);
   std::vector<Vec3> mean(mesh.nodes.size(), Vec3{});
   const auto boundary = find_boundary(mesh);
-  const auto calc_normal = [&](const Triangle& t) { return cross(mesh.nodes[t[1]] - mesh.nodes[t[0]], mesh.nodes[t[2]] - mesh.nodes[t[0]]); };
+  const auto calc_normal = [&](const Triangle& t) {
+    return cross(mesh.nodes[t[1]] - mesh.nodes[t[0]], mesh.nodes[t[2]] - mesh.nodes[t[0]]);
+  };
   for (const Triangle& t : boundary)
     for (const std::int32_t v : t) mean[v] = mean[v] + calc_normal(t), places[v] = Place::kSkin;
   for (const Triangle& t : boundary) {

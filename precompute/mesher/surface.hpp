@@ -30,15 +30,15 @@ enum class Axis { kX = 0, kY = 1, kZ = 2 };
 
 /// What to make of which surface. At most one of height_m and scale, and at most one of edge_m and nodes.
 struct SurfaceOptions {
-  std::filesystem::path surface = {};      // OBJ, STL (ASCII or binary), PLY (ASCII or binary), OFF
+  std::filesystem::path surface = {};                // OBJ, STL (ASCII or binary), PLY (ASCII or binary), OFF
   std::optional<double> wall_m = std::nullopt;       // hollow: thickness of the wall, inward from the given surface; without it solid
   std::optional<double> height_m = std::nullopt;     // scales the surface so that its extent along `up` is this
-  Axis up = Axis::kY;                 // OBJ models stand along y by custom; the coordinates themselves are never turned
+  Axis up = Axis::kY;                                // OBJ models stand along y by custom; the coordinates themselves are never turned
   std::optional<double> scale = std::nullopt;        // metres per unit of the file; without scale and height_m the file is in metres
   std::optional<double> edge_m = std::nullopt;       // length of the tetrahedra's edges
   std::optional<std::int64_t> nodes = std::nullopt;  // nodes of the final mesh (order 2: with the mid-side ones), met within 10 %
-  int order = 1;                      // 1: four nodes a tetrahedron, 2: ten (mid-side nodes at the middle of the edges)
-  double sharp_angle_deg = 40;        // an edge whose two faces turn by more than this, and not by noise, stays sharp
+  int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten (mid-side nodes at the middle of the edges)
+  double sharp_angle_deg = 40;                       // an edge whose two faces turn by more than this, and not by noise, stays sharp
   Method method = Method::kAutomatic;
 };
 

@@ -16,8 +16,12 @@ using namespace testing;
 
 TEST(input, five_formats_give_the_same_body) {
   const Polygons box = make_box(0.5, 0.25, 0.125);  // exact in single precision
-  const std::pair<const char*, std::string> files[] = {{"box.off", to_off(box)},        {"box.obj", to_obj(box)},         {"box.PLY", to_ply(box)},
-                                                       {"box_ascii.stl", to_stl(box)},  {"box_bin.stl", to_binary_stl(box)}, {"box_bin.ply", to_binary_ply(box)}};
+  const std::pair<const char*, std::string> files[] = {{"box.off", to_off(box)},
+                                                       {"box.obj", to_obj(box)},
+                                                       {"box.PLY", to_ply(box)},
+                                                       {"box_ascii.stl", to_stl(box)},
+                                                       {"box_bin.stl", to_binary_stl(box)},
+                                                       {"box_bin.ply", to_binary_ply(box)}};
   for (const auto& [name, text] : files) {
     SCOPED_TRACE(name);
     SurfaceReport report;
@@ -126,7 +130,8 @@ TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
       {"text.obj", "no surface here\n", plain, "no triangles in it"},
       {"points.off", "OFF\n1 0 0\n0 0 0\n", plain, "no triangles in it"},
       {"huge.off", "OFF\n900000000000 12 0\n0 0 0\n", plain, "the header promises 900000000000 vertices"},
-      {"huge.ply", "ply\nformat ascii 1.0\nelement vertex 99999999\nproperty float x\nend_header\n", plain, "the header promises 99999999 vertex"},
+      {"huge.ply", "ply\nformat ascii 1.0\nelement vertex 99999999\nproperty float x\nend_header\n", plain,
+       "the header promises 99999999 vertex"},
       {"no.ply", "plop\n", plain, "line 1 is not 'ply'"},
       {"cut.stl", to_binary_stl(make_box(1, 1, 1)).substr(0, 300), plain, "the header promises 12 triangles"},
       {"index.off", bad_index, plain, "index.off"},
