@@ -76,8 +76,9 @@ KrylovResult run_krylov_schur(const KrylovRequest& request) {
   const auto deflated = static_cast<PetscInt>(request.deflated.size());
   const PetscInt room = n - deflated;
   const PetscInt wanted = std::min(request.wanted, room);
-  // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves.
-  const PetscInt ncv = std::min(room, wanted + (3 * wanted) / 4 + 30);
+  // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the
+  // modes on both sides of it and needs less.
+  const PetscInt ncv = std::min(room, wanted + (request.sigma > 0 ? wanted / 2 : wanted) + 30);
   check(EPSSetDimensions(eps, wanted, ncv, ncv));
   check(EPSSetTolerances(eps, request.tolerance, 200));
   check(EPSSetPurify(eps, PETSC_FALSE));
