@@ -5,6 +5,7 @@
 #include <CGAL/Polyhedral_mesh_domain_3.h>
 #include <CGAL/Surface_mesh.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -42,21 +43,25 @@ class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
   std::vector<std::pair<Vec3, Domain::Index>> find_first_points(double spacing_m) override {
     // Points inside the triangles: never on an edge, where the patch of a Delaunay edge's crossing would be in doubt.
     std::vector<std::pair<Vec3, Domain::Index>> points;
-    std::set<std::array<std::int64_t, 3>> taken;
+    // One per cube of the spacing and direction of the face, so that both sides of a thin plate get theirs.
+    std::set<std::array<std::int64_t, 4>> taken;
     const auto index = domain_->index_from_surface_patch_index({0, 1});
     for (const Triangle& t : surface_.triangles) {
       const Vec3 &a = surface_.points[t[0]], &b = surface_.points[t[1]], &c = surface_.points[t[2]];
-      const Vec3 p = 0.37 * a + (0.34 * b + 0.29 * c);
-      // One point per cube of the spacing, and none in the cubes around it.
-      std::array<std::int64_t, 3> cube;
-      for (int k = 0; k < 3; ++k) cube[k] = static_cast<std::int64_t>(std::floor(p[k] / spacing_m));
-      bool close = false;
-      for (int x = -1; x <= 1; ++x)
-        for (int y = -1; y <= 1; ++y)
-          for (int z = -1; z <= 1; ++z) close = close || taken.contains({cube[0] + x, cube[1] + y, cube[2] + z});
-      if (close) continue;
-      taken.insert(cube);
-      points.emplace_back(p, index);
+      const Vec3 normal = cross(b - a, c - a);
+      int axis = 0;
+      for (int k = 1; k < 3; ++k)
+        if (std::abs(normal[k]) > std::abs(normal[axis])) axis = k;
+      const double longest = std::max({norm(b - a), norm(c - b), norm(a - c)});
+      const int pieces = std::clamp(static_cast<int>(std::ceil(longest / spacing_m)), 1, 200);
+      for (int i = 0; i < pieces; ++i)
+        for (int j = 0; i + j < pieces; ++j) {
+          const double u = (i + 0.34) / pieces, v = (j + 0.29) / pieces;
+          const Vec3 p = (1 - u - v) * a + (u * b + v * c);
+          std::array<std::int64_t, 4> cube{0, 0, 0, normal[axis] > 0 ? axis : 3 + axis};
+          for (int k = 0; k < 3; ++k) cube[k] = static_cast<std::int64_t>(std::floor(p[k] / spacing_m));
+          if (taken.insert(cube).second) points.emplace_back(p, index);
+        }
     }
     return points;
   }
