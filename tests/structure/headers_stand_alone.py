@@ -9,7 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 source, build, compiler = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
 
-# The include folders of each folder of ours, from the build's own commands.
+# The ways in which the files of each folder of ours are compiled, from the build's own commands. There may be two: Simbody 3.7's headers
+# are C++17, and so are the few files that include them.
 flags = {}
 for command in json.loads((build / "compile_commands.json").read_text()):
     folder = pathlib.Path(command["file"]).parent
@@ -20,14 +21,18 @@ for command in json.loads((build / "compile_commands.json").read_text()):
             kept.append(word)
         elif word == "-isystem":
             kept += [word, words[i + 1]]
-    flags.setdefault(folder, kept)
+    if kept not in flags.setdefault(folder, []):
+        flags[folder].append(kept)
 
 
 def check(header):
-    if header.parent not in flags:
-        return None
-    result = subprocess.run([compiler, "-fsyntax-only", "-x", "c++", *flags[header.parent], str(header)], capture_output=True, text=True)
-    return None if result.returncode == 0 else f"{header.relative_to(source)}: does not compile by itself\n{result.stderr[:600]}"
+    errors = ""
+    for way in flags.get(header.parent, []):
+        result = subprocess.run([compiler, "-fsyntax-only", "-x", "c++", *way, str(header)], capture_output=True, text=True)
+        if result.returncode == 0:
+            return None
+        errors = result.stderr[:600]
+    return f"{header.relative_to(source)}: does not compile by itself\n{errors}" if errors else None
 
 
 headers = [h for top in ("runtime", "precompute", "partition", "jobs") for h in sorted((source / top).rglob("*.hpp"))]
