@@ -90,7 +90,7 @@ void check_held(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held
       throw InputError(fmt::format("held node {} is not in the mesh, which has {} nodes", node, mesh.nodes.size()));
 }
 
-Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, int ranks, bool with_order, Distribution& out) {
+Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, int ranks, Distribution& out) {
   check_held(mesh, held_nodes);
   std::vector<std::int32_t> corners;
   corners.reserve(4 * mesh.tet_count());
@@ -130,12 +130,10 @@ Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_
     for (std::size_t v = 0; v < plan.held.size(); ++v)
       if (plan.held[v] && plan.owner[v] >= 0) out.held_m[plan.component[v]].push_back(mesh.nodes[v]);
   }
-  if (with_order) {
-    std::vector<std::int32_t> rows(mesh.tets.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = plan.row[mesh.tets[i]];
-    const auto graph = partition::make_node_graph(rows, mesh.nodes_per_tet(), static_cast<std::int32_t>(out.free_nodes));
-    out.elimination_position = partition::order_nested_dissection(graph);
-  }
+  std::vector<std::int32_t> rows(mesh.tets.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = plan.row[mesh.tets[i]];
+  const auto graph = partition::make_node_graph(rows, mesh.nodes_per_tet(), static_cast<std::int32_t>(out.free_nodes));
+  out.elimination_position = partition::order_nested_dissection(graph);
   return plan;
 }
 
@@ -254,14 +252,14 @@ void share_facts(MPI_Comm comm, Distribution& out) {
 
 }  // namespace
 
-Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, bool with_order) {
+Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
   Distribution out;
   Plan plan;
   petsc::run_agreed(comm, [&] {
-    if (rank == 0) plan = make_plan(mesh, held_nodes, ranks, with_order, out);
+    if (rank == 0) plan = make_plan(mesh, held_nodes, ranks, out);
   });
   if (rank == 0) {
     std::vector<std::vector<std::int32_t>> elements(ranks);

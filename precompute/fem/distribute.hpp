@@ -53,14 +53,14 @@ struct Distribution {
   std::int32_t components = 0;            // connected through common nodes
   std::vector<std::vector<Vec3>> held_m;  // per component the positions of its held nodes, the same on every rank; empty when none is held
   std::vector<std::int32_t> row_of_node;  // rank 0 only: (N) row of each node of the mesh, -1: held or unused
-  std::vector<std::int32_t> elimination_position;  // rank 0 only: (free nodes), by row; empty unless asked for
+  std::vector<std::int32_t> elimination_position;  // rank 0 only: (free nodes), by row: METIS' nested dissection order
 };
 
 /// Cuts the mesh with METIS, numbers the free nodes so that each rank's are contiguous, and sends each rank its piece. The mesh and the
-/// held nodes are read on rank 0 only. with_order: also calculates METIS' nested dissection order of the free nodes.
+/// held nodes are read on rank 0 only.
 /// Collective. Throws on every rank: InputError when there are fewer tetrahedra than ranks, a held node is not in the mesh, or every node
 /// is held; SystemError when memory runs out.
-Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, bool with_order);
+Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes);
 
 /// The report as a few lines of text for people.
 std::string describe(const PartitionReport& report);

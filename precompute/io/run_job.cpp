@@ -119,9 +119,7 @@ fem::Distribution distribute_mesh(Run& run, MeshFacts& facts) {
   run.stations.end();
 
   run.stations.begin("partition", "METIS k-way on the dual graph");
-  const bool with_order =
-      run.job.factorisation == spec::Factorisation::mumps || (run.job.factorisation == spec::Factorisation::automatic && run.ranks > 1);
-  fem::Distribution pieces = fem::distribute(run.comm, mesh, held, with_order);
+  fem::Distribution pieces = fem::distribute(run.comm, mesh, held);
   for (std::int32_t& row : facts.row) row = pieces.row_of_node[row];
   pieces.row_of_node = {};
   std::string report = fem::describe(pieces.report);

@@ -54,7 +54,7 @@ std::vector<double> iterate_subspace(const SparseMatrix& k, const SparseMatrix& 
 }
 
 std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, spec::Mass mass) {
-  const Distribution pieces = distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {}, false);
+  const Distribution pieces = distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {});
   const System system = assemble(PETSC_COMM_WORLD, pieces.local, kAluminium, mass);
   std::vector<int> number;
   int size = 0;
