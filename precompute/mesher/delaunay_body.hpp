@@ -14,6 +14,8 @@
 #include <CGAL/perturb_mesh_3.h>
 #include <CGAL/refine_mesh_3.h>
 
+#include <memory>
+#include <stdexcept>
 #include <unordered_map>
 #include <utility>
 
@@ -28,6 +30,7 @@ class Mesh3Body : public DelaunayBody {
   using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
   using Point = typename Domain::Point_3;
   using WeightedPoint = typename Triangulation::Weighted_point;
+  using TriangulationIndex = typename Triangulation::Vertex::Index;
 
  public:
   mesh::TetMesh refine(const DelaunaySizes& sizes) override {
@@ -37,7 +40,15 @@ class Mesh3Body : public DelaunayBody {
     make_domain();
     complex_ = Complex();
     const double radius = kRadiusPerEdge * sizes.edge_m;
-    const Criteria criteria(p::edge_size = sizes.edge_m, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
+    narrow_ = calc_curve_sizes(polylines_, sizes.edge_m);
+    // Every ball on a curve asks for its size at least once; without a bound, balls that are shrunk in turn would go on for minutes.
+    const auto asked = std::make_shared<std::size_t>(0);
+    const std::size_t most_asked = 20'000 + 4 * sizes.most_nodes;
+    const auto calc_edge = [this, edge_m = sizes.edge_m, asked, most_asked](const Point& at, int, const TriangulationIndex&) -> double {
+      if (++*asked > most_asked) throw std::runtime_error("the sharp edges lie too close to each other");
+      return calc_size(narrow_, edge_m, {at.x(), at.y(), at.z()});
+    };
+    const Criteria criteria(p::edge_size = calc_edge, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
                             p::cell_radius_edge_ratio = 2, p::cell_size = radius);
     // A bound on the nodes ends what would otherwise go on for ever: balls between curves that nearly touch.
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
@@ -61,6 +72,7 @@ class Mesh3Body : public DelaunayBody {
   virtual std::vector<std::pair<Vec3, Index>> find_first_points(double spacing_m) = 0;
 
   std::unique_ptr<Domain> domain_;
+  std::vector<Polyline> polylines_;  // the sharp curves
   bool has_curves_ = false;
 
  private:
@@ -103,6 +115,7 @@ class Mesh3Body : public DelaunayBody {
   }
 
   Complex complex_;
+  std::vector<SizedPoint> narrow_;  // where curves lie closer together than edges are long
 };
 
 }  // namespace carillon::mesher

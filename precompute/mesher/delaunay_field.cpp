@@ -21,6 +21,7 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
       curves_.emplace_back();
       for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
     }
+    polylines_ = curves;
     has_curves_ = !curves_.empty();
   }
 

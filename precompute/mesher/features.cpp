@@ -138,13 +138,25 @@ std::vector<Polyline> find_sharp_curves(const TriangleSurface& surface, double s
   for (const auto& [ends, edge] : edges)
     if (edge.face_count == 2 && edge.turn_deg > sharp_angle_deg) sharp.push_back(ends);
 
+  const auto all = join_curves(surface, sharp);
+  std::vector<char> kept(all.size(), 0);
+  std::set<std::int32_t> ends;
+  // Short curves are noise, but for those between the ends of long ones: the edges of a plate along its thickness.
+  for (const bool is_long : {true, false})
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      const auto& curve = all[n];
+      double length = 0;
+      for (std::size_t i = 0; i + 1 < curve.size(); ++i) length += norm(surface.points[curve[i + 1]] - surface.points[curve[i]]);
+      if (!(length > 0) || (length >= shortest_m) != is_long) continue;
+      if (!is_long && !(ends.contains(curve.front()) && ends.contains(curve.back()))) continue;
+      kept[n] = is_crease(surface, edges, curve, sharp_angle_deg, radius);
+      if (kept[n] && is_long) ends.insert({curve.front(), curve.back()});
+    }
   std::vector<Polyline> out;
-  for (const auto& curve : join_curves(surface, sharp)) {
-    double length = 0;
-    for (std::size_t i = 0; i + 1 < curve.size(); ++i) length += norm(surface.points[curve[i + 1]] - surface.points[curve[i]]);
-    if (!(length > 0) || length < shortest_m || !is_crease(surface, edges, curve, sharp_angle_deg, radius)) continue;
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    if (!kept[n]) continue;
     out.emplace_back();
-    for (const std::int32_t v : curve) out.back().push_back(surface.points[v]);
+    for (const std::int32_t v : all[n]) out.back().push_back(surface.points[v]);
   }
   return out;
 }

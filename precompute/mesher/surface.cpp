@@ -8,10 +8,13 @@
 #include <cmath>
 #include <new>
 
+#include "precompute/mesher/count_search.hpp"
 #include "precompute/mesher/delaunay.hpp"
 #include "precompute/mesher/distance_field.hpp"
 #include "precompute/mesher/inset_curves.hpp"
 #include "precompute/mesher/nearest.hpp"
+#include "precompute/mesher/part_nodes.hpp"
+#include "precompute/mesher/quiet.hpp"
 #include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
@@ -24,8 +27,13 @@ namespace {
 constexpr double kMostNodes = 2e7;
 constexpr double kCountTolerance = 0.10;  // promised
 constexpr double kCountAim = 0.04;        // where the search is content
-constexpr int kMostAttempts = 9;
+constexpr int kMostFinishes = 4;          // meshes that are finished, as what that changes in the count is learned
 constexpr double kSliverDeg = 12;
+// Edges longer than the body is thick do not make the mesh coarser: on plates and cubes its count levels out at what the model gives for
+// this multiple of the mean thickness. A target under this part of that count is refused at once.
+constexpr double kEdgePerThickness = 1.4;
+constexpr double kHopeless = 0.4;
+constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
 /// Tells the user of a phase and keeps its time.
 class Phases {
@@ -95,22 +103,6 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
         "The body is {:.3g} m long. If the file is not in metres, give its height or a scale (0.001 for millimetres).", largest));
 }
 
-/// About how many corner nodes a body gets; fitted to meshes of the hollow bunny with 5,000 to 40,000 nodes.
-struct CountModel {
-  double volume_m3, area_m2, factor = 1;
-  double calc_nodes(double edge_m) const { return factor * (0.61 * volume_m3 / std::pow(edge_m, 3) + 1.15 * area_m2 / (edge_m * edge_m)); }
-  double find_edge(double nodes) const {
-    double low = 0, high = std::cbrt(volume_m3) + std::sqrt(area_m2);
-    while (calc_nodes(high) > nodes) high *= 2;
-    for (int n = 0; n < 100; ++n) (calc_nodes(0.5 * (low + high)) > nodes ? low : high) = 0.5 * (low + high);
-    return 0.5 * (low + high);
-  }
-};
-
-std::int64_t count_nodes(const mesh::TetMesh& mesh, int order) {
-  return static_cast<std::int64_t>(mesh.nodes.size()) + (order == 2 ? count_edges(mesh) : 0);
-}
-
 /// Everything the meshers need of the body.
 struct Body {
   MendedSurface mended;
@@ -166,7 +158,7 @@ std::unique_ptr<DelaunayBody> make_delaunay(const Body& body, const SurfaceOptio
 DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m) {
   const double distance = body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m;
   // Far more than any body needs at this edge length, so that only a runaway meets it.
-  const double most = 5000 + 8 * std::max(body.model.calc_nodes(edge_m), static_cast<double>(options.nodes.value_or(0)));
+  const double most = 3000 + 5 * std::max(body.model.calc_nodes(edge_m), static_cast<double>(options.nodes.value_or(0)));
   return {edge_m, distance, static_cast<std::size_t>(std::min(most, 3 * kMostNodes))};
 }
 
@@ -190,71 +182,104 @@ Vec3 project(const Body& body, Vec3 p) {
   return p;
 }
 
-/// Makes meshes with make(edge) until the count is within kCountAim, then returns the best edge; the last mesh made is the one of that
-/// edge.
-template <class Make>
-mesh::TetMesh search_edge(const SurfaceOptions& options, CountModel model, double& edge_m, SurfaceReport& report, Make&& make) {
-  const auto target = static_cast<double>(*options.nodes);
-  double best_edge = edge_m, best_error = 1e300, low = 0, high = 1e300;
-  double fewest = 1e300;
-  mesh::TetMesh mesh;
-  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
-    mesh = make(edge_m);
+/// Makes the body of a fresh mesh sound: no pinched edges or nodes, no crumbs, no element flatter than need be.
+void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
+  const auto project_here = [&](const Vec3& p) { return project(body, p); };
+  report.removed_tets = make_manifold(mesh, report.components);
+  report.parted_nodes = part_pinched_nodes(mesh, report.components, project_here);
+  better_flat_elements(mesh, kSliverDeg, project_here);
+}
+
+/// Refines until the count is met, and finishes the mesh; again with a corrected target should finishing have changed the count too much.
+mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases,
+                         const std::function<mesh::TetMesh(double)>& refine, const std::function<void(mesh::TetMesh&)>& finish) {
+  const auto refuse_empty = [&](const mesh::TetMesh& mesh) {
+    if (mesh.tets.empty())
+      throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
+                                   options.surface.string(), edge_m));
+  };
+  if (!options.nodes) {
     ++report.attempts;
-    const auto count = static_cast<double>(std::max<std::int64_t>(count_nodes(mesh, options.order), 1));
-    fewest = std::min(fewest, count);
-    const double error = std::abs(count / target - 1);
-    if (error < best_error) best_error = error, best_edge = edge_m;
-    if (error <= kCountAim) return mesh;
-    // The model, scaled to the last count, says where to go; the bracket keeps it from leaving what is known.
-    (count > target ? low : high) = edge_m;
-    model.factor *= count / model.calc_nodes(edge_m);
-    const bool bracketed = low > 0 && high < 1e300;
-    if (attempt + 1 == kMostAttempts || (bracketed && high / low < 1.004)) break;
-    edge_m = model.find_edge(target);
-    if (bracketed && !(edge_m > low * 1.002 && edge_m < high / 1.002)) edge_m = std::sqrt(low * high);
+    mesh::TetMesh mesh = phases.run("refining", [&] { return refine(edge_m); });
+    refuse_empty(mesh);
+    finish(mesh);
+    refuse_empty(mesh);
+    return mesh;
   }
-  if (best_error > kCountTolerance)
-    throw InputError(fmt::format(
-        "{}: {} nodes cannot be met within 10 %: the nearest mesh has {:.0f} % {}; {}", options.surface.string(), *options.nodes,
-        100 * best_error, fewest > target ? "more" : "less or more",
-        fewest > target ? fmt::format("the body's shape{} needs at least about {:.0f}", options.wall_m ? " and wall" : "", fewest)
-                        : std::string("try another count")));
-  if (edge_m == best_edge) return mesh;
-  edge_m = best_edge;
-  ++report.attempts;
-  return make(edge_m);
+  const auto asked = static_cast<double>(*options.nodes);
+  const double longest = calc_box(body.mended.surface.points).diagonal();
+  double target = asked, nearest = 0;
+  for (int n = 0; n < kMostFinishes; ++n) {
+    mesh::TetMesh mesh = phases.run("refining", [&] {
+      return search_edge({target, options.order, longest, kCountTolerance, kCountAim}, body.model, edge_m, report.attempts, refine);
+    });
+    finish(mesh);
+    const double count = std::max(static_cast<double>(count_nodes(mesh, options.order)), 1.0);
+    if (std::abs(count / asked - 1) <= kCountTolerance) return mesh;
+    nearest = count;
+    target *= std::clamp(asked / count, 0.7, 1.5);
+  }
+  throw CountError("the count cannot be met", nearest, nearest);
+}
+
+[[noreturn]] void throw_count(const SurfaceOptions& options, const CountError& failure) {
+  const auto asked = static_cast<double>(*options.nodes);
+  if (failure.fewest > asked)
+    throw InputError(
+        fmt::format("{}: {} nodes cannot be met within 10 %: the thickness of the body{} needs at least about {:.0f}; ask for that many",
+                    options.surface.string(), *options.nodes, options.wall_m ? "'s wall" : "", 1.05 * failure.fewest));
+  throw InputError(fmt::format("{}: {} nodes cannot be met within 10 %: the nearest mesh has {:.0f}; ask for that many",
+                               options.surface.string(), *options.nodes, failure.nearest));
 }
 
 /// The linear mesh by Delaunay refinement.
 mesh::TetMesh make_delaunay_mesh(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases) {
   const double first_edge = edge_m;
-  for (const bool keep_sharp : {true, false}) {
-    try {
-      edge_m = first_edge;
-      auto delaunay = phases.run("finding sharp edges", [&] { return make_delaunay(body, options, edge_m, keep_sharp, report); });
-      mesh::TetMesh mesh = phases.run("refining", [&] {
-        const auto make = [&](double edge) { return delaunay->refine(calc_sizes(body, options, edge)); };
-        if (options.nodes) return search_edge(options, body.model, edge_m, report, make);
-        ++report.attempts;
-        return make(edge_m);
-      });
-      if (mesh.tets.empty())
-        throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
-                                     options.surface.string(), edge_m));
-      return phases.run("removing slivers", [&] { return delaunay->optimise(kSliverDeg); });
-    } catch (const std::bad_alloc&) {
-      throw;
-    } catch (const std::exception& failure) {
-      // Sharp edges that lie closer together than the elements are long defeat the mesher; rounded, the body can still be meshed.
-      if (!keep_sharp || report.sharp_curves == 0) {
-        if (dynamic_cast<const InputError*>(&failure)) throw;
-        throw SolveError(
-            fmt::format("{}: the mesher failed: {}; try another edge length or node count", options.surface.string(), failure.what()));
-      }
-      report.notes.push_back(
-          "The sharp edges lie too close to each other for this element size and were rounded; ask for more nodes to keep them.");
+  std::optional<CountError> with_sharp;
+  const auto make = [&](bool keep_sharp) {
+    edge_m = first_edge;
+    auto delaunay = phases.run("finding sharp edges", [&] { return make_delaunay(body, options, edge_m, keep_sharp, report); });
+    const auto refine = [&](double edge) { return delaunay->refine(calc_sizes(body, options, edge)); };
+    const auto finish = [&](mesh::TetMesh& mesh) {
+      mesh = phases.run("removing slivers", [&] { return delaunay->optimise(kSliverDeg); });
+      phases.run("mending the mesh", [&] { return finish_mesh(mesh, body, report), 0; });
+    };
+    return meet_count(body, options, edge_m, report, phases, refine, finish);
+  };
+  const auto refuse = [&](const std::exception& failure) {
+    if (with_sharp) throw_count(options, *with_sharp);
+    throw SolveError(
+        fmt::format("{}: the mesher failed: {}; try another edge length or node count", options.surface.string(), failure.what()));
+  };
+  try {
+    return make(true);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const CountError& failure) {
+    if (report.sharp_curves == 0) throw_count(options, failure);
+    with_sharp = failure;
+  } catch (const std::exception& failure) {
+    if (report.sharp_curves == 0) {
+      if (dynamic_cast<const InputError*>(&failure)) throw;
+      refuse(failure);
     }
+  }
+  // Sharp edges that lie closer together than the elements are long defeat the mesher; rounded, the body can still be meshed.
+  report.notes.push_back(
+      "The sharp edges lie too close to each other for this element size and were rounded; ask for more nodes to keep them.");
+  try {
+    mesh::TetMesh mesh = make(false);
+    if (with_sharp && std::abs(measure(mesh).volume_m3 / report.expected_volume_m3 - 1) > kMostLostByRounding)
+      throw_count(options, *with_sharp);
+    return mesh;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const CountError& failure) {
+    throw_count(options, with_sharp.value_or(failure));
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::exception& failure) {
+    refuse(failure);
   }
   return {};
 }
@@ -332,6 +357,9 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   if (const double nodes = body.model.calc_nodes(edge); nodes > 1.5 * kMostNodes)
     throw InputError(
         fmt::format("edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones", edge, nodes, kMostNodes));
+  const double least = body.model.calc_nodes(kEdgePerThickness * body.thickness_m);
+  if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * least)
+    throw_count(options, CountError("", least, least));
   if (!options.edge_m && !options.nodes)
     report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
@@ -343,30 +371,24 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
 
   mesh::TetMesh linear;
   if (report.method == Method::kStuffing) {
-    linear = phases.run("stuffing", [&] {
-      const auto make = [&](double e) { return stuff(*body.field, body.wall_m, e); };
-      if (options.nodes) return search_edge(options, body.model, edge, report, make);
-      ++report.attempts;
-      return make(edge);
-    });
+    const auto refine = [&](double e) { return stuff(*body.field, body.wall_m, e); };
+    try {
+      linear = meet_count(body, options, edge, report, phases, refine, [&](mesh::TetMesh& mesh) { finish_mesh(mesh, body, report); });
+    } catch (const CountError& failure) {
+      throw_count(options, failure);
+    }
   } else {
     linear = make_delaunay_mesh(body, options, edge, report, phases);
   }
-  phases.run("checking", [&] {
-    const std::int64_t removed = make_manifold(linear, report.components);
-    if (removed > 0)
-      report.notes.push_back(fmt::format("{} elements were removed where the body only touched itself or was cut off.", removed));
-    if (linear.tets.empty())
-      throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
-                                   options.surface.string(), edge));
-    better_flat_elements(linear, kSliverDeg, [&](const Vec3& p) { return project(body, p); });
-    measure_mesh(linear, body, report);
-    if (!(report.volume_m3 > 0.6 * report.expected_volume_m3))
-      throw InputError(
-          fmt::format("{}: with edges of {:.3g} m only {:.0f} % of the body's volume can be meshed; ask for shorter edges or more nodes",
-                      options.surface.string(), edge, 100 * report.volume_m3 / report.expected_volume_m3));
-    return 0;
-  });
+  if (report.removed_tets > 0)
+    report.notes.push_back(fmt::format("{} elements were removed where the body only touched itself or was cut off.", report.removed_tets));
+  if (report.parted_nodes > 0)
+    report.notes.push_back(fmt::format("The mesh was mended at {} nodes where both skins of a thin part met.", report.parted_nodes));
+  measure_mesh(linear, body, report);
+  if (!(report.volume_m3 > 0.6 * report.expected_volume_m3))
+    throw InputError(
+        fmt::format("{}: with edges of {:.3g} m only {:.0f} % of the body's volume can be meshed; ask for shorter edges or more nodes",
+                    options.surface.string(), edge, 100 * report.volume_m3 / report.expected_volume_m3));
   report.edge_m = edge;
   mesh::TetMesh out = options.order == 2 ? make_second_order(linear) : std::move(linear);
   report.nodes = static_cast<std::int64_t>(out.nodes.size());
@@ -380,6 +402,7 @@ mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report,
   report = SurfaceReport{};
   check_options(options);
   Phases phases(report, progress);
+  const Quiet quiet;
   try {
     return make_mesh(options, report, phases);
   } catch (const std::bad_alloc&) {

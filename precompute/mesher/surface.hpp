@@ -64,9 +64,11 @@ struct SurfaceReport {
   std::int64_t nodes = 0;
   std::int64_t corner_nodes = 0;
   std::int64_t tets = 0;
-  double edge_m = 0;       // the edge length asked of the mesher
-  double mean_edge_m = 0;  // as it came out
-  int attempts = 0;        // meshes made to meet the node count
+  double edge_m = 0;              // the edge length asked of the mesher
+  double mean_edge_m = 0;         // as it came out
+  std::int64_t removed_tets = 0;  // where the body only touched itself, or crumbs
+  std::int64_t parted_nodes = 0;  // at which two skins met
+  int attempts = 0;               // meshes made to meet the node count
   double volume_m3 = 0;
   double expected_volume_m3 = 0;  // solid: input_volume_m3; with a wall: that of the shell by the distance field
   double min_dihedral_deg = 0;

@@ -142,24 +142,6 @@ std::vector<char> find_crumbs(const std::vector<std::array<std::int32_t, 4>>& ne
   return remove;
 }
 
-void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove) {
-  std::vector<std::int32_t> number(mesh.nodes.size(), -1), tets;
-  std::vector<Vec3> nodes;
-  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
-    if (remove[static_cast<std::size_t>(e)]) continue;
-    for (const std::int32_t v : mesh.tet(e)) {
-      if (number[v] < 0) {
-        number[v] = static_cast<std::int32_t>(nodes.size());
-        nodes.push_back(mesh.nodes[v]);
-      }
-      tets.push_back(number[v]);
-    }
-  }
-  mesh.nodes = std::move(nodes);
-  mesh.tets = std::move(tets);
-  mesh.regions.assign(static_cast<std::size_t>(mesh.tet_count()), 0);
-}
-
 }  // namespace
 
 TetMeasures measure(const mesh::TetMesh& mesh) {
@@ -202,6 +184,24 @@ std::int64_t count_edges(const mesh::TetMesh& mesh) {
     for (const auto& [a, b] : mesh::kEdges) edges.push_back(sorted(Edge{mesh.tet(e)[a], mesh.tet(e)[b]}));
   std::sort(edges.begin(), edges.end());
   return std::unique(edges.begin(), edges.end()) - edges.begin();
+}
+
+void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove) {
+  std::vector<std::int32_t> number(mesh.nodes.size(), -1), tets;
+  std::vector<Vec3> nodes;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+    if (remove[static_cast<std::size_t>(e)]) continue;
+    for (const std::int32_t v : mesh.tet(e)) {
+      if (number[v] < 0) {
+        number[v] = static_cast<std::int32_t>(nodes.size());
+        nodes.push_back(mesh.nodes[v]);
+      }
+      tets.push_back(number[v]);
+    }
+  }
+  mesh.nodes = std::move(nodes);
+  mesh.tets = std::move(tets);
+  mesh.regions.assign(static_cast<std::size_t>(mesh.tet_count()), 0);
 }
 
 std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components) {

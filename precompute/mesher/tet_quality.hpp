@@ -22,9 +22,13 @@ std::vector<Triangle> find_boundary(const mesh::TetMesh& mesh);
 /// Number of different edges, so corner nodes plus this is the count of the second-order mesh.
 std::int64_t count_edges(const mesh::TetMesh& mesh);
 
-/// Removes elements until every boundary edge has two boundary faces, the boundary is a surface around every node too, and no more
-/// than `components` pieces are left (the largest ones). Removes unused nodes. Linear meshes. Returns how many elements went.
+/// Removes elements until every boundary edge has two boundary faces, no node joins elements that do not hang together by faces
+/// around it, and no more than `components` pieces are left (the largest ones). Removes unused nodes. Linear meshes. Returns how many
+/// elements went.
 std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components);
+
+/// Removes the elements that are marked, and the nodes that nothing uses then. Linear meshes.
+void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove);
 
 /// The same mesh with a node at the middle of every edge.
 mesh::TetMesh make_second_order(const mesh::TetMesh& linear);

@@ -58,7 +58,8 @@ struct MendedSurface {
 MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path& path, SurfaceReport& report);
 
 /// The sharp edges of a mended surface, joined to curves. An edge is sharp if its two faces turn by more than
-/// `sharp_angle_deg`, also when its sides are averaged over `radius`; curves shorter than `shortest_m` are left out.
+/// `sharp_angle_deg`, also when its sides are averaged over `radius`; curves shorter than `shortest_m` are left out
+/// unless they join the ends of longer ones.
 /// A closed curve repeats its first point.
 std::vector<Polyline> find_sharp_curves(const TriangleSurface& surface, double sharp_angle_deg, double shortest_m, double radius);
 

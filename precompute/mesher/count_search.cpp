@@ -1,0 +1,111 @@
+// Method: secant steps on a model of the count, scaled to the last mesh, inside the bracket known so far. Where the count no longer falls
+// as
+//   edges grow, the body's own thickness sets it and the search ends. Counts of coarse meshes jump, so a row of edges is tried there too.
+// Source: our own.
+// Deviations: none.
+#include "precompute/mesher/count_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <optional>
+
+#include "precompute/mesher/tet_quality.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+constexpr int kMostSteps = 10;
+// Below this target a mesh costs a few hundredths of a second, and the row of edges is tried.
+constexpr double kCheapTarget = 3000;
+constexpr int kRow = 24;
+
+struct Trial {
+  double edge_m, count;
+};
+
+/// True if edges a good deal longer gave hardly fewer nodes.
+bool is_level(const std::vector<Trial>& trials, double target) {
+  for (const Trial& a : trials)
+    for (const Trial& b : trials)
+      if (a.count > target && b.count > target && b.edge_m > 1.25 * a.edge_m && b.count > 0.9 * a.count) return true;
+  return false;
+}
+
+}  // namespace
+
+double CountModel::calc_nodes(double edge_m) const {
+  return factor * (0.61 * volume_m3 / std::pow(edge_m, 3) + 1.15 * area_m2 / (edge_m * edge_m));
+}
+
+double CountModel::find_edge(double nodes) const {
+  double low = 0, high = std::cbrt(volume_m3) + std::sqrt(area_m2);
+  while (calc_nodes(high) > nodes) high *= 2;
+  for (int n = 0; n < 100; ++n) (calc_nodes(0.5 * (low + high)) > nodes ? low : high) = 0.5 * (low + high);
+  return 0.5 * (low + high);
+}
+
+std::int64_t count_nodes(const mesh::TetMesh& linear, int order) {
+  return static_cast<std::int64_t>(linear.nodes.size()) + (order == 2 ? count_edges(linear) : 0);
+}
+
+mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& edge_m, int& attempts,
+                          const std::function<mesh::TetMesh(double)>& make) {
+  const double target = search.target;
+  std::vector<Trial> trials;
+  mesh::TetMesh mesh;
+  double last_edge = 0;
+  std::optional<Trial> best;
+  // The count at an edge, or nothing if such a mesh cannot be made though shorter edges could.
+  const auto attempt = [&](double edge) -> std::optional<double> {
+    ++attempts;
+    try {
+      mesh = make(edge);
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception&) {
+      if (trials.empty()) throw;
+      last_edge = 0;
+      return std::nullopt;
+    }
+    last_edge = edge;
+    const auto count = static_cast<double>(count_nodes(mesh, search.order));
+    if (count > 0) trials.push_back({edge, count});
+    if (count > 0 && (!best || std::abs(count - target) < std::abs(best->count - target))) best = {edge, count};
+    return count;
+  };
+  const auto is_met = [&](double tolerance) { return best && std::abs(best->count / target - 1) <= tolerance; };
+
+  double edge = std::min(edge_m, search.longest_m), low = 0, high = 1e300;
+  for (int step = 0; step < kMostSteps && !is_met(search.contented); ++step) {
+    const std::optional<double> count = attempt(edge);
+    if (is_level(trials, target)) break;
+    if (!count || *count < target)
+      high = std::min(high, edge);
+    else
+      low = std::max(low, edge);
+    if (count && *count > 0) model.factor *= *count / model.calc_nodes(edge);
+    const bool bracketed = low > 0 && high < 1e300;
+    if (high / std::max(low, 1e-300) < 1.004 || (low >= search.longest_m)) break;
+    edge = count && *count > 0 ? std::min(model.find_edge(target), search.longest_m) : 0.7 * edge;
+    if (bracketed && !(edge > low * 1.002 && edge < high / 1.002)) edge = std::sqrt(low * high);
+  }
+  if (!is_met(search.tolerance) && target < kCheapTarget && best && !is_level(trials, target)) {
+    const double middle = best->edge_m;
+    for (int n = 0; n < kRow && !is_met(0.8 * search.tolerance); ++n)
+      attempt(std::min(middle * (1 + 0.015 * (n / 2 + 1) * (n % 2 == 0 ? 1 : -1)), search.longest_m));
+  }
+  if (!is_met(search.tolerance)) {
+    double fewest = 1e300;
+    for (const Trial& t : trials) fewest = std::min(fewest, t.count);
+    throw CountError("the count cannot be met", fewest, best ? best->count : 0);
+  }
+  edge_m = best->edge_m;
+  if (last_edge != edge_m) {
+    ++attempts;
+    mesh = make(edge_m);
+  }
+  return mesh;
+}
+
+}  // namespace carillon::mesher

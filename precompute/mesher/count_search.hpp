@@ -1,0 +1,44 @@
+// The edge length at which a mesh has the node count that was asked for.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <stdexcept>
+#include <string>
+
+#include "precompute/mesh/tet_mesh.hpp"
+
+namespace carillon::mesher {
+
+/// About how many nodes a body gets; fitted to meshes of the hollow bunny with 5,000 to 40,000 nodes.
+struct CountModel {
+  double volume_m3 = 0, area_m2 = 0, factor = 1;
+  double calc_nodes(double edge_m) const;
+  double find_edge(double nodes) const;
+};
+
+/// Nodes of the mesh, of order 2 with those at the middle of its edges.
+std::int64_t count_nodes(const mesh::TetMesh& linear, int order);
+
+/// The count cannot be met; `fewest` is the smallest count of all meshes made.
+struct CountError : std::runtime_error {
+  CountError(const std::string& what, double fewest_nodes, double nearest_nodes)
+      : std::runtime_error(what), fewest(fewest_nodes), nearest(nearest_nodes) {}
+  double fewest, nearest;
+};
+
+struct CountSearch {
+  double target = 0;     // nodes
+  int order = 1;         // of the mesh that is counted
+  double longest_m = 0;  // no edge longer than this is tried
+  double tolerance = 0;  // largest relative error of a result
+  double contented = 0;  // relative error at which the search ends
+};
+
+/// Makes meshes with make(edge), from `edge_m` on, until one has the count; a failure of make at long edges counts as too few of them.
+/// Returns the mesh nearest to it, `edge_m` is its edge then; the last mesh made is that one. Throws CountError if none is within the
+/// tolerance, and what make throws if it never succeeds. `attempts` counts the meshes. At most about twenty meshes, of small ones forty.
+mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& edge_m, int& attempts,
+                          const std::function<mesh::TetMesh(double edge_m)>& make);
+
+}  // namespace carillon::mesher

@@ -1,0 +1,153 @@
+// Method: the boundary faces around a node form one fan on a surface. Where they form several, the cheapest place for a second node is
+//   sought over each of the fans, and the space between fan and node filled with one element per face.
+// Source: our own; the inverse of the edge collapse that would have pinched a sound mesh.
+// Deviations: none.
+#include "precompute/mesher/part_nodes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "precompute/mesher/tet_quality.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+// The flattest element that may be added; smoothing opens it further.
+constexpr double kFlattestDeg = 4;
+constexpr int kMostPasses = 8;
+
+using Fan = std::vector<std::array<std::int32_t, 2>>;  // the other two nodes of each face, counter-clockwise seen from outside
+
+/// The fans of the boundary faces around each node that has more than one.
+std::map<std::int32_t, std::vector<Fan>> find_pinched(const mesh::TetMesh& mesh) {
+  std::vector<std::vector<std::array<std::int32_t, 2>>> around(mesh.nodes.size());
+  for (const Triangle& t : find_boundary(mesh))
+    for (int c = 0; c < 3; ++c) around[t[c]].push_back({t[(c + 1) % 3], t[(c + 2) % 3]});
+  std::map<std::int32_t, std::vector<Fan>> pinched;
+  for (std::size_t v = 0; v < around.size(); ++v) {
+    auto left = around[v];
+    std::vector<Fan> fans;
+    while (!left.empty()) {
+      // Each face is followed by the one that begins where it ends.
+      Fan fan{left.back()};
+      left.pop_back();
+      for (;;) {
+        const auto next = std::find_if(left.begin(), left.end(), [&](const auto& face) { return face[0] == fan.back()[1]; });
+        if (next == left.end()) break;
+        fan.push_back(*next);
+        left.erase(next);
+      }
+      fans.push_back(fan);
+    }
+    if (fans.size() > 1) pinched.emplace(static_cast<std::int32_t>(v), fans);
+  }
+  return pinched;
+}
+
+/// The smallest dihedral angle of a tetrahedron, or of 180 degrees less its largest; negative if it is inverted.
+double calc_flatness(const std::array<Vec3, 4>& p) {
+  if (!(dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) > 0)) return -1;
+  std::array<Vec3, 4> normal;
+  for (int f = 0; f < 4; ++f)
+    normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
+  double worst = 180;
+  for (int i = 0; i < 4; ++i)
+    for (int j = i + 1; j < 4; ++j) {
+      const double turn = std::atan2(norm(cross(normal[i], normal[j])), dot(normal[i], normal[j])) * 180 / std::numbers::pi;
+      worst = std::min({worst, turn, 180 - turn});
+    }
+  return worst;
+}
+
+bool is_inside(const mesh::TetMesh& mesh, std::int32_t e, const Vec3& x) {
+  const auto tet = mesh.tet(e);
+  for (const auto& face : mesh::kFaces) {
+    const Vec3 &a = mesh.nodes[tet[face[0]]], &b = mesh.nodes[tet[face[1]]], &c = mesh.nodes[tet[face[2]]];
+    if (dot(cross(b - a, c - a), x - a) >= 0) return false;  // the faces' normals point outward
+  }
+  return true;
+}
+
+struct Place {
+  double flatness = -1;
+  Vec3 at{};
+};
+
+/// The place over the fan that gives the best elements.
+Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, const std::function<Vec3(const Vec3&)>& project) {
+  const Vec3 middle = mesh.nodes[v];
+  Vec3 normal{}, centre{};
+  double length = 0;
+  for (const auto& [a, b] : fan) {
+    normal = normal + cross(mesh.nodes[a] - middle, mesh.nodes[b] - middle);
+    centre = centre + (1.0 / static_cast<double>(fan.size())) * mesh.nodes[a];
+    length += norm(mesh.nodes[a] - middle) / static_cast<double>(fan.size());
+  }
+  std::vector<Vec3> places{centre};
+  if (norm(normal) > 0)
+    for (const double part : {1.0, 0.7, 0.5, 0.35, 0.25, 0.15}) places.push_back(middle + (part * length / norm(normal)) * normal);
+  for (std::size_t n = places.size(); n-- > 0;) places.push_back(project(places[n]));
+  Place best;
+  for (const Vec3& x : places) {
+    double worst = 180;
+    for (const auto& [a, b] : fan) worst = std::min(worst, calc_flatness({middle, mesh.nodes[a], mesh.nodes[b], x}));
+    if (worst > best.flatness) best = {worst, x};
+  }
+  return best;
+}
+
+}  // namespace
+
+std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, const std::function<Vec3(const Vec3&)>& project) {
+  std::int64_t mended = 0;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    const auto pinched = find_pinched(mesh);
+    if (pinched.empty()) break;
+    std::vector<std::vector<std::int32_t>> around(mesh.nodes.size());
+    for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
+      for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
+    std::vector<char> touched(mesh.nodes.size(), 0);
+    std::vector<char> remove(static_cast<std::size_t>(mesh.tet_count()), 0);
+    for (const auto& [v, fans] : pinched) {
+      // Fans of neighbours change with each other: they wait for the next pass.
+      bool wait = touched[v];
+      for (const Fan& fan : fans)
+        for (const auto& face : fan) wait = wait || touched[face[0]];
+      if (wait) continue;
+      ++mended;
+      Place best;
+      const Fan* over = nullptr;
+      for (const Fan& fan : fans) {
+        const Place place = find_place(mesh, v, fan, project);
+        if (!(place.flatness > best.flatness)) continue;
+        bool free = true;
+        for (const auto& face : fan)
+          for (const std::int32_t e : around[face[0]]) free = free && !is_inside(mesh, e, place.at);
+        if (free) best = place, over = &fan;
+      }
+      touched[v] = 1;
+      for (const Fan& fan : fans)
+        for (const auto& face : fan) touched[face[0]] = 1;
+      if (over == nullptr || best.flatness < kFlattestDeg || pass + 2 >= kMostPasses) {
+        for (const std::int32_t e : around[v]) remove[e] = 1;
+        continue;
+      }
+      const auto fresh = static_cast<std::int32_t>(mesh.nodes.size());
+      mesh.nodes.push_back(best.at);
+      for (const auto& [a, b] : *over) {
+        mesh.tets.insert(mesh.tets.end(), {v, a, b, fresh});
+        mesh.regions.push_back(0);
+        remove.push_back(0);
+      }
+    }
+    if (std::find(remove.begin(), remove.end(), 1) != remove.end()) drop_elements(mesh, remove);
+    make_manifold(mesh, components);
+  }
+  return mended;
+}
+
+}  // namespace carillon::mesher

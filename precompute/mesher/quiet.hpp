@@ -1,0 +1,21 @@
+// Keeps libraries from talking past the program.
+#pragma once
+
+#include <memory>
+
+namespace carillon::mesher {
+
+/// While it lives, CGAL's warnings and what anybody writes to std::cerr go nowhere; CGAL's errors still throw. One at a time.
+class Quiet {
+ public:
+  Quiet();
+  ~Quiet();
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+
+ private:
+  struct Saved;
+  std::unique_ptr<Saved> saved_;
+};
+
+}  // namespace carillon::mesher
