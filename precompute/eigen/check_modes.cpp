@@ -1,9 +1,10 @@
-// Method:     Residuals and Gram matrix with matrix-matrix products; orthonormalisation by the Newton-Schulz step of the polar factor.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 15.9 (a residual bounds the error of its eigenvalue); Higham,
-//             Functions of Matrices, 2008, section 8.3 (polar factor).
+// Method:     Residuals and Gram matrix with matrix-matrix products; Gram-Schmidt as Cholesky of the Gram matrix.
+// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 4.5 (a residual bounds the error of its eigenvalue); Golub, Van
+//             Loan, Matrix Computations, sections 2.7 (rounding of products) and 5.2 (orthonormal bases).
 // Deviations: none.
 #include "precompute/eigen/check_modes.hpp"
 
+#include <fmt/core.h>
 #include <petscblaslapack.h>
 
 #include <algorithm>
@@ -11,7 +12,9 @@
 #include <cmath>
 #include <tuple>
 
+#include "precompute/eigen/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
 
 namespace carillon::eigen {
 namespace {
@@ -19,45 +22,7 @@ namespace {
 using petsc::check;
 
 constexpr double kTieTolerance = 1e-6;
-constexpr double kRoundOff = 100;
-
-// A dense matrix's own rows, column-major.
-struct LocalColumns {
-  explicit LocalColumns(Mat dense) : mat(dense) {
-    PetscInt first = 0;
-    PetscInt last = 0;
-    check(MatGetOwnershipRange(dense, &first, &last));
-    check(MatGetSize(dense, nullptr, &columns));
-    check(MatDenseGetLDA(dense, &stride));
-    rows = last - first;
-    check(MatDenseGetArray(dense, &values));
-  }
-  ~LocalColumns() { (void)MatDenseRestoreArray(mat, &values); }
-  LocalColumns(const LocalColumns&) = delete;
-  LocalColumns& operator=(const LocalColumns&) = delete;
-  double* column(PetscInt j) const { return values + static_cast<std::size_t>(j) * static_cast<std::size_t>(stride); }
-
-  Mat mat = nullptr;
-  PetscScalar* values = nullptr;
-  PetscInt rows = 0;
-  PetscInt columns = 0;
-  PetscInt stride = 0;
-};
-
-// C = A^T B over all ranks, (a.columns, b.columns) column-major.
-std::vector<double> calc_gram(MPI_Comm comm, const LocalColumns& a, const LocalColumns& b) {
-  std::vector<double> gram(static_cast<std::size_t>(a.columns) * static_cast<std::size_t>(b.columns), 0.0);
-  PetscBLASInt m = a.columns;
-  PetscBLASInt n = b.columns;
-  PetscBLASInt k = a.rows;
-  PetscBLASInt lda = std::max(a.stride, 1);
-  PetscBLASInt ldb = std::max(b.stride, 1);
-  double one = 1;
-  double zero = 0;
-  if (k > 0) BLASgemm_("T", "N", &m, &n, &k, &one, a.values, &lda, b.values, &ldb, &zero, gram.data(), &m);
-  MPI_Allreduce(MPI_IN_PLACE, gram.data(), static_cast<int>(gram.size()), MPI_DOUBLE, MPI_SUM, comm);
-  return gram;
-}
+constexpr double kRoundOff = 10;  // Refined modes of thin shelves come out at 1 to 2.
 
 }  // namespace
 
@@ -132,19 +97,17 @@ void orthonormalise_shapes(Mat mass, Mat shapes) {
   petsc::MatHandle m_shapes;
   check(MatMatMult(mass, shapes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, m_shapes.out()));
   const LocalColumns phi(shapes);
-  const LocalColumns work(m_shapes);
-  std::vector<double> step = calc_gram(comm, phi, work);
-  const auto modes = static_cast<std::size_t>(phi.columns);
-  for (std::size_t i = 0; i < step.size(); ++i) step[i] *= -0.5;
-  for (std::size_t i = 0; i < modes; ++i) step[i * modes + i] += 1.5;
-  for (PetscInt j = 0; j < phi.columns; ++j) std::copy_n(phi.column(j), phi.rows, work.column(j));
-  PetscBLASInt m = phi.rows;
-  PetscBLASInt n = phi.columns;
-  PetscBLASInt lda = std::max(work.stride, 1);
-  PetscBLASInt ldc = std::max(phi.stride, 1);
+  const LocalColumns m_phi(m_shapes);
+  std::vector<double> gram = calc_gram(comm, phi, m_phi);
+  PetscBLASInt rows = phi.rows;
+  PetscBLASInt modes = phi.columns;
+  PetscBLASInt stride = std::max(phi.stride, 1);
+  PetscBLASInt info = 0;
   double one = 1;
-  double zero = 0;
-  if (m > 0) BLASgemm_("N", "N", &m, &n, &n, &one, work.values, &lda, step.data(), &n, &zero, phi.values, &ldc);
+  LAPACKpotrf_("U", &modes, gram.data(), &modes, &info);
+  if (info != 0)
+    throw SolveError(fmt::format("Mode {} is a combination of lower ones: it converged twice. Solve the band in parts.", info));
+  if (rows > 0) BLAStrsm_("R", "U", "N", "N", &rows, &modes, &one, gram.data(), &modes, phi.values, &stride);
 }
 
 void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {

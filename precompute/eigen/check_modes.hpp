@@ -19,8 +19,9 @@ struct ModeErrors {
 /// Normalises each column to phi^T M phi = 1 and measures residuals and orthonormality. shapes: (3n, modes) dense. Collective.
 ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<double>& lambda, Mat shapes);
 
-/// Phi <- Phi (3 I - Phi^T M Phi) / 2: one step towards the nearest M-orthonormal set, which squares the error. Columns must be M-normal.
-/// Collective.
+/// Gram-Schmidt in the M inner product from the first column on: Phi <- Phi R^-1 with Phi^T M Phi = R^T R. Columns must ascend in lambda:
+/// an error of a high mode, small beside its own lambda, would be large beside a low one's, so the low modes must take none from above.
+/// Collective. Throws SolveError when columns are linearly dependent.
 void orthonormalise_shapes(Mat mass, Mat shapes);
 
 /// Turns each column so that its entry of largest magnitude is positive; among entries as large to 1e-6 the one whose node comes first by

@@ -8,6 +8,7 @@
 #include <slepceps.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "precompute/petsc/session.hpp"
 
@@ -40,6 +41,17 @@ PetscErrorCode apply_inverse(PC pc, Vec b, Vec x) {
 
 PetscErrorCode report_progress(EPS, PetscInt, PetscInt converged, PetscScalar*, PetscScalar*, PetscReal*, PetscInt, void* context) {
   static_cast<const KrylovRequest*>(context)->progress(converged);
+  return 0;
+}
+
+// Error of lambda = sigma + 1 / theta relative to lambda, where that is more than the error of theta relative to theta: a mode near zero
+// keeps its digits though the shift is far above it. Beyond kDigits the operator's own rounding would let nothing converge.
+PetscErrorCode calc_error(EPS, PetscScalar theta, PetscScalar, PetscReal residual, PetscReal* error, void* context) {
+  constexpr double kDigits = 1e3;
+  const double sigma = static_cast<const KrylovRequest*>(context)->sigma;
+  const double lambda = std::abs(sigma + 1 / theta);
+  const double loss = std::min(std::abs(1 / theta) / std::max(lambda, PETSC_MACHINE_EPSILON), kDigits);
+  *error = residual / std::abs(theta) * std::max(loss, 1.0);
   return 0;
 }
 
@@ -81,6 +93,7 @@ KrylovResult run_krylov_schur(const KrylovRequest& request) {
   const PetscInt ncv = std::min(room, wanted + (request.sigma > 0 ? wanted / 2 : wanted) + 30);
   check(EPSSetDimensions(eps, wanted, ncv, ncv));
   check(EPSSetTolerances(eps, request.tolerance, 200));
+  check(EPSSetConvergenceTestFunction(eps, calc_error, const_cast<KrylovRequest*>(&request), nullptr));
   check(EPSSetPurify(eps, PETSC_FALSE));
   if (deflated > 0) check(EPSSetDeflationSpace(eps, deflated, const_cast<Vec*>(request.deflated.data())));
   if (request.progress) check(EPSMonitorSet(eps, report_progress, const_cast<KrylovRequest*>(&request), nullptr));

@@ -21,7 +21,7 @@ struct KrylovRequest {
   ShiftedFactor* factor = nullptr;  // already factorised at sigma
   double sigma = 0;
   PetscInt wanted = 0;                                   // the eigenvalues nearest sigma, those of the deflated space not counted
-  double tolerance = 1e-10;                              // of the Ritz residual, relative to theta = 1 / (lambda - sigma)
+  double tolerance = 1e-10;                              // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
   std::vector<Vec> deflated;                             // M-orthonormal, the run stays M-orthogonal to them
   std::function<void(std::int64_t converged)> progress;  // may be empty
 };

@@ -16,11 +16,16 @@
 #include <numbers>
 #include <numeric>
 
+#include "precompute/eigen/check_input.hpp"
 #include "precompute/eigen/check_modes.hpp"
 #include "precompute/eigen/dense_modes.hpp"
 #include "precompute/eigen/krylov.hpp"
+#include "precompute/eigen/refine.hpp"
 #include "precompute/eigen/rigid_modes.hpp"
+#include "precompute/eigen/scaling.hpp"
 #include "precompute/eigen/shifted_factor.hpp"
+#include "precompute/eigen/slices.hpp"
+#include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -35,75 +40,15 @@ constexpr std::int64_t kSliceModes = 320;  // Beyond, Gram-Schmidt costs more th
 constexpr double kEdgeNudge = 1e-6;        // Counts are taken this far outside the band, relative to lambda.
 constexpr double kEdgeTolerance = 1e-9;    // A mode this close to an end of the band (relative to lambda) is in it.
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
-constexpr int kRounds = 4;                 // Krylov runs per slice until its count is met.
+constexpr int kRounds = 60;                // Krylov runs per slice at most until its count is met,
+constexpr int kIdleRounds = 2;             // and so many without a new mode.
+constexpr double kKrylovTolerance = 1e-2;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
 constexpr double kOrthonormal = 1e-11;     // Good enough without another step of orthonormalisation.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
   return omega_rad_s * omega_rad_s;
 }
-
-// Adds the time of its life to a sum.
-class Timer {
- public:
-  explicit Timer(double& sum) : sum_(sum), start_(MPI_Wtime()) {}
-  ~Timer() { sum_ += MPI_Wtime() - start_; }
-  Timer(const Timer&) = delete;
-  Timer& operator=(const Timer&) = delete;
-
- private:
-  double& sum_;
-  double start_;
-};
-
-// K and M times powers of two, so that lambda is about 1 at the upper end and M about 1: thresholds of the solvers then mean what they say.
-// Powers of two change no mantissa; the destructor restores every bit.
-class Scaling {
- public:
-  Scaling(Mat stiffness, Mat mass, double lambda_high) : stiffness_(stiffness), mass_(mass) {
-    PetscScalar trace = 0;
-    PetscInt n = 0;
-    check(MatGetTrace(mass, &trace));
-    check(MatGetSize(mass, &n, nullptr));
-    if (!(trace > 0) || !std::isfinite(trace)) throw SolveError("The mass matrix has no positive trace. Look for elements without volume.");
-    mass_power_ = 2 * static_cast<int>(std::lround(0.5 * std::log2(trace / n)));  // Even: its root is a power of two as well.
-    lambda_power_ = static_cast<int>(std::lround(std::log2(lambda_high)));
-    scale(1);
-  }
-  ~Scaling() {
-    try {
-      scale(-1);
-    } catch (...) {  // Only a destroyed matrix can fail here.
-    }
-  }
-  Scaling(const Scaling&) = delete;
-  Scaling& operator=(const Scaling&) = delete;
-
-  double to_scaled(double lambda) const { return std::ldexp(lambda, -lambda_power_); }
-  double from_scaled(double lambda) const { return std::ldexp(lambda, lambda_power_); }
-  double get_shape_factor() const { return std::ldexp(1.0, -mass_power_ / 2); }
-
- private:
-  void scale(int direction) {
-    check(MatScale(mass_, std::ldexp(1.0, -direction * mass_power_)));
-    check(MatScale(stiffness_, std::ldexp(1.0, -direction * (mass_power_ + lambda_power_))));
-  }
-
-  Mat stiffness_;
-  Mat mass_;
-  int mass_power_ = 0;
-  int lambda_power_ = 0;
-};
-
-// An interval of lambda (scaled) and how many eigenvalues lie below its ends.
-struct Slice {
-  double low = 0;
-  std::int64_t below_low = 0;
-  double high = 0;
-  std::int64_t below_high = 0;
-
-  std::int64_t count() const { return below_high - below_low; }
-};
 
 class BandSolver {
  public:
@@ -115,8 +60,7 @@ class BandSolver {
   void solve_sparse_band();
   std::int64_t count_below(double lambda);
   Slice count_band();
-  Slice cut_to_max_modes(const Slice& band);
-  std::vector<Slice> cut_into_slices(const Slice& band);
+  std::vector<Slice> cut(const Slice& band);
   void solve_slice(const Slice& slice, bool is_only);
   std::int64_t run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t wanted, double tolerance);
   void collect(const DensePairs* dense);
@@ -141,47 +85,6 @@ class BandSolver {
   Pairs found_;
   Modes modes_;
 };
-
-void check_input(const Problem& problem, const Options& options) {
-  if (problem.stiffness == nullptr || problem.mass == nullptr) throw InputError("The eigenproblem lacks its stiffness or mass matrix.");
-  if (!(options.high_hz > options.low_hz) || !(options.low_hz >= 0) || !std::isfinite(options.high_hz)) {
-    throw InputError(fmt::format("The band {} .. {} Hz is empty or negative: give two frequencies, the lower one first.", options.low_hz,
-                                 options.high_hz));
-  }
-  if (options.max_modes && *options.max_modes < 1)
-    throw InputError(fmt::format("max_modes is {}: it must be at least 1.", *options.max_modes));
-  if (!(options.tolerance > 0) || options.tolerance > 1e-2) {
-    throw InputError(fmt::format("The tolerance {} is out of range: take one between 1e-14 and 1e-2.", options.tolerance));
-  }
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm));
-  int size = 1;
-  MPI_Comm_size(comm, &size);
-  if (size > 1 && options.factorisation == Factorisation::kCholmod) {
-    throw InputError(fmt::format("CHOLMOD factorises on one rank and there are {}: take MUMPS.", size));
-  }
-  petsc::run_agreed(comm, [&] {
-    PetscInt rows = 0;
-    PetscInt n = 0;
-    check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
-    check(MatGetSize(problem.stiffness, &n, nullptr));
-    const NodeLayout& nodes = problem.nodes;
-    if (static_cast<std::size_t>(rows) != 3 * nodes.position.size() || nodes.position.size() != nodes.component.size()) {
-      throw InputError(fmt::format("The node layout has {} positions and {} components for {} rows of the stiffness matrix.",
-                                   nodes.position.size(), nodes.component.size(), rows));
-    }
-    for (const std::int32_t c : nodes.component) {
-      if (c < 0 || c >= nodes.component_count)
-        throw InputError(fmt::format("Component {} is none of the layout's {}.", c, nodes.component_count));
-    }
-    const std::size_t order = nodes.elimination_position.size();
-    int rank = 0;
-    MPI_Comm_rank(comm, &rank);
-    if (rank == 0 && order != 0 && 3 * order != static_cast<std::size_t>(n)) {
-      throw InputError(fmt::format("The elimination order names {} nodes of {}.", order, n / 3));
-    }
-  });
-}
 
 BandSolver::BandSolver(const Problem& problem, const Options& options)
     : problem_(problem), options_(options), scaling_(problem.stiffness, problem.mass, calc_lambda(options.high_hz)) {
@@ -273,45 +176,11 @@ Slice BandSolver::count_band() {
   return band;
 }
 
-// Lowers the upper end until the slice holds few more than max_modes. Modes of a body lie about evenly in frequency: cut there.
-Slice BandSolver::cut_to_max_modes(const Slice& band) {
-  if (!options_.max_modes || *options_.max_modes >= band.count()) return band;
-  const std::int64_t wanted = *options_.max_modes;
-  const std::int64_t enough = wanted + std::max<std::int64_t>(10, wanted / 4);
-  Slice cut = band;
-  double too_low = band.low;
-  std::int64_t below_too_low = band.below_low;
-  for (int i = 0; i < 8 && cut.count() > enough; ++i) {
-    const auto goal = static_cast<double>(band.below_low + (wanted + enough) / 2 - below_too_low);
-    const double part = std::clamp(goal / static_cast<double>(cut.below_high - below_too_low), 0.05, 0.95);
-    const double root = std::lerp(std::sqrt(too_low), std::sqrt(cut.high), part);
-    const double trial = root * root;
-    const std::int64_t below = count_below(trial);
-    if (below - band.below_low >= wanted) {
-      cut.high = trial;
-      cut.below_high = below;
-    } else {
-      too_low = trial;
-      below_too_low = below;
-    }
-  }
-  return cut;
-}
-
-std::vector<Slice> BandSolver::cut_into_slices(const Slice& band) {
-  const double width = band.high - band.low;
-  if (band.count() <= kSliceModes || width < 1e-4 * band.high || options_.factorisation == Factorisation::kCholmod) return {band};
-  const auto parts = static_cast<double>((band.count() + kSliceModes - 1) / kSliceModes);
-  const double root = std::lerp(std::sqrt(band.low), std::sqrt(band.high), std::floor(parts / 2) / parts);
-  Slice left = band;
-  left.high = root * root;
-  left.below_high = count_below(left.high);
-  Slice right = band;
-  right.low = left.high;
-  right.below_low = left.below_high;
-  std::vector<Slice> slices = cut_into_slices(left);
-  for (const Slice& slice : cut_into_slices(right)) slices.push_back(slice);
-  return slices;
+std::vector<Slice> BandSolver::cut(const Slice& band) {
+  const CountBelow count = [this](double lambda) { return count_below(lambda); };
+  const Slice wanted = options_.max_modes ? cut_to_lowest(band, *options_.max_modes, count) : band;
+  if (options_.factorisation == Factorisation::kCholmod) return {wanted};  // It cannot shift into the band.
+  return cut_into_slices(wanted, kSliceModes, count);
 }
 
 void BandSolver::solve_sparse_band() {
@@ -327,7 +196,7 @@ void BandSolver::solve_sparse_band() {
   modes_.factor.flops = counter_->get_flops();
   if (band.count() == 0) return;
   if (n_ <= kDenseRowsFull && 4 * band.below_high > n_) return solve_dense_band();
-  const std::vector<Slice> slices = cut_into_slices(cut_to_max_modes(band));
+  const std::vector<Slice> slices = cut(band);
   for (const Slice& slice : slices) solve_slice(slice, slices.size() == 1);
   counter_.reset();
   collect(nullptr);
@@ -400,10 +269,13 @@ void BandSolver::solve_slice(const Slice& slice, bool is_only) {
     modes_.factor.ordering = factor->get_ordering();
   }
   const Timer timer(modes_.seconds.iterate);
+  // A run finds one copy of a repeated eigenvalue for certain; rounding brings the others, or the next runs.
   std::int64_t missing = slice.count();
-  double tolerance = 1e-2 * options_.tolerance;
-  for (int round = 0; round < kRounds && missing > 0; ++round) {
-    missing -= run_round(slice, *factor, sigma, round == 0 ? wanted : wanted - slice.count() + missing, tolerance);
+  int idle = 0;
+  for (int round = 0; round < kRounds && idle < kIdleRounds && missing > 0; ++round) {
+    const std::int64_t added = run_round(slice, *factor, sigma, wanted - slice.count() + missing, kKrylovTolerance * options_.tolerance);
+    missing -= added;
+    idle = added > 0 ? 0 : idle + 1;
   }
 }
 
@@ -452,47 +324,26 @@ void BandSolver::collect(const DensePairs* dense) {
   found_ = {};
 }
 
-// Inverse iteration for the modes whose residual is too large, then one step of orthonormalisation for all.
 void BandSolver::refine(ModeErrors& errors) {
-  const auto is_bad = [&](std::size_t j) { return !(errors.residual[j] <= std::max(options_.tolerance, errors.floor[j])); };
-  std::vector<std::size_t> bad;
-  for (std::size_t j = 0; j < errors.residual.size(); ++j) {
-    if (is_bad(j)) bad.push_back(j);
-  }
-  if (bad.empty()) return;
-  if (counter_ == nullptr) counter_ = std::make_unique<MumpsFactor>(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
-  double sigma = std::lerp(low_, high_, 0.5);
-  while (!counter_->factorise(sigma)) sigma *= 1 + 1e-5;
-  ++modes_.factor.factorisations;
-  petsc::VecHandle right;
-  petsc::VecHandle work;
-  check(MatCreateVecs(problem_.stiffness, right.out(), work.out()));
-  for (const std::size_t j : bad) {
-    Vec column = nullptr;
-    check(MatDenseGetColumnVec(modes_.shapes, static_cast<PetscInt>(j), &column));
-    check(MatMult(problem_.mass, column, right));
-    counter_->solve(right, column);
-    ++modes_.factor.solves;
-    PetscScalar stiffness = 0;
-    PetscScalar mass = 0;
-    check(MatMult(problem_.stiffness, column, work));
-    check(VecDot(column, work, &stiffness));
-    check(MatMult(problem_.mass, column, work));
-    check(VecDot(column, work, &mass));
-    check(VecScale(column, 1 / std::sqrt(mass)));
-    check(MatDenseRestoreColumnVec(modes_.shapes, static_cast<PetscInt>(j), &column));
-    modes_.lambda[j] = stiffness / mass;
-  }
+  RefineRequest request;
+  request.stiffness = problem_.stiffness;
+  request.mass = problem_.mass;
+  request.tolerance = options_.tolerance;
+  request.get_factor = [&]() -> ShiftedFactor& {
+    if (counter_ == nullptr)
+      counter_ = std::make_unique<MumpsFactor>(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
+    return *counter_;
+  };
+  const RefineCost cost = refine_modes(request, modes_.lambda, modes_.shapes, errors);
   counter_.reset();
-  orthonormalise_shapes(problem_.mass, modes_.shapes);
-  errors = normalise_and_measure(problem_.stiffness, problem_.mass, modes_.lambda, modes_.shapes);
-  for (const std::size_t j : bad) {
-    if (is_bad(j)) {
-      throw SolveError(
-          fmt::format("Mode {} at {:.6g} Hz has the relative residual {:.2g}, above the tolerance {:.2g} and above what rounding "
-                      "explains ({:.2g}). Take a looser tolerance, or mend the thinnest elements of the mesh.",
-                      j, to_hz(modes_.lambda[j]), errors.residual[j], options_.tolerance, errors.floor[j]));
-    }
+  modes_.factor.factorisations += cost.factorisations;
+  modes_.factor.solves += cost.solves;
+  for (std::size_t j = 0; j < errors.residual.size(); ++j) {
+    if (is_accepted(errors, j, options_.tolerance)) continue;
+    throw SolveError(
+        fmt::format("Mode {} at {:.6g} Hz has the relative residual {:.2g}, above the tolerance {:.2g} and above what rounding "
+                    "explains ({:.2g}). Take a looser tolerance, or mend the thinnest elements of the mesh.",
+                    j, to_hz(modes_.lambda[j]), errors.residual[j], options_.tolerance, errors.floor[j]));
   }
 }
 
@@ -511,6 +362,8 @@ void BandSolver::finish() {
                     errors.orthonormality));
   }
   modes_.residual = errors.residual;
+  modes_.above_tolerance_count =
+      std::count_if(errors.residual.begin(), errors.residual.end(), [&](double residual) { return residual > options_.tolerance; });
   modes_.orthonormality_error = errors.orthonormality;
   orient_shapes(modes_.shapes, problem_.nodes.position);
   check(MatScale(modes_.shapes, scaling_.get_shape_factor()));

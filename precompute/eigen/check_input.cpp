@@ -1,0 +1,55 @@
+#include "precompute/eigen/check_input.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::eigen {
+
+using petsc::check;
+
+void check_input(const Problem& problem, const Options& options) {
+  if (problem.stiffness == nullptr || problem.mass == nullptr) throw InputError("The eigenproblem lacks its stiffness or mass matrix.");
+  if (!(options.high_hz > options.low_hz) || !(options.low_hz >= 0) || !std::isfinite(options.high_hz)) {
+    throw InputError(fmt::format("The band {} .. {} Hz is empty or negative: give two frequencies, the lower one first.", options.low_hz,
+                                 options.high_hz));
+  }
+  if (options.max_modes && *options.max_modes < 1)
+    throw InputError(fmt::format("max_modes is {}: it must be at least 1.", *options.max_modes));
+  if (!(options.tolerance > 0) || options.tolerance > 1e-2) {
+    throw InputError(fmt::format("The tolerance {} is out of range: take one between 1e-14 and 1e-2.", options.tolerance));
+  }
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm));
+  int size = 1;
+  MPI_Comm_size(comm, &size);
+  if (size > 1 && options.factorisation == Factorisation::kCholmod) {
+    throw InputError(fmt::format("CHOLMOD factorises on one rank and there are {}: take MUMPS.", size));
+  }
+  petsc::run_agreed(comm, [&] {
+    PetscInt rows = 0;
+    PetscInt n = 0;
+    check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
+    check(MatGetSize(problem.stiffness, &n, nullptr));
+    const NodeLayout& nodes = problem.nodes;
+    if (static_cast<std::size_t>(rows) != 3 * nodes.position.size() || nodes.position.size() != nodes.component.size()) {
+      throw InputError(fmt::format("The node layout has {} positions and {} components for {} rows of the stiffness matrix.",
+                                   nodes.position.size(), nodes.component.size(), rows));
+    }
+    for (const std::int32_t c : nodes.component) {
+      if (c < 0 || c >= nodes.component_count)
+        throw InputError(fmt::format("Component {} is none of the layout's {}.", c, nodes.component_count));
+    }
+    const std::size_t order = nodes.elimination_position.size();
+    int rank = 0;
+    MPI_Comm_rank(comm, &rank);
+    if (rank == 0 && order != 0 && 3 * order != static_cast<std::size_t>(n)) {
+      throw InputError(fmt::format("The elimination order names {} nodes of {}.", order, n / 3));
+    }
+  });
+}
+
+}  // namespace carillon::eigen

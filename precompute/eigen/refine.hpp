@@ -1,0 +1,37 @@
+// Mends modes whose residual is above the tolerance.
+#pragma once
+
+#include <petscmat.h>
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "precompute/eigen/check_modes.hpp"
+#include "precompute/eigen/shifted_factor.hpp"
+
+namespace carillon::eigen {
+
+struct RefineRequest {
+  Mat stiffness = nullptr;
+  Mat mass = nullptr;
+  double tolerance = 1e-8;                     // of the relative residual
+  std::function<ShiftedFactor&()> get_factor;  // L D L^T of any shift; asked for only when a mode needs it
+  std::function<void(std::int64_t)> progress;  // modes that meet the tolerance so far; may be empty
+};
+
+struct RefineCost {
+  std::int64_t factorisations = 0;
+  std::int64_t solves = 0;
+};
+
+/// Improves the modes whose residual is above the tolerance until none is left, or what is left after a first pass is explained by
+/// rounding (errors.floor), or six passes are over. lambda and the columns of shapes stay ascending; errors is measured anew. Modes that
+/// still fail are the caller's to judge: errors tells. lambda: (modes) > 0; shapes: (3n, modes) dense, M-normal columns. Collective.
+/// Throws SolveError when K - sigma M is singular wherever it is tried.
+RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
+
+/// True if mode j is good: its residual is within the tolerance, or within what rounding explains.
+bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance);
+
+}  // namespace carillon::eigen
