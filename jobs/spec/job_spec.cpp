@@ -70,6 +70,12 @@ Fixed read_fixed(config::Object fixed) {
   return result;
 }
 
+/// The same name, or two names of one file that exists.
+bool is_same_file(const fs::path& a, const fs::path& b) {
+  std::error_code none;
+  return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal() || fs::equivalent(a, b, none);
+}
+
 JobSpec read_root(config::Object job, const fs::path& file) {
   JobSpec spec;
   spec.file = file;
@@ -89,14 +95,18 @@ JobSpec read_root(config::Object job, const fs::path& file) {
     spec.fixed = read_fixed(*fixed);
   }
   if (auto solver = job.object_if("solver")) {
-    spec.tolerance = solver->number_or("tolerance", spec.tolerance, {1e-14, 1e-3});
+    spec.tolerance = solver->number_or("tolerance", spec.tolerance, {1e-14, 1e-4});
     const std::string choice = solver->choice_or("factorisation", {"automatic", "mumps", "cholmod"}, "automatic");
     spec.factorisation = choice == "mumps" ? Factorisation::mumps : choice == "cholmod" ? Factorisation::cholmod : Factorisation::automatic;
     solver->finish();
   }
   job.ignore("run");
   job.finish();
-  if (spec.mesh == spec.bank) job.fail("bank", "the bank would overwrite the mesh; choose another file");
+  const fs::path resolved = find_resolved_path(spec.bank);
+  if (is_same_file(spec.bank, spec.mesh) || is_same_file(resolved, spec.mesh)) {
+    job.fail("bank", "the bank or its record would overwrite the mesh; choose another file");
+  }
+  if (is_same_file(spec.bank, file)) job.fail("bank", "the bank would overwrite this job file; choose another file");
   return spec;
 }
 
@@ -113,6 +123,8 @@ std::string relative_to(const fs::path& path, const fs::path& folder) {
 }
 
 }  // namespace
+
+fs::path find_resolved_path(const fs::path& bank) { return fs::path(bank) += ".resolved.json"; }
 
 JobSpec parse_job(std::string_view text, const fs::path& file) { return read_root(config::parse_document(text, file).root(), file); }
 

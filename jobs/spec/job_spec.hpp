@@ -43,13 +43,16 @@ struct JobSpec {
   std::array<double, 2> band_hz{20.0, 20000.0};
   std::optional<int> max_modes;  // the lowest that many of the band
   std::optional<Fixed> fixed;
-  double tolerance = 1e-8;                                 // solver.tolerance: relative residual of every mode
+  double tolerance = 1e-8;  // solver.tolerance: relative residual of every mode; a bank takes none above 1e-4
   Factorisation factorisation = Factorisation::automatic;  // solver.factorisation
 };
 
 /// Reads and validates a job. Throws InputError. Not collective: rank 0 reads, then broadcasts the text.
 JobSpec read_job(const std::filesystem::path& file);
 JobSpec parse_job(std::string_view text, const std::filesystem::path& file);
+
+/// Where the resolved job goes: beside the bank, "<bank>.resolved.json".
+std::filesystem::path find_resolved_path(const std::filesystem::path& bank);
 
 /// The job as JSON text with every value used. Paths are written relative to `folder` where they can be. `run_json` (an object, may be
 /// empty) is stored under the key "run", which read_job() accepts and ignores, so that the result runs again as a job.

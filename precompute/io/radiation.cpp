@@ -95,8 +95,8 @@ std::vector<double> calc_radiation_gain(const std::vector<Vec3>& vertices_m, con
   const double radius = std::sqrt(area_sum / (4 * std::numbers::pi));
   std::vector<double> gain(modes);
   for (std::size_t m = 0; m < modes; ++m) {
-    const double ka = omega_rad_s[m] / kSoundSpeedMS * radius;
-    gain[m] = kAirDensityKgM3 * omega_rad_s[m] / (4 * std::numbers::pi * std::sqrt(1 + ka * ka)) * flow[m];
+    const double ka = omega_rad_s[m] / bank::kSoundSpeedMs * radius;
+    gain[m] = bank::kAirDensityKgM3 * omega_rad_s[m] / (4 * std::numbers::pi * std::sqrt(1 + ka * ka)) * flow[m];
   }
   return gain;
 }

@@ -13,9 +13,6 @@ namespace carillon::io {
 using bank::Vec3;
 using Triangle = std::array<std::int32_t, 3>;
 
-inline constexpr double kAirDensityKgM3 = 1.21;  // OCE01 section 4
-inline constexpr double kSoundSpeedMS = 343.0;
-
 /// The triangles that face the open air: those of closed shells (connected through edges) that enclose a positive volume. The wall of a
 /// closed cavity encloses a negative one; it moves air that cannot get out. A body open to the outside, such as a bowl, is one shell.
 /// Not collective.

@@ -53,8 +53,6 @@ void warn(int rank, const std::string& text) {
   fmt::print(stderr, "carillon-precompute: warning: {}\n", text);
 }
 
-fs::path find_resolved_path(const fs::path& bank) { return fs::path(bank) += ".resolved.json"; }
-
 /// Rank 0 reads the text; all ranks parse it, so that all fail alike.
 spec::JobSpec read_shared_job(MPI_Comm comm, int rank, const fs::path& file) {
   std::string text;
@@ -74,7 +72,7 @@ void check_outputs(const Run& run) {
   petsc::run_agreed(run.comm, [&] {
     if (run.rank != 0) return;
     config::check_writable(run.job.bank, "bank");
-    config::check_writable(find_resolved_path(run.job.bank), "resolved job");
+    config::check_writable(spec::find_resolved_path(run.job.bank), "resolved job");
   });
 }
 
@@ -292,7 +290,7 @@ std::string write_json(const Json::Value& value) {
 RunSummary write_outputs(Run& run, bank::Bank bank, const Json::Value& record) {
   RunSummary summary;
   summary.bank = run.job.bank;
-  summary.resolved = find_resolved_path(run.job.bank);
+  summary.resolved = spec::find_resolved_path(run.job.bank);
   run.stations.begin("write", summary.bank.string());
   petsc::run_agreed(run.comm, [&] {
     if (run.rank != 0) return;
@@ -319,6 +317,11 @@ RunSummary run_job(MPI_Comm comm, const fs::path& job_file, bool quiet) {
   MPI_Comm_rank(comm, &run.rank);
   MPI_Comm_size(comm, &run.ranks);
   run.job = read_shared_job(comm, run.rank, job_file);
+  if (run.ranks > 1 && run.job.factorisation == spec::Factorisation::cholmod) {
+    throw InputError(
+        fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
+                    job_file.string(), run.ranks));
+  }
   check_outputs(run);
   if (run.job.element == spec::Element::T4 && run.job.material.poisson_ratio > 0.45)
     warn(run.rank,

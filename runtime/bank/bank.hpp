@@ -17,6 +17,10 @@ namespace carillon::bank {
 inline constexpr int kVersionMajor = 1;
 inline constexpr int kVersionMinor = 0;
 
+/// Air, as OCE01 section 4 has it: radiation gains are made with it and sound travels in it.
+inline constexpr double kAirDensityKgM3 = 1.21;
+inline constexpr double kSoundSpeedMs = 343.0;
+
 using Vec3 = std::array<double, 3>;
 
 /// Rigid-body data of the undeformed solid, in the frame of the mesh.

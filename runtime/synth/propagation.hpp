@@ -7,11 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "runtime/bank/bank.hpp"
+
 namespace carillon::synth {
 
 using Vec3 = std::array<double, 3>;
 
-inline constexpr double kSoundSpeedMs = 343.0;  // OCE01, air
+using bank::kSoundSpeedMs;
 inline constexpr double kNearestM = 0.05;       // a source never counts as nearer than this (1/r has no bound)
 
 /// Where a source is over time: cubic between the given points, with slopes from their neighbours, so that its speed is continuous.

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "jobs/spec/job_spec.hpp"
@@ -46,6 +49,21 @@ TEST(JobSpec, the_resolved_job_is_a_job_again_and_resolves_to_itself) {
   EXPECT_EQ(*again.fixed->node_set, "x-min");
   EXPECT_EQ(again.material.young_modulus_pa, job.material.young_modulus_pa);
   EXPECT_EQ(resolved_json(again, "/jobs/a/out", R"({"ranks": 2, "git": "abc"})"), text);
+}
+
+TEST(JobSpec, a_bank_that_links_to_the_mesh_is_refused) {
+  namespace fs = std::filesystem;
+  std::string name = (fs::temp_directory_path() / "carillon-spec-XXXXXX").string();
+  const fs::path folder = ::mkdtemp(name.data());
+  std::ofstream(folder / "m.msh") << "mesh";
+  fs::create_directory(folder / "out");
+  fs::create_symlink(folder / "m.msh", folder / "out" / "b.bank");
+  EXPECT_THROW(parse_job(job_with(""), folder / "job.json"), InputError);
+  fs::remove_all(folder);
+}
+
+TEST(JobSpec, a_resolved_job_may_be_the_record_that_it_writes_again) {
+  EXPECT_NO_THROW(parse_job("{\"mesh\": \"m\", \"bank\": \"b\"," + kMaterial + "}", "/jobs/b.resolved.json"));
 }
 
 TEST(JobSpec, a_resolved_job_moves_with_its_folder) {
@@ -112,6 +130,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadJob{"box_reversed", job_with(",\n\"fixed\": {\"box_m\": {\"min\": [0,0,0], \"max\": [1,-1,1]}}"),
                "job.json:3:", "at least that of"},
         BadJob{"bank_is_mesh", "{\"mesh\": \"m\", \"bank\": \"x/../m\"," + kMaterial + "}", "job.json:1:", "overwrite the mesh"},
+        BadJob{"bank_is_job", "{\"mesh\": \"m\", \"bank\": \"../jobs/job.json\"," + kMaterial + "}", "job.json:1:", "overwrite this job"},
+        BadJob{"record_is_mesh", "{\"mesh\": \"b.resolved.json\", \"bank\": \"b\"," + kMaterial + "}", "job.json:1:", "overwrite the mesh"},
         BadJob{"tolerance", job_with(",\n\"solver\": {\"tolerance\": 1}"), "job.json:3:", "between"},
         BadJob{"path_is_number", "{\"mesh\": 5, \"bank\": \"b\"," + kMaterial + "}", "job.json:1:", "text in quotes"}),
     [](const auto& info) { return info.param.name; });

@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 
-FORBIDDEN = re.compile(r"lib(mpi|open-rte|petsc|slepc|metis|dmumps|mumps|cholmod|CGAL|gmp|mpfr|openvdb|hdf5_openmpi|vtk)", re.I)
+FORBIDDEN = re.compile(r"lib(mpi|open-rte|petsc|slepc|metis|dmumps|mumps|cholmod|CGAL|gmp|mpfr|openvdb|hdf5_openmpi|vtk|umfpack|spqr|fftw|scotch|gsl|readline)", re.I)
 bad = []
 for name in ("carillon-bank", "carillon-render"):
     program = pathlib.Path(sys.argv[1]) / name

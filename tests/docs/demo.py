@@ -1,0 +1,38 @@
+#!/usr/bin/python3
+"""Runs the demo's main job with coarse meshes and looks at what it leaves: words of the table, banks, sound, pictures.
+
+usage: demo.py SOURCE_DIR BIN_DIR WORK_DIR
+"""
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import wave
+
+import numpy
+
+source, bin_dir, work = (pathlib.Path(word) for word in sys.argv[1:4])
+shutil.rmtree(work, ignore_errors=True)
+run = subprocess.run([source / "deploy/chute/run", "--bin", bin_dir, "--out", work, "--quick"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+print(run.stdout[-6000:], run.stderr[-2000:])
+assert run.returncode == 0, run.returncode
+for words in ("855.9 Hz", "real time", "peak memory", "first five frequencies", "bunny_t4", "bunny_t10", "shelf_wood", "chute.wav", "T4, lumped mass"):
+    assert words in run.stdout, words
+ours = [float(hz) for hz in re.findall(r"^  ours, .*?([0-9.]+) Hz", run.stdout, re.M)]
+assert len(ours) == 2 and 700 < ours[1] < ours[0] < 1400, ours  # coarse T4 is stiffer than coarse T10
+
+with wave.open(str(work / "chute.wav")) as sound:
+    assert (sound.getnchannels(), sound.getframerate(), sound.getsampwidth()) == (2, 48000, 3), sound.getparams()
+    raw = numpy.frombuffer(sound.readframes(sound.getnframes()), dtype=numpy.uint8).reshape(-1, 2, 3)
+samples = ((raw[..., 0].astype(numpy.int32) << 8 | raw[..., 1].astype(numpy.int32) << 16 | raw[..., 2].astype(numpy.int32) << 24) >> 8) / 2.0**23
+assert len(samples) == 6 * 48000, len(samples)
+assert abs(20 * numpy.log10(abs(samples).max()) + 1.0) < 0.01, abs(samples).max()  # the peak stands at -1 dBFS: loud, and not clipped
+assert abs(samples).max(axis=0).min() > 0.1, "both ears hear it"
+report = json.loads((work / "chute-report.json").read_text())
+struck = {body["name"]: body["impulses"] for body in report["per_body"]}
+assert all(count > 0 for count in struck.values()) and len(struck) == 4, struck  # the bunny and all three shelves sound
+for picture in ("chute-spectrogram.png", "bunny-modes.png", "chute-path.png"):
+    bytes_ = (work / picture).read_bytes()
+    assert bytes_[:8] == b"\x89PNG\r\n\x1a\n" and len(bytes_) > 30000, picture
