@@ -10,29 +10,57 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Far beyond every solid: what lies outside is a slip of the unit, and would only end in overflow later.
+constexpr double kMostStiffnessPa = 1e16;
+constexpr double kMostDensityKgM3 = 1e8;
+constexpr double kLeast = 1e-6;
+constexpr double kMostDampingS = 1e6, kMostDampingPerS = 1e12;
+constexpr double kMostHz = 1e12;
+
+double read_positive(config::Object& object, std::string_view key, double most) {
+  const double value = object.number(key, config::kPositive);
+  if (value < kLeast || value > most)
+    object.fail(key, fmt::format("must be from {:g} to {:g} as no solid is outside, and is {:g}; check the unit", kLeast, most, value));
+  return value;
+}
+
+/// The stiffness matrix loses as many digits as lambda / mu (or K / mu near nu = -1) has; seven are what a solve can spare.
+void check_definite(config::Object& material, std::string_view key, double poisson_ratio) {
+  constexpr double kMargin = 1e-7;
+  if (poisson_ratio > 0.5 - kMargin || poisson_ratio < -1.0 + kMargin)
+    material.fail(key,
+                  fmt::format("makes a Poisson's ratio of {:.12g}, too near the limits -1 and 0.5 to be solved in double precision; keep "
+                              "{:g} away from them",
+                              poisson_ratio, kMargin));
+}
+
 /// E and nu, or lambda and mu: exactly one pair.  E = mu (3 lambda + 2 mu) / (lambda + mu), nu = lambda / (2 (lambda + mu)).
 void read_elasticity(config::Object& material, Material& result) {
   const bool engineering = material.has("young_modulus_pa") || material.has("poisson_ratio");
   const bool lame = material.has("lame_lambda_pa") || material.has("lame_mu_pa");
   if (engineering && lame) {
-    material.fail("lame_lambda_pa", "give young_modulus_pa and poisson_ratio, or lame_lambda_pa and lame_mu_pa, not both pairs");
+    material.fail(material.has("lame_lambda_pa") ? "lame_lambda_pa" : "lame_mu_pa",
+                  "give young_modulus_pa and poisson_ratio, or lame_lambda_pa and lame_mu_pa, not both pairs");
   }
   if (!lame) {
-    result.young_modulus_pa = material.number("young_modulus_pa", config::kPositive);
+    result.young_modulus_pa = read_positive(material, "young_modulus_pa", kMostStiffnessPa);
     result.poisson_ratio = material.number("poisson_ratio", {-1.0, 0.5});
+    check_definite(material, "poisson_ratio", result.poisson_ratio);
     return;
   }
-  const double mu = material.number("lame_mu_pa", config::kPositive);
-  const double lambda = material.number("lame_lambda_pa");
+  const double mu = read_positive(material, "lame_mu_pa", kMostStiffnessPa);
+  const double lambda = material.number("lame_lambda_pa", {-kMostStiffnessPa, kMostStiffnessPa});
   // Positive definite: mu > 0 and 3 lambda + 2 mu > 0.
   if (!(3 * lambda + 2 * mu > 0))
     material.fail("lame_lambda_pa", fmt::format("must be greater than -2/3 of lame_mu_pa ({}), and is {}", -2 * mu / 3, lambda));
   result.young_modulus_pa = mu * (3 * lambda + 2 * mu) / (lambda + mu);
   result.poisson_ratio = lambda / (2 * (lambda + mu));
+  check_definite(material, "lame_lambda_pa", result.poisson_ratio);
 }
 
-double read_not_negative(config::Object& object, std::string_view key) {
+double read_not_negative(config::Object& object, std::string_view key, double most) {
   const double value = object.number_or(key, 0.0);
+  if (value > most) object.fail(key, fmt::format("must be at most {:g}, and is {:g}; check the unit", most, value));
   if (value < 0) object.fail(key, fmt::format("must not be negative, and is {}", value));
   return value;
 }
@@ -40,11 +68,11 @@ double read_not_negative(config::Object& object, std::string_view key) {
 Material read_material(config::Object material) {
   Material result;
   read_elasticity(material, result);
-  result.density_kg_m3 = material.number("density_kg_m3", config::kPositive);
+  result.density_kg_m3 = read_positive(material, "density_kg_m3", kMostDensityKgM3);
   config::Object damping = material.object("damping");
   config::Object rayleigh = damping.object("rayleigh");
-  result.alpha1_s = read_not_negative(rayleigh, "alpha1_s");
-  result.alpha2_per_s = read_not_negative(rayleigh, "alpha2_per_s");
+  result.alpha1_s = read_not_negative(rayleigh, "alpha1_s", kMostDampingS);
+  result.alpha2_per_s = read_not_negative(rayleigh, "alpha2_per_s", kMostDampingPerS);
   rayleigh.finish();
   damping.finish();
   material.ignore("name");
@@ -88,6 +116,8 @@ JobSpec read_root(config::Object job, const fs::path& file) {
   if (!(spec.band_hz[0] > 0 && spec.band_hz[1] > spec.band_hz[0])) {
     job.fail("band_hz", fmt::format("must be [low, high] with 0 < low < high in Hz, and is [{}, {}]", spec.band_hz[0], spec.band_hz[1]));
   }
+  if (spec.band_hz[1] > kMostHz)
+    job.fail("band_hz", fmt::format("must end at {:g} Hz at most, and ends at {:g}", kMostHz, spec.band_hz[1]));
   if (auto count = job.integer_if("max_modes", 1, 100000)) spec.max_modes = static_cast<int>(*count);
   if (job.has_string("fixed")) {
     spec.fixed = Fixed{job.string("fixed"), {}};  // short for {"node_set": name}

@@ -300,9 +300,14 @@ std::vector<std::string> Object::keys() const {
 }
 
 void Object::finish() {
+  // A key that is not there yet is likelier meant than one that is: alpha2_s beside alpha1_s is alpha2_per_s.
+  std::vector<std::string> open;
+  for (const std::string& key : *asked_)
+    if (!json(value_).isMember(key)) open.push_back(key);
   for (const std::string& key : keys()) {
     if (std::find(asked_->begin(), asked_->end(), key) != asked_->end()) continue;
-    const std::string near = find_nearest(key, *asked_);
+    std::string near = find_nearest(key, open);
+    if (near.empty()) near = find_nearest(key, *asked_);
     fail(key,
          near.empty() ? fmt::format("unknown key; known here: {}", join(*asked_)) : fmt::format("unknown key; did you mean \"{}\"?", near));
   }
@@ -318,6 +323,11 @@ std::string find_nearest(std::string_view word, const std::vector<std::string>& 
       best = distance;
       nearest = candidate;
     }
+  }
+  if (!nearest.empty()) return nearest;
+  for (const std::string& candidate : known) {  // "box" for "box_m", "modes" for "max_modes"
+    const bool contained = word.size() >= 3 && candidate.find(word) != std::string::npos;
+    if (contained || (candidate.size() >= 4 && word.find(candidate) != std::string_view::npos)) return candidate;
   }
   return nearest;
 }

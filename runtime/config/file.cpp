@@ -36,6 +36,13 @@ class Descriptor {
 
 fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
 
+/// Beside `file`, hidden, of this process and call alone: two threads that write one name must not share a temporary file. Never longer
+/// than the name of `file` and some forty bytes, cut where a file system's 255 would end.
+fs::path make_temporary_name(const fs::path& file) {
+  static std::atomic<unsigned> count{0};
+  return folder_of(file) / fmt::format(".{}.tmp.{}.{}", file.filename().string().substr(0, 200), ::getpid(), count++);
+}
+
 void sync_folder(const fs::path& folder) {
   const Descriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (fd.get() >= 0) ::fsync(fd.get());
@@ -72,8 +79,7 @@ std::string read_file(const fs::path& file, std::string_view what, std::uint64_t
 }
 
 void write_file(const fs::path& file, std::string_view bytes) {
-  static std::atomic<unsigned> count{0};  // two threads that write one name must not share a temporary file
-  const fs::path temporary = folder_of(file) / fmt::format(".{}.tmp.{}.{}", file.filename().string(), ::getpid(), count++);
+  const fs::path temporary = make_temporary_name(file);
   const auto refuse = [&](int error) {
     ::unlink(temporary.c_str());
     throw SystemError(
@@ -103,13 +109,17 @@ void check_writable(const fs::path& file, std::string_view what) {
     throw InputError(fmt::format("{}: the {} cannot be written here: this is {}; name a file", file.string(), what,
                                  fs::is_directory(status) ? "a folder" : "a pipe or a device"));
   }
+  struct stat info {};
   const fs::path folder = folder_of(file);
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder)) {
     throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", folder.string(), what,
                                  error ? error.message() : "it is not a folder"));
   }
-  const fs::path probe = folder / fmt::format(".carillon-probe.{}", ::getpid());
+  if (::lstat(file.c_str(), &info) != 0 && errno != ENOENT) {  // a name too long, a loop of links
+    throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose another name", file.string(), what, std::strerror(errno)));
+  }
+  const fs::path probe = make_temporary_name(file);
   const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600));
   if (fd.get() < 0) {
     throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", file.string(), what,

@@ -51,6 +51,15 @@ TEST(Document, an_unknown_key_names_itself_its_line_and_the_nearest_known_key) {
   EXPECT_NE(message.find("did you mean \"density_kg_m3\""), std::string::npos) << message;
 }
 
+TEST(Document, an_unknown_key_is_likelier_a_key_that_is_absent_than_one_that_is_there) {
+  auto object = parse("{\"alpha1_s\": 1,\n\"alpha2_s\": 2}");
+  object.number_or("alpha1_s", 0);
+  object.number_or("alpha2_per_s", 0);
+  const auto message = message_of([&] { object.finish(); });
+  EXPECT_NE(message.find("file.json:2:"), std::string::npos) << message;
+  EXPECT_NE(message.find("did you mean \"alpha2_per_s\""), std::string::npos) << message;
+}
+
 TEST(Document, a_mistyped_required_key_is_reported_at_its_line) {
   const auto message = message_of([] { parse("{\n\n\"messh\": \"x\"}").string("mesh"); });
   EXPECT_NE(message.find("file.json:3:"), std::string::npos) << message;
@@ -108,6 +117,11 @@ TEST(FindNearest, counts_swaps_and_gives_up_on_strangers) {
   EXPECT_EQ(config::find_nearest("mesch", {"mesh", "mass"}), "mesh");
   EXPECT_EQ(config::find_nearest("msah", {"mesh", "mash"}), "mash");
   EXPECT_EQ(config::find_nearest("zzzz", {"mesh", "mass"}), "");
+}
+
+TEST(FindNearest, takes_a_part_of_a_name_for_the_name) {
+  EXPECT_EQ(config::find_nearest("box", {"node_set", "box_m"}), "box_m");
+  EXPECT_EQ(config::find_nearest("modes", {"mesh", "max_modes"}), "max_modes");
 }
 
 }  // namespace

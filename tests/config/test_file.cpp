@@ -56,6 +56,15 @@ TEST_F(File, a_place_that_cannot_be_written_is_found_before_the_work) {
   config::write_file(folder_ / "plain", "x");
   EXPECT_THROW(config::check_writable(folder_ / "plain" / "x.bank", "bank"), InputError);
   EXPECT_THROW(config::write_file("/proc/carillon", "x"), carillon::SystemError);
+  EXPECT_THROW(config::check_writable(folder_ / std::string(256, 'x'), "bank"), InputError);
+}
+
+TEST_F(File, a_name_as_long_as_the_file_system_takes_is_written) {
+  const fs::path file = folder_ / std::string(255, 'x');
+  config::check_writable(file, "bank");
+  config::write_file(file, "long");
+  EXPECT_EQ(config::read_file(file, "test file", 100), "long");
+  EXPECT_EQ(count_entries(), 1u);
 }
 
 TEST_F(File, a_write_that_the_machine_cuts_short_leaves_the_old_file_and_no_rest) {
