@@ -132,7 +132,6 @@ INSTANTIATE_TEST_SUITE_P(
         BadJob{"bank_is_mesh", "{\"mesh\": \"m\", \"bank\": \"x/../m\"," + kMaterial + "}", "job.json:1:", "overwrite the mesh"},
         BadJob{"bank_is_job", "{\"mesh\": \"m\", \"bank\": \"../jobs/job.json\"," + kMaterial + "}", "job.json:1:", "overwrite this job"},
         BadJob{"record_is_mesh", "{\"mesh\": \"b.resolved.json\", \"bank\": \"b\"," + kMaterial + "}", "job.json:1:", "overwrite the mesh"},
-               "job.json:1:", "overwrite the mesh"},
         BadJob{"pairs_mixed", material_with("\"young_modulus_pa\": 1,\n\"lame_mu_pa\": 1" + kDamping),
                "job.json:4: \"material.lame_mu_pa\"", "not both pairs"},
         BadJob{"stiffness_of_no_solid", material_with("\"young_modulus_pa\": 1e300,\n\"poisson_ratio\": 0.3" + kDamping),
