@@ -1,7 +1,9 @@
-// Method: one Simbody free joint per moving body, uniform gravity, a custom force for resting contacts; Runge-Kutta-Merson between the instants at
+// Method: one Simbody free joint per moving body, uniform gravity, a custom force for resting contacts; Runge-Kutta-Merson between the
+// instants at
 //   which the caller changes something.
 // Source: M. Sherman, A. Seth, S. Delp, "Simbody: multibody dynamics for biomedical research", Procedia IUTAM 2 (2011).
-// Deviations: Simbody's compliant contact subsystem is not used: it gives one force for a pair of meshes, its restitution depends on the speed,
+// Deviations: Simbody's compliant contact subsystem is not used: it gives one force for a pair of meshes, its restitution depends on the
+// speed,
 //   and a contact soft enough to be integrated lasts milliseconds where the real one lasts a tenth of one.
 #include "runtime/contact/engine.hpp"
 
@@ -22,10 +24,10 @@ using SimTK::State;
 using SimTK::Transform;
 using Point = SimTK::Vec3;
 
-constexpr double kSink = 2e-5;          // m; how far a resting body sinks into its contact under its own weight
-constexpr double kRolling = 2e-3;       // rolling resistance arm over the size of the smaller body; hard bodies on hard floors: 1e-3 to 5e-3
-constexpr double kLongestStep = 2e-3;   // s
-constexpr double kContactStep = 5e-4;   // s; while something in touch moves by more than kContactDepth
+constexpr double kSink = 2e-5;         // m; how far a resting body sinks into its contact under its own weight
+constexpr double kRolling = 2e-3;      // rolling resistance arm over the size of the smaller body; hard bodies on hard floors: 1e-3 to 5e-3
+constexpr double kLongestStep = 2e-3;  // s
+constexpr double kContactStep = 5e-4;  // s; while something in touch moves by more than kContactDepth
 constexpr double kContactDepth = 5e-6;  // m
 
 Point to_vec(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
@@ -98,8 +100,8 @@ void Engine::check_overlaps() const {
       for (int v = 0; v < sa.mesh().getNumVertices(); ++v) lowest = std::min(lowest, (now.poses[a] * sa.vertex(v))[2]);
       const double depth = world_.ground->height_m - lowest;
       if (depth > allowed_m(a)) {
-        throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much", world_.bodies[a].name,
-                                     depth * 1e3, world_.ground->height_m));
+        throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much",
+                                     world_.bodies[a].name, depth * 1e3, world_.ground->height_m));
       }
     }
     for (int b = a + 1; b < count; ++b) {
@@ -107,8 +109,9 @@ void Engine::check_overlaps() const {
       Point where(0);
       const double depth = calc_overlap(sa, now.poses[a], surface(b), now.poses[b], where);
       if (depth > std::min(allowed_m(a), allowed_m(b))) {
-        throw InputError(fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
-                                     world_.bodies[a].name, world_.bodies[b].name, depth * 1e3, where[0], where[1], where[2]));
+        throw InputError(
+            fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
+                        world_.bodies[a].name, world_.bodies[b].name, depth * 1e3, where[0], where[1], where[2]));
       }
     }
   }
@@ -207,7 +210,8 @@ State Engine::calc_advanced(const State& state, double step_s) {
     if (!std::isfinite(to.getY().normSqr())) throw SolveError(fmt::format("the motion is not finite after {:.6f} s", to.getTime()));
     return to;
   } catch (const SimTK::Exception::Base& e) {
-    throw SolveError(fmt::format("Simbody cannot integrate the motion of {} at {:.6f} s: {}", list_names(world_), state.getTime(), e.what()));
+    throw SolveError(
+        fmt::format("Simbody cannot integrate the motion of {} at {:.6f} s: {}", list_names(world_), state.getTime(), e.what()));
   }
 }
 

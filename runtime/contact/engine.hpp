@@ -42,8 +42,8 @@ class Engine {
   /// The state `step_s` later. Throws SolveError.
   SimTK::State calc_advanced(const SimTK::State& state, double step_s);
 
-  /// No step may be longer than this, so that nothing passes through anything; while something is in touch, so that what comes down beside it
-  /// is not far inside when it is seen.
+  /// No step may be longer than this, so that nothing passes through anything; while something is in touch, so that what comes down beside
+  /// it is not far inside when it is seen.
   double calc_largest_step(const Snapshot& now, bool in_touch) const;
 
   ImpactPoint make_impact_point(const TouchPoint& touch) const;

@@ -1,6 +1,8 @@
 // Method: impulses at n points by projected relaxation: first Jacobi sweeps damped by 1/n, which share the load evenly where the points are
-//   redundant (a box that lands flat) and keep every symmetry, then Gauss-Seidel sweeps to convergence. Newton's restitution, Coulomb's cone.
-// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996); J. Moreau, "Some numerical methods in multibody dynamics"
+//   redundant (a box that lands flat) and keep every symmetry, then Gauss-Seidel sweeps to convergence. Newton's restitution, Coulomb's
+//   cone.
+// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996); J. Moreau, "Some numerical methods in multibody
+// dynamics"
 //   (1999). Contact time: K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 // Deviations: Newton's restitution with friction can gain energy (Kane 1984); then all impulses are scaled back to where it is not so.
 #include "runtime/contact/impact.hpp"
@@ -129,7 +131,8 @@ void solve_impact(std::vector<Mobile>& bodies, std::vector<ImpactPoint>& points,
 }
 
 double calc_hertz_duration(const Elastic& a, const Elastic& b, double mass_kg, double speed_m_s, double largest_radius_m) {
-  const double compliance = (1 - a.poisson_ratio * a.poisson_ratio) / a.young_modulus_pa + (1 - b.poisson_ratio * b.poisson_ratio) / b.young_modulus_pa;
+  const double compliance =
+      (1 - a.poisson_ratio * a.poisson_ratio) / a.young_modulus_pa + (1 - b.poisson_ratio * b.poisson_ratio) / b.young_modulus_pa;
   const double curvature = std::max(a.curvature_per_m + b.curvature_per_m, 0.0);
   const double radius = 1.0 / std::clamp(curvature, 1.0 / std::max(largest_radius_m, 0.5e-3), 1.0 / 0.5e-3);
   const double speed = std::max(speed_m_s, 1e-3);

@@ -9,22 +9,22 @@ namespace carillon::contact {
 
 /// A rigid body at the instant of an impact, world axes. A body that cannot move has zero inverse mass and inertia.
 struct Mobile {
-  double inverse_mass = 0.0;                 // 1/kg
-  SimTK::Mat33 inverse_inertia{0};           // 1/(kg m^2), about the centre
-  SimTK::Vec3 centre{0};                     // m
-  SimTK::Vec3 velocity{0};                   // m/s, of the centre
-  SimTK::Vec3 spin{0};                       // rad/s
+  double inverse_mass = 0.0;        // 1/kg
+  SimTK::Mat33 inverse_inertia{0};  // 1/(kg m^2), about the centre
+  SimTK::Vec3 centre{0};            // m
+  SimTK::Vec3 velocity{0};          // m/s, of the centre
+  SimTK::Vec3 spin{0};              // rad/s
 };
 
 /// A point where two bodies touch at that instant.
 struct ImpactPoint {
-  int a = 0, b = -1;            // index of the Mobile; -1: does not move
-  SimTK::Vec3 where{0};          // m
-  SimTK::Vec3 normal{0};         // unit, from b to a
-  double restitution = 0.0;     // used only where the approach is faster than the threshold of solve_impact
+  int a = 0, b = -1;         // index of the Mobile; -1: does not move
+  SimTK::Vec3 where{0};      // m
+  SimTK::Vec3 normal{0};     // unit, from b to a
+  double restitution = 0.0;  // used only where the approach is faster than the threshold of solve_impact
   double friction = 0.0;
-  double approach_m_s = 0.0;    // out: normal speed before, > 0 approaching
-  SimTK::Vec3 impulse{0};       // out: on a [N s]
+  double approach_m_s = 0.0;  // out: normal speed before, > 0 approaching
+  SimTK::Vec3 impulse{0};     // out: on a [N s]
 };
 
 /// Velocity of the point of a minus that of b.

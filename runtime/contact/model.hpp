@@ -1,5 +1,5 @@
-// What the Simbody side sees of a world. C++17: Simbody 3.7's headers do not compile as C++20 (their index types' operator== become ambiguous),
-// and the bank's header needs C++20. So world.cpp looks into the banks, checks, and hands over this.
+// What the Simbody side sees of a world. C++17: Simbody 3.7's headers do not compile as C++20 (their index types' operator== become
+// ambiguous), and the bank's header needs C++20. So world.cpp looks into the banks, checks, and hands over this.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace carillon::contact {
 
 struct BodyModel {
   std::string name;
-  const std::vector<std::array<double, 3>>* vertices_m = nullptr;         // of the bank; the same address means the same surface
+  const std::vector<std::array<double, 3>>* vertices_m = nullptr;  // of the bank; the same address means the same surface
   const std::vector<std::array<std::int32_t, 3>>* triangles = nullptr;
   bool fixed = false;
   Pose initial;

@@ -21,7 +21,8 @@ struct RestingPoint {
   double rolling_arm_m = 0.0;  // rolling resistance: moment per normal force
 };
 
-/// Simbody force element: spring, damper and regularised Coulomb friction and rolling resistance at a list of points that is changed only between steps.
+/// Simbody force element: spring, damper and regularised Coulomb friction and rolling resistance at a list of points that is changed only
+/// between steps.
 class RestingForce : public SimTK::Force::Custom::Implementation {
  public:
   explicit RestingForce(const SimTK::SimbodyMatterSubsystem& matter) : matter_(matter) {}

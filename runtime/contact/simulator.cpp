@@ -1,8 +1,10 @@
-// Method: event-driven. Between impacts Simbody integrates the motion; after each step the surfaces are tested, and a new touch that approaches
+// Method: event-driven. Between impacts Simbody integrates the motion; after each step the surfaces are tested, and a new touch that
+// approaches
 //   faster than kSlowest is traced back to its first instant, where all touching points are solved together for their impulses and the
-//   velocities jump. Slower touches, and points beside a spot that already rests, are left to a soft force and make no sound. The real contact
-//   lasts a Hertz time from the touch on, so its pulse is centred half that time later.
-// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996); J. O'Brien, C. Shen, C. Gatchalian, "Synthesizing sounds from
+//   velocities jump. Slower touches, and points beside a spot that already rests, are left to a soft force and make no sound. The real
+//   contact lasts a Hertz time from the touch on, so its pulse is centred half that time later.
+// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996); J. O'Brien, C. Shen, C. Gatchalian, "Synthesizing
+// sounds from
 //   rigid-body simulations" (2002), section 4, for what the sound needs of it.
 // Deviations: resting contact is a damped spring, not a train of micro-impacts, since those would be heard.
 #include <fmt/format.h>
@@ -26,14 +28,15 @@ using SimTK::State;
 using SimTK::Transform;
 using Point = SimTK::Vec3;
 
-constexpr double kSlowest = 0.01;         // m/s; a touch slower than this is not an impact (a fall from 5 um)
-constexpr double kTogether = 1e-4;        // s; touches nearer in time than this are one impact (a Hertz contact lasts about as long)
-constexpr double kTouchDepth = 3e-7;      // m; how well the first instant of a touch is found
-constexpr double kTouchTime = 2e-7;       // s; the same in time
-constexpr double kRollingTime = 10e-3;    // s; a body that rolls or slides over the corners of its own mesh hops from one to the next so fast ...
-constexpr double kRollingSpeed = 0.1;     // m/s; ... and lands on them slower than this: that is the mesh, not the body, and must not be heard
-constexpr double kSamePlace = 2e-4;       // m; a bouncing body comes back to the same place, a rolling one does not
-constexpr double kPoseInterval = 2e-3;    // s
+constexpr double kSlowest = 0.01;     // m/s; a touch slower than this is not an impact (a fall from 5 um)
+constexpr double kTogether = 1e-4;    // s; touches nearer in time than this are one impact (a Hertz contact lasts about as long)
+constexpr double kTouchDepth = 3e-7;  // m; how well the first instant of a touch is found
+constexpr double kTouchTime = 2e-7;   // s; the same in time
+constexpr double kRollingTime =
+    10e-3;  // s; a body that rolls or slides over the corners of its own mesh hops from one to the next so fast ...
+constexpr double kRollingSpeed = 0.1;  // m/s; ... and lands on them slower than this: that is the mesh, not the body, and must not be heard
+constexpr double kSamePlace = 2e-4;    // m; a bouncing body comes back to the same place, a rolling one does not
+constexpr double kPoseInterval = 2e-3;  // s
 
 /// A point that was in contact a moment ago.
 struct OldPoint {
@@ -119,8 +122,8 @@ std::vector<TouchPoint> Simulator::find_fresh(const Snapshot& now, double faster
   return fresh;
 }
 
-/// One step, or less when a fresh touch comes in between: then up to its first instant. It is an impact if it is fast even there (a body set
-/// down with no gap gains speed within the step).
+/// One step, or less when a fresh touch comes in between: then up to its first instant. It is an impact if it is fast even there (a body
+/// set down with no gap gains speed within the step).
 Step Simulator::calc_step(double step_s) {
   double low = 0.0, high = SimTK::Infinity, step = step_s, creep = 2e-6;
   Step touch;

@@ -1,5 +1,7 @@
-// Method: the bank's triangles are checked to be a closed oriented manifold, split into components by shared edges, and the components with
-//   positive signed volume (outer walls) become one Simbody TriangleMesh. Curvature by a least-squares paraboloid.
+// Method: the bank's triangles are checked to be closed and oriented (two triangles an edge), split into components by shared edges, and
+// the
+//   components with positive signed volume (outer walls) become one Simbody TriangleMesh. Where several fans of triangles meet in one
+//   vertex, each fan gets a vertex of its own, since Simbody knows one fan a vertex only. Curvature by a least-squares paraboloid.
 // Source: M. Sherman, A. Seth, S. Delp, "Simbody: multibody dynamics for biomedical research" (2011), mesh contact geometry.
 // Deviations: none.
 #include "runtime/contact/surface.hpp"
@@ -36,7 +38,8 @@ EdgeMap make_directed_edges(const Vertices& vertices, const Triangles& triangles
   }
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     for (const double x : vertices[v]) {
-      if (!std::isfinite(x)) throw InputError(fmt::format("body '{}': surface vertex {} is not a finite point; make the bank again", body, v));
+      if (!std::isfinite(x))
+        throw InputError(fmt::format("body '{}': surface vertex {} is not a finite point; make the bank again", body, v));
     }
   }
   EdgeMap edges;
@@ -44,43 +47,65 @@ EdgeMap make_directed_edges(const Vertices& vertices, const Triangles& triangles
     const auto& corners = triangles[t];
     for (int k = 0; k < 3; ++k) {
       if (corners[k] < 0 || corners[k] >= count) {
-        throw InputError(
-            fmt::format("body '{}': surface triangle {} names vertex {}, but there are {} vertices; make the bank again", body, t, corners[k], count));
+        throw InputError(fmt::format("body '{}': surface triangle {} names vertex {}, but there are {} vertices; make the bank again", body,
+                                     t, corners[k], count));
       }
     }
     for (int k = 0; k < 3; ++k) {
       const auto edge = std::make_pair(corners[k], corners[(k + 1) % 3]);
       if (edge.first == edge.second || !edges.emplace(edge, static_cast<std::int32_t>(t)).second) {
-        throw InputError(fmt::format(
-            "body '{}': the surface is not a manifold at edge {}-{} (triangle {}): more than two triangles meet there or two disagree about "
-            "which side is outside; mend the mesh and make the bank again",
-            body, edge.first, edge.second, t));
+        throw InputError(
+            fmt::format("body '{}': the surface is not a manifold at edge {}-{} (triangle {}): more than two triangles meet there or two "
+                        "disagree about "
+                        "which side is outside; mend the mesh and make the bank again",
+                        body, edge.first, edge.second, t));
       }
     }
   }
   for (const auto& [edge, triangle] : edges) {
     if (!edges.count({edge.second, edge.first})) {
-      throw InputError(fmt::format("body '{}': the surface is open at edge {}-{} (triangle {}); close the mesh and make the bank again", body,
-                                   edge.first, edge.second, triangle));
+      throw InputError(fmt::format("body '{}': the surface is open at edge {}-{} (triangle {}); close the mesh and make the bank again",
+                                   body, edge.first, edge.second, triangle));
     }
   }
   return edges;
 }
 
-std::vector<std::int32_t> find_components(const Triangles& triangles, const EdgeMap& edges) {
-  std::vector<std::int32_t> parent(triangles.size());
+/// Union-find: the smallest member of the group of each of `count` things, `joined` two and two.
+std::vector<std::int32_t> find_groups(std::size_t count, const std::vector<std::pair<std::int32_t, std::int32_t>>& joined) {
+  std::vector<std::int32_t> parent(count);
   std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](std::int32_t t) {
-    while (parent[t] != t) t = parent[t] = parent[parent[t]];
-    return t;
+  const auto root = [&](std::int32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
   };
-  for (const auto& [edge, triangle] : edges) {
-    const auto a = root(triangle);
-    const auto b = root(edges.at({edge.second, edge.first}));
+  for (const auto& [first, second] : joined) {
+    const auto a = root(first), b = root(second);
     parent[std::max(a, b)] = std::min(a, b);
   }
-  for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = root(static_cast<std::int32_t>(t));
+  for (std::size_t i = 0; i < count; ++i) parent[i] = root(static_cast<std::int32_t>(i));
   return parent;
+}
+
+/// The component of every triangle.
+std::vector<std::int32_t> find_components(const Triangles& triangles, const EdgeMap& edges) {
+  std::vector<std::pair<std::int32_t, std::int32_t>> joined;
+  for (const auto& [edge, triangle] : edges) joined.emplace_back(triangle, edges.at({edge.second, edge.first}));
+  return find_groups(triangles.size(), joined);
+}
+
+/// The fan of every corner of a triangle: corners of one vertex have the same number when edges at that vertex lead from one triangle to
+/// the other.
+std::vector<std::int32_t> find_fans(const Triangles& triangles, const EdgeMap& edges) {
+  const auto corner_at = [&](std::int32_t t, std::int32_t vertex) {
+    return 3 * t + static_cast<std::int32_t>(std::find(triangles[t].begin(), triangles[t].end(), vertex) - triangles[t].begin());
+  };
+  std::vector<std::pair<std::int32_t, std::int32_t>> joined;
+  for (const auto& [edge, t] : edges) {
+    const std::int32_t other = edges.at({edge.second, edge.first});
+    joined.emplace_back(corner_at(t, edge.first), corner_at(other, edge.first));
+  }
+  return find_groups(3 * triangles.size(), joined);
 }
 
 Vec3 corner(const Vertices& vertices, const Triangles& triangles, std::int32_t triangle, int k) {
@@ -89,12 +114,15 @@ Vec3 corner(const Vertices& vertices, const Triangles& triangles, std::int32_t t
 }
 
 Selection select_outer(const Vertices& vertices, const Triangles& triangles, const std::string& body) {
-  const auto component = find_components(triangles, make_directed_edges(vertices, triangles, body));
+  const EdgeMap edges = make_directed_edges(vertices, triangles, body);
+  const auto component = find_components(triangles, edges);
+  const auto fan = find_fans(triangles, edges);
   Vec3 origin = corner(vertices, triangles, 0, 0);
   std::map<std::int32_t, double> volume;  // six times
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const auto i = static_cast<std::int32_t>(t);
-    const Vec3 a = corner(vertices, triangles, i, 0) - origin, b = corner(vertices, triangles, i, 1) - origin, c = corner(vertices, triangles, i, 2) - origin;
+    const Vec3 a = corner(vertices, triangles, i, 0) - origin, b = corner(vertices, triangles, i, 1) - origin,
+               c = corner(vertices, triangles, i, 2) - origin;
     volume[component[t]] += SimTK::dot(a, SimTK::cross(b, c));
     const Vec3 twice_area = SimTK::cross(b - a, c - a);
     if (!(twice_area.norm() > 1e-14 * (b - a).normSqr())) {
@@ -102,21 +130,22 @@ Selection select_outer(const Vertices& vertices, const Triangles& triangles, con
     }
   }
   Selection s;
-  std::vector<int> renumbered(vertices.size(), -1);
+  std::vector<int> renumbered(fan.size(), -1);  // by fan, which is a vertex unless it is pinched
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     if (volume[component[t]] <= 0.0) continue;
     s.bank_triangle.push_back(static_cast<std::int32_t>(t));
-    for (const auto v : triangles[t]) {
-      if (renumbered[v] < 0) {
-        renumbered[v] = static_cast<int>(s.vertices.size());
-        const auto& x = vertices[v];
-        s.vertices.push_back(Vec3(x[0], x[1], x[2]));
+    for (int k = 0; k < 3; ++k) {
+      int& index = renumbered[fan[3 * t + k]];
+      if (index < 0) {
+        index = static_cast<int>(s.vertices.size());
+        s.vertices.push_back(corner(vertices, triangles, static_cast<std::int32_t>(t), k));
       }
-      s.indices.push_back(renumbered[v]);
+      s.indices.push_back(index);
     }
   }
   if (s.indices.empty()) {
-    throw InputError(fmt::format("body '{}': the surface is inside out (its signed volume is negative); turn the triangles and make the bank again", body));
+    throw InputError(fmt::format(
+        "body '{}': the surface is inside out (its signed volume is negative); turn the triangles and make the bank again", body));
   }
   return s;
 }

@@ -19,10 +19,12 @@ struct RidgeEdge {
   std::array<SimTK::Vec3, 2> into_face{};  // unit, in the plane of each face, at right angles to the edge, pointing into the face
 };
 
-/// The closed outer surface of a bank, in the frame of its mesh. Inner walls (components of negative volume) are left out: nothing gets there.
+/// The closed outer surface of a bank, in the frame of its mesh. Inner walls (components of negative volume) are left out: nothing gets
+/// there.
 class Surface {
  public:
-  /// Throws InputError when the surface is empty, open, not a manifold, degenerate or inside out; the message names `body` and the place.
+  /// Throws InputError when the surface is empty, open, has more than two triangles at an edge, is degenerate or inside out; the message
+  /// names `body` and the place. Vertices in which several fans of triangles meet are split, so vertex numbers are not those of the bank.
   Surface(const Vertices& vertices_m, const Triangles& triangles, const std::string& body);
 
   const SimTK::ContactGeometry::TriangleMesh& mesh() const { return mesh_; }

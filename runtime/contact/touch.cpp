@@ -1,9 +1,12 @@
-// Method: the two trees of oriented boxes that Simbody keeps for its meshes are walked together down to the triangles near the cut; of these,
+// Method: the two trees of oriented boxes that Simbody keeps for its meshes are walked together down to the triangles near the cut; of
+// these,
 //   a vertex inside the other body carries when none of its neighbours is deeper along the other's normal, and two ridges carry when their
 //   arcs on the Gauss map cross (the only two ways in which polyhedra touch first).
-// Source: S. Gottschalk, M. Lin, D. Manocha, "OBBTree" (1996); C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9; the Gauss-map test for
+// Source: S. Gottschalk, M. Lin, D. Manocha, "OBBTree" (1996); C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9; the Gauss-map
+// test for
 //   edges: D. Gregorius, "The separating axis test between convex polyhedra" (GDC 2013).
-// Deviations: the tests are local, so they hold for hollow shapes as well; buried faces are not looked for, since a step never goes so deep.
+// Deviations: the tests are local, so they hold for hollow shapes as well; buried faces are not looked for, since a step never goes so
+// deep.
 #include "runtime/contact/touch.hpp"
 
 #include <algorithm>
@@ -20,10 +23,12 @@ using SimTK::UnitVec3;
 using SimTK::Vec3;
 using Node = SimTK::ContactGeometry::TriangleMesh::OBBTreeNode;
 
-constexpr double kFlat = 0.02;  // rad; how far below the plane a neighbour may point: a flat face that lands nearly flat lands with all of itself
+constexpr double kFlat =
+    0.02;  // rad; how far below the plane a neighbour may point: a flat face that lands nearly flat lands with all of itself
 
-constexpr double kSunk = 2e-3;  // of the size
-constexpr double kBrim = 1e-4;  // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
+constexpr double kSunk = 2e-3;        // of the size
+constexpr std::size_t kProbes = 200;  // faces of each body that calc_overlap looks behind
+constexpr double kBrim = 1e-4;        // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
 
 /// Does vertex v carry against a plane with this outward normal (frame of the surface)?
 bool carries(const Surface& surface, int v, const Vec3& normal) {
@@ -60,8 +65,8 @@ std::set<int> find_vertices(const Surface& surface, const std::set<int>& faces) 
   return vertices;
 }
 
-/// A face of `theirs` that vertex v of `mine` (at x, frame of theirs) has gone through, if there is one on which it carries. The nearest face is
-/// not always the one: on a box that stands flush on another, the corners are nearer to the side than to the top.
+/// A face of `theirs` that vertex v of `mine` (at x, frame of theirs) has gone through, if there is one on which it carries. The nearest
+/// face is not always the one: on a box that stands flush on another, the corners are nearer to the side than to the top.
 bool find_carrying_face(const Surface& mine, int v, const Surface& theirs, const Vec3& x, const SimTK::Rotation& R_theirs_mine,
                         const std::set<int>& their_faces, TouchPoint& touch) {
   bool inside = false;
@@ -94,8 +99,8 @@ bool find_carrying_face(const Surface& mine, int v, const Surface& theirs, const
   return found;
 }
 
-/// A cheap look at the faces near the cut alone: may x (frame of `theirs`) be inside? Simbody's search over the whole mesh takes milliseconds
-/// for a point that many faces are about equally far from, so only the few points that pass come to it.
+/// A cheap look at the faces near the cut alone: may x (frame of `theirs`) be inside? Simbody's search over the whole mesh takes
+/// milliseconds for a point that many faces are about equally far from, so only the few points that pass come to it.
 bool may_be_inside(const Surface& theirs, const std::set<int>& their_faces, const Vec3& x, double brim) {
   const auto& mesh = theirs.mesh();
   double least = SimTK::Infinity;
@@ -288,6 +293,31 @@ double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, 
   find_near_faces(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), ~X_b * X_a, faces_a, faces_b);
   test_edges(sa, X_a, sb, X_b, faces_a);
   test_edges(sb, X_b, sa, X_a, faces_b);
+  // Two bodies whose faces coincide (the same body twice at the same place) have vertices and edges on, not in, each other. Their insides
+  // tell: points halfway from a face to the wall opposite.
+  const auto test_insides = [&](const Surface& mine, const Transform& X_mine, const Surface& theirs, const Transform& X_theirs,
+                                const std::set<int>& faces) {
+    const std::size_t stride = 1 + faces.size() / kProbes;
+    std::size_t count = 0;
+    for (const int f : faces) {
+      if (count++ % stride != 0) continue;
+      const UnitVec3 inwards = -mine.mesh().getFaceNormal(f);
+      const Vec3 start = mine.mesh().findCentroid(f) + 1e-6 * mine.size_m() * Vec3(inwards);
+      double across = 0.0;
+      UnitVec3 normal;
+      if (!mine.mesh().intersectsRay(start, inwards, across, normal)) continue;
+      const Vec3 x = ~X_theirs * (X_mine * (start + 0.5 * across * Vec3(inwards)));
+      if (!theirs.mesh().getOBBTreeNode().getBounds().containsPoint(x)) continue;
+      bool inside = false;
+      const double depth = std::min((theirs.mesh().findNearestPoint(x, inside, normal) - x).norm(), 0.5 * across);
+      if (inside && depth > deepest) {
+        deepest = depth;
+        where = X_theirs * x;
+      }
+    }
+  };
+  test_insides(sa, X_a, sb, X_b, faces_a);
+  test_insides(sb, X_b, sa, X_a, faces_b);
   return deepest;
 }
 

@@ -15,13 +15,13 @@ struct TouchPoint {
   int a = 0, b = -1;
   std::array<int, 3> feature{};  // kind (0 vertex of a, 1 vertex of b, 2 ridges), index, index: tells the point again in the next step
   bool plane_on_b = true;        // the plane is fixed on b and the point on a, or the other way round
-  SimTK::Vec3 station{0};         // of the point, frame of its body
-  SimTK::Vec3 plane_point{0};      // of the plane, frame of the plane's body (world for the ground)
-  SimTK::Vec3 plane_normal{0};     // outward of the plane's body, same frame
+  SimTK::Vec3 station{0};        // of the point, frame of its body
+  SimTK::Vec3 plane_point{0};    // of the plane, frame of the plane's body (world for the ground)
+  SimTK::Vec3 plane_normal{0};   // outward of the plane's body, same frame
   // At the poses it was found with (world):
   SimTK::Vec3 where{0};
-  SimTK::Vec3 normal{0}; // unit, from b to a
-  double depth_m = 0.0;  // > 0 inside
+  SimTK::Vec3 normal{0};  // unit, from b to a
+  double depth_m = 0.0;   // > 0 inside
 };
 
 /// Where the point of `touch` is, which way the normal (b to a) and how deep, at the poses given. X_b is not used for the ground's frame
@@ -36,6 +36,7 @@ std::vector<TouchPoint> find_touches(int a, const Surface& surface_a, const SimT
                                      const SimTK::Transform& X_b);
 
 /// How deep the two surfaces are in each other, whatever the features [m]; 0 when they are apart. `where` gets the deepest point (world).
-double calc_overlap(const Surface& surface_a, const SimTK::Transform& X_a, const Surface& surface_b, const SimTK::Transform& X_b, SimTK::Vec3& where);
+double calc_overlap(const Surface& surface_a, const SimTK::Transform& X_a, const Surface& surface_b, const SimTK::Transform& X_b,
+                    SimTK::Vec3& where);
 
 }  // namespace carillon::contact

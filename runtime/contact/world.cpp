@@ -17,8 +17,10 @@ bool is_zero(const Vec3& x) { return x[0] == 0.0 && x[1] == 0.0 && x[2] == 0.0; 
 
 void check_contact_numbers(const std::string& who, double restitution, double friction, double young, double poisson) {
   if (!(restitution >= 0.0 && restitution <= 1.0)) throw InputError(fmt::format("{}: restitution {} is not within 0..1", who, restitution));
-  if (!(friction >= 0.0 && std::isfinite(friction))) throw InputError(fmt::format("{}: friction {} must be a finite number, 0 or more", who, friction));
-  if (!(young > 0.0 && std::isfinite(young))) throw InputError(fmt::format("{}: young_modulus_pa {} must be a finite number above 0", who, young));
+  if (!(friction >= 0.0 && std::isfinite(friction)))
+    throw InputError(fmt::format("{}: friction {} must be a finite number, 0 or more", who, friction));
+  if (!(young > 0.0 && std::isfinite(young)))
+    throw InputError(fmt::format("{}: young_modulus_pa {} must be a finite number above 0", who, young));
   if (!(poisson > -1.0 && poisson <= 0.5)) throw InputError(fmt::format("{}: poisson_ratio {} is not within -1..0.5", who, poisson));
 }
 
@@ -27,7 +29,8 @@ bool is_positive_definite(const std::array<double, 9>& m, double tolerance) {
   const double trace = m[0] + m[4] + m[8];
   const double minor2 = m[0] * m[4] - m[1] * m[3];
   const double minor3 = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
-  return std::isfinite(trace) && m[0] > tolerance * trace && minor2 > tolerance * trace * trace && minor3 > tolerance * trace * trace * trace;
+  return std::isfinite(trace) && m[0] > tolerance * trace && minor2 > tolerance * trace * trace &&
+         minor3 > tolerance * trace * trace * trace;
 }
 
 void check_rigid(const std::string& who, const bank::RigidBody& r) {
@@ -40,7 +43,8 @@ void check_rigid(const std::string& who, const bank::RigidBody& r) {
   const double half_trace = 0.5 * (i[0] + i[4] + i[8]);
   const std::array<double, 9> second{half_trace - i[0], -i[1], -i[2], -i[3], half_trace - i[4], -i[5], -i[6], -i[7], half_trace - i[8]};
   if (!is_positive_definite(second, -1e-9)) {
-    throw InputError(who + ": no body can have the inertia in its bank (one principal moment exceeds the sum of the others); make the bank again");
+    throw InputError(
+        who + ": no body can have the inertia in its bank (one principal moment exceeds the sum of the others); make the bank again");
   }
 }
 
@@ -85,7 +89,8 @@ BodyModel make_body(const BodySpec& b) {
 }  // namespace
 
 Simulation simulate(const WorldSpec& spec, double duration_s, const std::function<void(double)>& progress) {
-  if (!(duration_s >= 0.0 && std::isfinite(duration_s))) throw InputError(fmt::format("the duration {} s must be a finite number, 0 or more", duration_s));
+  if (!(duration_s >= 0.0 && std::isfinite(duration_s)))
+    throw InputError(fmt::format("the duration {} s must be a finite number, 0 or more", duration_s));
   if (!is_finite(spec.gravity_m_s2)) throw InputError("gravity must be three finite numbers");
   WorldModel world;
   world.gravity_m_s2 = spec.gravity_m_s2;

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "runtime/config/error.hpp"
-#include "tests/contact/solids.hpp"
 #include "runtime/contact/world.hpp"
+#include "tests/contact/solids.hpp"
 
 namespace carillon::contact::tests {
 namespace {
@@ -27,11 +27,22 @@ const Case kCases[] = {
     {"restitution", [](auto& w, auto&) { w.bodies[0].restitution = 1.5; }, {"'cup'", "restitution", "1.5", "0..1"}},
     {"friction", [](auto& w, auto&) { w.bodies[0].friction = -1; }, {"'cup'", "friction", "-1"}},
     {"velocity", [](auto& w, auto&) { w.bodies[0].velocity_m_s[1] = kNan; }, {"'cup'", "velocity", "finite"}},
-    {"rotation", [](auto& w, auto&) { w.bodies[0].initial.rotation = {0, 0, 0, 0}; }, {"'cup'", "rotation", "1 0 0 0"}},
-    {"fixed and moving", [](auto& w, auto&) { w.bodies[0].fixed = true; w.bodies[0].velocity_m_s = {1, 0, 0}; }, {"'cup'", "fixed", "velocity"}},
+    {"rotation",
+     [](auto& w, auto&) {
+       w.bodies[0].initial.rotation = {0, 0, 0, 0};
+     },
+     {"'cup'", "rotation", "1 0 0 0"}},
+    {"fixed and moving",
+     [](auto& w, auto&) {
+       w.bodies[0].fixed = true;
+       w.bodies[0].velocity_m_s = {1, 0, 0};
+     },
+     {"'cup'", "fixed", "velocity"}},
     {"mass", [](auto&, auto& b) { b.rigid.mass_kg = 0; }, {"'cup'", "mass"}},
     {"inertia", [](auto&, auto& b) { b.rigid.inertia_kg_m2[0] = -1; }, {"'cup'", "inertia", "positive definite"}},
-    {"inertia against the triangle rule", [](auto&, auto& b) { b.rigid.inertia_kg_m2[0] *= 100; }, {"'cup'", "no body can have the inertia"}},
+    {"inertia against the triangle rule",
+     [](auto&, auto& b) { b.rigid.inertia_kg_m2[0] *= 100; },
+     {"'cup'", "no body can have the inertia"}},
     {"material", [](auto&, auto& b) { b.material.young_modulus_pa = 0; }, {"'cup'", "young_modulus_pa"}},
     {"no triangles", [](auto&, auto& b) { b.triangles.clear(); }, {"'cup'", "no surface triangles"}},
     {"open", [](auto&, auto& b) { b.triangles.pop_back(); }, {"'cup'", "open at edge"}},
@@ -45,8 +56,36 @@ const Case kCases[] = {
      },
      {"'cup'", "inside out"}},
     {"in the ground", [](auto& w, auto&) { w.bodies[0].initial.position_m[2] = 0.01; }, {"'cup'", "10.00 mm", "ground", "raise"}},
-    {"in each other", [](auto& w, auto&) { w.bodies[0].initial.position_m = {1.0, 0, 0.535}; }, {"'cup'", "'shelf'", "inside each other", "5.00 mm"}},
-    {"swallowed", [](auto& w, auto&) { w.bodies[0].initial.position_m = {1.0, 0, 0.6 - 0.098}; }, {"'cup'", "'shelf'", "inside each other"}},
+    {"in each other",
+     [](auto& w, auto&) {
+       w.bodies[0].initial.position_m = {1.0, 0, 0.535};
+     },
+     {"'cup'", "'shelf'", "inside each other", "5.00 mm"}},
+    {"swallowed",
+     [](auto& w, auto&) {
+       w.bodies[0].initial.position_m = {1.0, 0, 0.6 - 0.098};
+     },
+     {"'cup'", "'shelf'", "inside each other"}},
+    {"one body twice at one place",
+     [](auto& w, auto&) {
+       w.bodies[1] = w.bodies[0];
+       w.bodies[1].name = "twin";
+     },
+     {"'cup'", "'twin'", "inside each other", "13.33 mm"}},
+    {"twins a hair apart",
+     [](auto& w, auto&) {
+       w.bodies[1] = w.bodies[0];
+       w.bodies[1].name = "twin";
+       w.bodies[1].initial.position_m = {5e-5, 5e-5, 0.3 + 5e-5};
+     },
+     {"'cup'", "'twin'", "inside each other"}},
+    {"twins shifted along their faces",
+     [](auto& w, auto&) {
+       w.bodies[1] = w.bodies[0];
+       w.bodies[1].name = "twin";
+       w.bodies[1].initial.position_m = {0.01, 0, 0.3};
+     },
+     {"'cup'", "'twin'", "inside each other"}},
     {"gravity", [](auto& w, auto&) { w.gravity_m_s2[0] = kNan; }, {"gravity"}},
     {"ground", [](auto& w, auto&) { w.ground->height_m = kNan; }, {"ground", "height"}},
 };

@@ -17,7 +17,9 @@ inline double norm(const Vec3& a) { return std::hypot(a[0], a[1], a[2]); }
 
 inline Vec3 rotate(const std::array<double, 4>& q, const Vec3& v) {
   const Vec3 u{q[1], q[2], q[3]};
-  const auto cross = [](const Vec3& a, const Vec3& b) { return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; };
+  const auto cross = [](const Vec3& a, const Vec3& b) {
+    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  };
   const Vec3 t = 2.0 * cross(u, v);
   return v + q[0] * t + cross(u, t);
 }
@@ -98,7 +100,8 @@ inline std::vector<EnergySample> calc_energies(const bank::Bank& bank, const std
     for (int k = 0; k < 3; ++k) {
       for (int l = 0; l < 3; ++l) spin += 0.5 * w[k] * bank.rigid.inertia_kg_m2[3 * k + l] * w[l];
     }
-    energies.push_back({0.5 * (a.time_s + b.time_s), 0.5 * bank.rigid.mass_kg * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + spin + bank.rigid.mass_kg * g * 0.5 * (ca[2] + cb[2])});
+    energies.push_back({0.5 * (a.time_s + b.time_s), 0.5 * bank.rigid.mass_kg * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + spin +
+                                                         bank.rigid.mass_kg * g * 0.5 * (ca[2] + cb[2])});
   }
   return energies;
 }

@@ -34,8 +34,9 @@ class DroppedBall : public testing::TestWithParam<std::tuple<double, double, dou
 
 /// radius, height of fall, restitution
 INSTANTIATE_TEST_SUITE_P(Sizes, DroppedBall,
-                         testing::Values(std::tuple{0.03, 0.5, 0.5}, std::tuple{0.03, 2.0, 0.8}, std::tuple{0.01, 0.1, 0.3}, std::tuple{0.25, 1.0, 0.6},
-                                         std::tuple{0.03, 0.01, 0.5}, std::tuple{0.03, 0.3, 0.0}, std::tuple{0.03, 5.0, 0.95}));
+                         testing::Values(std::tuple{0.03, 0.5, 0.5}, std::tuple{0.03, 2.0, 0.8}, std::tuple{0.01, 0.1, 0.3},
+                                         std::tuple{0.25, 1.0, 0.6}, std::tuple{0.03, 0.01, 0.5}, std::tuple{0.03, 0.3, 0.0},
+                                         std::tuple{0.03, 5.0, 0.95}));
 
 TEST_P(DroppedBall, TouchesAndBouncesAtTheTimesOfTheClosedForm) {
   const auto [radius, height, e] = GetParam();

@@ -91,7 +91,7 @@ TEST(Shelf, IsHitByEdgeOnEdge) {
   WorldSpec w;
   w.bodies = {make_body("falling", bar, {0, 0, 0.2}), make_body("standing", bar, {0, 0, 0})};
   const double c = std::cos(M_PI / 8), d = std::sin(M_PI / 8), h = std::sqrt(0.5);
-  w.bodies[0].initial.rotation = {c, d, 0, 0};              // turned 45 degrees about its length
+  w.bodies[0].initial.rotation = {c, d, 0, 0};                  // turned 45 degrees about its length
   w.bodies[1].initial.rotation = {h * c, h * d, h * d, h * c};  // the same, then a quarter turn about z
   w.bodies[1].fixed = true;
   const Simulation s = simulate(w, 0.25);

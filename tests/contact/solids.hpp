@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <utility>
+#include <vector>
 
 #include "runtime/bank/bank.hpp"
 
@@ -119,6 +121,60 @@ inline bank::Bank make_box(std::array<double, 3> size_m, std::array<int, 3> n = 
         }
       }
     }
+  }
+  set_rigid_of_solid(bank);
+  return bank;
+}
+
+/// Cubes of side `side_m` at whole-numbered places, glued at their faces; cubes that meet in a corner only share that vertex.
+inline bank::Bank make_cells(const std::vector<std::array<int, 3>>& cells, double side_m) {
+  bank::Bank bank;
+  bank.material = ceramic();
+  const std::set<std::array<int, 3>> filled(cells.begin(), cells.end());
+  std::map<std::array<int, 3>, std::int32_t> index;
+  const auto vertex = [&](const std::array<int, 3>& i) {
+    const auto [it, fresh] = index.emplace(i, static_cast<std::int32_t>(bank.vertices_m.size()));
+    if (fresh) bank.vertices_m.push_back({side_m * i[0], side_m * i[1], side_m * i[2]});
+    return it->second;
+  };
+  for (const auto& cell : filled) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int side = 0; side < 2; ++side) {
+        auto next = cell;
+        next[axis] += side == 1 ? 1 : -1;
+        if (filled.count(next) != 0) continue;
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const auto at = [&](int du, int dv) {
+          auto i = cell;
+          i[axis] += side;
+          i[u] += du;
+          i[v] += dv;
+          return vertex(i);
+        };
+        const auto a = at(0, 0), b = at(1, 0), c = at(1, 1), d = at(0, 1);
+        if (side == 1) {
+          bank.triangles.insert(bank.triangles.end(), {{a, b, c}, {a, c, d}});
+        } else {
+          bank.triangles.insert(bank.triangles.end(), {{a, c, b}, {a, d, c}});
+        }
+      }
+    }
+  }
+  set_rigid_of_solid(bank);
+  return bank;
+}
+
+/// A lumpy head with two ears and hollows between them: smooth, neither convex nor symmetric, the edges as fine as a real mesh's.
+inline bank::Bank make_eared_ball(double radius_m, int levels) {
+  bank::Bank bank = make_ball(radius_m, levels);
+  const bank::Vec3 ears[2] = {{0.48, 0.36, 0.8}, {-0.6, 0.0, 0.8}};
+  for (auto& x : bank.vertices_m) {
+    double stretch = 1.0 + 0.05 * std::sin(9.0 * x[0] / radius_m) * std::sin(7.0 * x[1] / radius_m + 1.0);
+    for (const auto& ear : ears) {
+      const double cosine = (x[0] * ear[0] + x[1] * ear[1] + x[2] * ear[2]) / radius_m;
+      stretch += 1.0 * std::exp(-(1.0 - cosine) / 0.03);
+    }
+    for (double& c : x) c *= stretch;
   }
   set_rigid_of_solid(bank);
   return bank;
