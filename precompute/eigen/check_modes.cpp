@@ -1,4 +1,4 @@
-// Method:     Residuals and Gram matrix with matrix-matrix products; Gram-Schmidt as Cholesky of the Gram matrix.
+// Method:     Rayleigh quotients, residuals and Gram matrix with matrix-matrix products; Gram-Schmidt as Cholesky of the Gram matrix.
 // Source:     Parlett, The symmetric eigenvalue problem, 1998, section 4.5 (a residual bounds the error of its eigenvalue); Golub, Van
 //             Loan, Matrix Computations, sections 2.7 (rounding of products) and 5.2 (orthonormal bases).
 // Deviations: none.
@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 
 #include "precompute/eigen/local_columns.hpp"
@@ -26,7 +27,7 @@ constexpr double kRoundOff = 10;  // Refined modes of thin shelves come out at 1
 
 }  // namespace
 
-ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<double>& lambda, Mat shapes) {
+ModeErrors normalise_and_measure(Mat stiffness, Mat mass, std::vector<double>& lambda, Mat shapes) {
   MPI_Comm comm = MPI_COMM_NULL;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
   const std::size_t modes = lambda.size();
@@ -72,6 +73,11 @@ ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<doub
     const LocalColumns phi(shapes);
     for (std::size_t j = 0; j < modes; ++j) {
       const auto c = static_cast<PetscInt>(j);
+      lambda[j] = std::inner_product(phi.column(c), phi.column(c) + phi.rows, k_phi.column(c), 0.0);
+    }
+    MPI_Allreduce(MPI_IN_PLACE, lambda.data(), static_cast<int>(modes), MPI_DOUBLE, MPI_SUM, comm);
+    for (std::size_t j = 0; j < modes; ++j) {
+      const auto c = static_cast<PetscInt>(j);
       for (PetscInt i = 0; i < k_phi.rows; ++i) {
         const double rest = k_phi.column(c)[i] - lambda[j] * m_phi.column(c)[i];
         const double term = weight[i] * phi.column(c)[i];
@@ -89,6 +95,24 @@ ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<doub
     errors.floor.push_back(kRoundOff * PETSC_MACHINE_EPSILON * std::sqrt(squares[3 * j + 2]) / scale);
   }
   return errors;
+}
+
+void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
+  if (std::is_sorted(lambda.begin(), lambda.end())) return;
+  std::vector<std::size_t> order(lambda.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
+  for (std::vector<double>* values : {&lambda, &errors.residual, &errors.floor}) {
+    const std::vector<double> old = *values;
+    for (std::size_t j = 0; j < order.size(); ++j) (*values)[j] = old[order[j]];
+  }
+  petsc::MatHandle copy;
+  check(MatDuplicate(shapes, MAT_COPY_VALUES, copy.out()));
+  const LocalColumns from(copy);
+  const LocalColumns to(shapes);
+  for (std::size_t j = 0; j < order.size(); ++j) {
+    std::copy_n(from.column(static_cast<PetscInt>(order[j])), from.rows, to.column(static_cast<PetscInt>(j)));
+  }
 }
 
 void orthonormalise_shapes(Mat mass, Mat shapes) {

@@ -16,8 +16,12 @@ struct ModeErrors {
   double orthonormality = 0;  // max |phi_i^T M phi_j - delta_ij|
 };
 
-/// Normalises each column to phi^T M phi = 1 and measures residuals and orthonormality. shapes: (3n, modes) dense. Collective.
-ModeErrors normalise_and_measure(Mat stiffness, Mat mass, const std::vector<double>& lambda, Mat shapes);
+/// Normalises each column to phi^T M phi = 1, sets lambda to the Rayleigh quotients phi^T K phi, whose errors are of second order, and
+/// measures residuals and orthonormality. lambda: (modes); shapes: (3n, modes) dense. Collective.
+ModeErrors normalise_and_measure(Mat stiffness, Mat mass, std::vector<double>& lambda, Mat shapes);
+
+/// Sorts modes by ascending lambda, their shapes and errors with them. Collective.
+void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
 
 /// Gram-Schmidt in the M inner product from the first column on: Phi <- Phi R^-1 with Phi^T M Phi = R^T R. Columns must ascend in lambda:
 /// an error of a high mode, small beside its own lambda, would be large beside a low one's, so the low modes must take none from above.

@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
 #include "precompute/eigen/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
@@ -122,20 +121,16 @@ void improve_group(const RefineRequest& request, const Group& group, double near
   }
 }
 
-// Refined values may have passed their neighbours by a rounding error or more.
-void sort_modes(std::vector<double>& lambda, Mat shapes) {
-  if (std::is_sorted(lambda.begin(), lambda.end())) return;
-  std::vector<std::size_t> order(lambda.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
-  petsc::MatHandle old;
-  check(MatDuplicate(shapes, MAT_COPY_VALUES, old.out()));
-  std::vector<double> sorted;
-  for (std::size_t j = 0; j < order.size(); ++j) {
-    sorted.push_back(lambda[order[j]]);
-    if (order[j] != j) copy_column(old, order[j], shapes, j);
+// Gram-Schmidt must go upwards in lambda, and refined values may have passed their neighbours.
+ModeErrors measure_orthonormal(const RefineRequest& request, std::vector<double>& lambda, Mat shapes) {
+  ModeErrors errors = normalise_and_measure(request.stiffness, request.mass, lambda, shapes);
+  sort_modes(lambda, shapes, errors);
+  if (errors.orthonormality > kOrthonormal) {
+    orthonormalise_shapes(request.mass, shapes);
+    errors = normalise_and_measure(request.stiffness, request.mass, lambda, shapes);
+    sort_modes(lambda, shapes, errors);
   }
-  lambda = std::move(sorted);
+  return errors;
 }
 
 }  // namespace
@@ -146,6 +141,7 @@ bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance) {
 
 RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
   RefineCost cost;
+  errors = measure_orthonormal(request, lambda, shapes);
   for (std::size_t pass = 0; pass < kSpread.size(); ++pass) {
     std::vector<std::size_t> bad;
     for (std::size_t j = 0; j < lambda.size(); ++j) {
@@ -157,12 +153,7 @@ RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambd
     for (const Group& group : group_neighbours(bad, lambda, spread)) {
       improve_group(request, group, std::min(0.1, 0.1 * (spread - 1)), lambda, shapes, cost);
     }
-    sort_modes(lambda, shapes);
-    errors = normalise_and_measure(request.stiffness, request.mass, lambda, shapes);
-    if (errors.orthonormality > kOrthonormal) {
-      orthonormalise_shapes(request.mass, shapes);
-      errors = normalise_and_measure(request.stiffness, request.mass, lambda, shapes);
-    }
+    errors = measure_orthonormal(request, lambda, shapes);
   }
   return cost;
 }

@@ -17,7 +17,6 @@ struct RefineRequest {
   Mat mass = nullptr;
   double tolerance = 1e-8;                     // of the relative residual
   std::function<ShiftedFactor&()> get_factor;  // L D L^T of any shift; asked for only when a mode needs it
-  std::function<void(std::int64_t)> progress;  // modes that meet the tolerance so far; may be empty
 };
 
 struct RefineCost {
@@ -25,10 +24,11 @@ struct RefineCost {
   std::int64_t solves = 0;
 };
 
-/// Improves the modes whose residual is above the tolerance until none is left, or what is left after a first pass is explained by
-/// rounding (errors.floor), or six passes are over. lambda and the columns of shapes stay ascending; errors is measured anew. Modes that
-/// still fail are the caller's to judge: errors tells. lambda: (modes) > 0; shapes: (3n, modes) dense, M-normal columns. Collective.
-/// Throws SolveError when K - sigma M is singular wherever it is tried.
+/// Makes the modes M-orthonormal, measures them, and improves those whose residual is above the tolerance until none is left, or what is
+/// left after a first pass is explained by rounding (errors.floor), or six passes are over. lambda becomes the Rayleigh quotients,
+/// ascending; errors is what was measured last. Modes that still fail are the caller's to judge: is_accepted. lambda: (modes) > 0, about
+/// ascending; shapes: (3n, modes) dense. Collective. Throws SolveError when K - sigma M is singular wherever it is tried, or the modes are
+/// linearly dependent.
 RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
 
 /// True if mode j is good: its residual is within the tolerance, or within what rounding explains.

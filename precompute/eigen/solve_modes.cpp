@@ -43,7 +43,6 @@ constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are 
 constexpr int kRounds = 60;                // Krylov runs per slice at most until its count is met,
 constexpr int kIdleRounds = 2;             // and so many without a new mode.
 constexpr double kKrylovTolerance = 1e-2;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
-constexpr double kOrthonormal = 1e-11;     // Good enough without another step of orthonormalisation.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -65,7 +64,7 @@ class BandSolver {
   std::int64_t run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t wanted, double tolerance);
   void collect(const DensePairs* dense);
   void finish();
-  void refine(ModeErrors& errors);
+  ModeErrors refine();
   void report(Phase phase, std::int64_t done) const;
   double to_hz(double scaled_lambda) const {
     return std::sqrt(std::max(scaling_.from_scaled(scaled_lambda), 0.0)) / (2 * std::numbers::pi);
@@ -324,7 +323,7 @@ void BandSolver::collect(const DensePairs* dense) {
   found_ = {};
 }
 
-void BandSolver::refine(ModeErrors& errors) {
+ModeErrors BandSolver::refine() {
   RefineRequest request;
   request.stiffness = problem_.stiffness;
   request.mass = problem_.mass;
@@ -334,6 +333,7 @@ void BandSolver::refine(ModeErrors& errors) {
       counter_ = std::make_unique<MumpsFactor>(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
     return *counter_;
   };
+  ModeErrors errors;
   const RefineCost cost = refine_modes(request, modes_.lambda, modes_.shapes, errors);
   counter_.reset();
   modes_.factor.factorisations += cost.factorisations;
@@ -345,22 +345,12 @@ void BandSolver::refine(ModeErrors& errors) {
                     "explains ({:.2g}). Take a looser tolerance, or mend the thinnest elements of the mesh.",
                     j, to_hz(modes_.lambda[j]), errors.residual[j], options_.tolerance, errors.floor[j]));
   }
+  return errors;
 }
 
 void BandSolver::finish() {
   if (modes_.lambda.empty()) return;
-  ModeErrors errors = normalise_and_measure(problem_.stiffness, problem_.mass, modes_.lambda, modes_.shapes);
-  if (errors.orthonormality > kOrthonormal) {  // Modes of different slices, or of different runs.
-    orthonormalise_shapes(problem_.mass, modes_.shapes);
-    errors = normalise_and_measure(problem_.stiffness, problem_.mass, modes_.lambda, modes_.shapes);
-  }
-  refine(errors);
-  constexpr double kDependent = 1e-6;
-  if (!(errors.orthonormality < kDependent)) {
-    throw SolveError(
-        fmt::format("The modes that converged are not M-orthogonal (error {:.2g}): some are the same. Solve the band in parts.",
-                    errors.orthonormality));
-  }
+  const ModeErrors errors = refine();
   modes_.residual = errors.residual;
   modes_.above_tolerance_count =
       std::count_if(errors.residual.begin(), errors.residual.end(), [&](double residual) { return residual > options_.tolerance; });
