@@ -86,6 +86,18 @@ std::vector<std::int32_t> find_held_nodes(const mesh::TetMesh& mesh, const spec:
   }
 }
 
+/// Runs a collective step whose errors cannot know the mesh, and names it in them. All ranks throw alike, so no agreement is needed.
+template <class Step>
+auto name_mesh(const Run& run, Step&& step) {
+  try {
+    return step();
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", run.job.mesh.string(), error.what()));
+  } catch (const SolveError& error) {
+    throw SolveError(fmt::format("{} (job {}): {}", run.job.mesh.string(), run.job.file.string(), error.what()));
+  }
+}
+
 /// Reads, checks and raises or lowers the mesh to the element's order. Rank 0 only.
 mesh::TetMesh read_checked_mesh(const Run& run, MeshFacts& facts) {
   mesh::TetMesh mesh = mesh::read_mesh(run.job.mesh);
@@ -117,7 +129,7 @@ fem::Distribution distribute_mesh(Run& run, MeshFacts& facts) {
   run.stations.end();
 
   run.stations.begin("partition", "METIS k-way on the dual graph");
-  fem::Distribution pieces = fem::distribute(run.comm, mesh, held);
+  fem::Distribution pieces = name_mesh(run, [&] { return fem::distribute(run.comm, mesh, held); });
   for (std::int32_t& row : facts.row) row = pieces.row_of_node[row];
   pieces.row_of_node = {};
   std::string report = fem::describe(pieces.report);
@@ -333,10 +345,10 @@ RunSummary run_job(MPI_Comm comm, const fs::path& job_file, bool quiet) {
   run.stations.begin("assembly",
                      fmt::format("{} unknowns, {}, {} mass", 3 * pieces.free_nodes, run.job.element == spec::Element::T4 ? "T4" : "T10",
                                  run.job.mass == spec::Mass::lumped ? "lumped" : "consistent"));
-  const fem::System system = fem::assemble(comm, pieces.local, run.job.material, run.job.mass);
+  const fem::System system = name_mesh(run, [&] { return fem::assemble(comm, pieces.local, run.job.material, run.job.mass); });
   const fem::RigidBody body = fem::calc_rigid_body(comm, pieces.local, run.job.material.density_kg_m3);
   run.stations.end();
-  const eigen::Modes modes = solve(run, system, make_layout(pieces));
+  const eigen::Modes modes = name_mesh(run, [&] { return solve(run, system, make_layout(pieces)); });
 
   run.stations.begin("bank", "shapes on the surface, radiation gains");
   const std::vector<double> shapes = gather_shapes(comm, modes.shapes, facts.row);

@@ -28,7 +28,7 @@ MeshFormat find_format(std::string_view bytes, const std::string& name, const st
   const auto begin = head.find_first_not_of(" \t\r\n");
   if (begin == std::string_view::npos) throw InputError(fmt::format("{}:1: the file holds only blanks; write the mesh again", name));
   head.remove_prefix(begin);
-  if (head.front() == '$') return MeshFormat::kGmsh;
+  if (head.front() == '$' && head.size() > 1 && std::isalpha(static_cast<unsigned char>(head[1])) != 0) return MeshFormat::kGmsh;
   if (head.front() == '<') return MeshFormat::kVtu;
   if (head.starts_with("MeshVersionFormatted") || (head.front() == '#' && extension == ".mesh")) return MeshFormat::kMedit;
   if (head.starts_with("MFEM mesh")) throw InputError(fmt::format("{}:1: an MFEM mesh; {}: convert it", name, kReadable));

@@ -2,7 +2,8 @@
 // Source: INRIA technical report RT-0253 (P. Frey, "MEDIT", 2001), appendix on the .mesh format; TetrahedraP2 and TetrahedraP2Ordering as
 //   libMeshb 7 has them.
 // Deviations: TetrahedraP2 without TetrahedraP2Ordering has no agreed order. VTK's is assumed (Gmsh reads it so) unless Gmsh's own order
-//   brings the mid nodes nearer to the middles of their edges.
+//   brings the mid nodes nearer to the middles of their edges.  Gmsh (4.8) writes second order under the keywords of the first, with more
+//   numbers a line; rows of 11 numbers under Tetrahedra are taken so (two rows of the first order on a line would be 10).
 
 #include <algorithm>
 #include <array>
@@ -20,13 +21,14 @@ struct Section {
   const char* prefix;   // of the node sets, nullptr for none
   const char* plural;   // in messages
   bool volume = false;  // a solid element that is no tetrahedron
+  int quadratic = 0;    // node numbers of a line where Gmsh writes second order under the first order's keyword
 };
 
 const std::map<std::string_view, Section>& sections() {
   static const std::map<std::string_view, Section> table{
-      {"Edges", {2, "edges", "edges"}},
+      {"Edges", {2, "edges", "edges", false, 3}},
       {"EdgesP2", {3, "edges", "edges"}},
-      {"Triangles", {3, "triangles", "triangles"}},
+      {"Triangles", {3, "triangles", "triangles", false, 6}},
       {"TrianglesP2", {6, "triangles", "triangles"}},
       {"Quadrilaterals", {4, "quads", "quadrilaterals"}},
       {"QuadrilateralsQ2", {9, "quads", "quadrilaterals"}},
@@ -54,6 +56,7 @@ class MeditReader {
     const std::size_t place = cursor_.place();
     return cursor_.checked_count(cursor_.text_int("a count", INT64_MIN, INT64_MAX), least_bytes, what, place);
   }
+  int count_line_numbers();
   void read_vertices();
   void read_tets(int node_count);
   void read_surface(const Section& section);
@@ -80,8 +83,22 @@ void MeditReader::read_vertices() {
   }
 }
 
+/// How many words stand on the line of the first row of a list.
+int MeditReader::count_line_numbers() {
+  if (!cursor_.skip_space()) return 0;
+  std::string_view line = cursor_.bytes().substr(cursor_.place());
+  line = line.substr(0, line.find_first_of("\n#"));
+  int words = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const auto blank = [&](std::size_t k) { return std::isspace(static_cast<unsigned char>(line[k])) != 0; };
+    if (!blank(i) && (i == 0 || blank(i - 1))) ++words;
+  }
+  return words;
+}
+
 void MeditReader::read_tets(int node_count) {
   const auto count = read_count(2 * static_cast<std::size_t>(node_count) + 2, "tetrahedra");
+  if (count > 0 && count_line_numbers() == 11) node_count = 10;
   std::array<std::int64_t, 10> tags{};
   for (std::size_t i = 0; i < count; ++i) {
     cursor_.skip_space();
@@ -99,7 +116,10 @@ void MeditReader::read_surface(const Section& section) {
   if (count > 0 && section.volume)
     cursor_.fail(start, "the mesh holds {} {}; only tetrahedra are read: mesh the volume with those", count, section.plural);
   if (count > 0) raw_.others[section.plural] += static_cast<std::int64_t>(count);
-  std::vector<RawMesh::Reference> nodes(static_cast<std::size_t>(section.numbers));
+  std::size_t numbers = static_cast<std::size_t>(section.numbers);
+  if (count > 0 && section.quadratic > 0 && count_line_numbers() == section.quadratic + 1)
+    numbers = static_cast<std::size_t>(section.quadratic);
+  std::vector<RawMesh::Reference> nodes(numbers);
   for (std::size_t i = 0; i < count; ++i) {
     cursor_.skip_space();
     const std::size_t place = cursor_.place();

@@ -241,6 +241,11 @@ void make_mesh(const Order& order) {
   check_options(order);
   config::check_writable(order.out, "mesh");
   if (!order.json.empty()) config::check_writable(order.json, "report");
+  std::error_code none;
+  if (!order.json.empty() && (std::filesystem::path(order.json).lexically_normal() == std::filesystem::path(order.out).lexically_normal() ||
+                              std::filesystem::equivalent(order.json, order.out, none))) {
+    throw InputError(fmt::format("--json {}: the report would overwrite the mesh; give it another name", order.json));
+  }
 
   Result result = order.shape.empty() ? make_from_surface(order, progress) : make_from_shape(order, progress);
   note_count(order, result);

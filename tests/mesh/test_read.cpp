@@ -108,6 +108,24 @@ TEST(read, tetgens_own_files_have_mid_nodes_in_the_middle_and_the_box_volume) {
   }
 }
 
+// Gmsh (4.8) saves second order as rows of 11 and 7 numbers under the keywords of the first.
+TEST(read, medit_of_second_order_under_the_keywords_of_the_first_is_the_same_mesh) {
+  std::string text = read_text(fixture("medit_2.mesh"));
+  for (const std::string word : {"TetrahedraP2", "TrianglesP2"}) {
+    const auto at = text.find(word + "\n");
+    if (at != std::string::npos) text.erase(at + word.size() - 2, 2);
+  }
+  ASSERT_EQ(text.find("P2"), std::string::npos);
+  text.insert(text.find("Tetrahedra"), "Triangles\n1\n1 2 3 4 5 6 9\n");
+  TetMesh mesh = parse_mesh(std::as_bytes(std::span(text)), "gmsh.mesh", MeshFormat::kMedit);
+  const TetMesh truth = read_mesh(fixture("medit_2.mesh"));
+  EXPECT_EQ(mesh.order, 2);
+  EXPECT_EQ(mesh.tets, truth.tets);
+  EXPECT_EQ(mesh.node_sets["triangles:9"].size(), 6u);
+  mesh.node_sets.erase("triangles:9");
+  EXPECT_EQ(mesh.node_sets, truth.node_sets);
+}
+
 TEST(read, medit_triangles_make_sets_of_their_references) {
   // In a file of Gmsh's the reference of a triangle is the number of its surface: six of them cover the box.
   const TetMesh mesh = read_mesh(fixture("gmsh_1.mesh"));

@@ -65,7 +65,7 @@ INSTANTIATE_TEST_SUITE_P(
                   mesh::write_gmsh(flat, f / "mesh.msh");
                 },
                 {"mesh.msh"}},
-        BadCase{"more_ranks_than_elements", 7, [](const Folder&) {}, {"6 tetrahedra", "7 ranks", "at most 6"}},
+        BadCase{"more_ranks_than_elements", 7, [](const Folder&) {}, {"mesh.msh: ", "6 tetrahedra", "7 ranks", "at most 6"}},
         BadCase{"unknown_node_set",
                 2,
                 [](const Folder& f) { f.write_job({}, R"("fixed": "x-mim",)"); },
@@ -78,7 +78,7 @@ INSTANTIATE_TEST_SUITE_P(
             "everything_held",
             2,
             [](const Folder& f) { f.write_job({}, R"("element": "T4", "fixed": {"box_m": {"min": [-1, -1, -1], "max": [1, 1, 1]}},)"); },
-            {"holds every node"}},
+            {"mesh.msh: ", "holds every node"}},
         BadCase{"bank_in_place_of_a_folder", 2, [](const Folder& f) { std::filesystem::create_directory(f / "out.bank"); }, {"out.bank"}},
         BadCase{"bank_below_a_file",
                 1,

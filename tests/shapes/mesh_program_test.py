@@ -72,6 +72,7 @@ with tempfile.TemporaryDirectory() as name:
         (["--shape", "bar", "--nodes", "-5", "-o", "out.msh"], ["-5 nodes", "positive"]),
         (["--shape", "bar", "--order", "3", "-o", "out.msh"], ["--order", "3"]),
         (["--shape", "bar", "-o", "out.vtu"], ["out.vtu", ".msh"]),
+        (["--shape", "bar", "-o", "out.msh", "--json", "./out.msh"], ["--json", "overwrite the mesh"]),
         (["--shape", "bar"], ["--output is required"]),
         (["-o", "out.msh"], ["SURFACE", "--shape"]),
         (["a.obj", "--shape", "bar", "-o", "out.msh"], ["both", "a.obj", "one of them"]),
