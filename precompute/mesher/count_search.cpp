@@ -55,6 +55,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
   std::vector<Trial> trials;
   mesh::TetMesh mesh;
   double last_edge = 0;
+  int failures = 0;
   std::optional<Trial> best;
   // The count at an edge, or nothing if such a mesh cannot be made though shorter edges could.
   const auto attempt = [&](double edge) -> std::optional<double> {
@@ -64,7 +65,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception&) {
-      if (trials.empty()) throw;
+      if (trials.empty() || ++failures > 1) throw;  // each may have taken seconds
       last_edge = 0;
       return std::nullopt;
     }
@@ -90,7 +91,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
     edge = count && *count > 0 ? std::min(model.find_edge(target), search.longest_m) : 0.7 * edge;
     if (bracketed && !(edge > low * 1.002 && edge < high / 1.002)) edge = std::sqrt(low * high);
   }
-  if (!is_met(search.tolerance) && target < kCheapTarget && best && !is_level(trials, target)) {
+  if (!is_met(search.tolerance) && target < kCheapTarget && best && failures == 0 && !is_level(trials, target)) {
     const double middle = best->edge_m;
     for (int n = 0; n < kRow && !is_met(0.8 * search.tolerance); ++n)
       attempt(std::min(middle * (1 + 0.015 * (n / 2 + 1) * (n % 2 == 0 ? 1 : -1)), search.longest_m));

@@ -37,7 +37,7 @@ class Mesh3Body : public DelaunayBody {
     namespace p = CGAL::parameters;
     // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
     CGAL::get_default_random() = CGAL::Random(0);
-    make_domain();
+    make_domain(sizes.most_nodes);
     complex_ = Complex();
     const double radius = kRadiusPerEdge * sizes.edge_m;
     narrow_ = calc_curve_sizes(polylines_, sizes.edge_m);
@@ -67,7 +67,8 @@ class Mesh3Body : public DelaunayBody {
   }
 
  protected:
-  virtual void make_domain() = 0;  // sets domain_ and has_curves_
+  /// Sets domain_, which may end a refinement that does not by an exception; `most_nodes` says how much work to expect.
+  virtual void make_domain(std::size_t most_nodes) = 0;
   /// Points on the boundary about three edges apart, on every part of it, each with its index in the domain.
   virtual std::vector<std::pair<Vec3, Index>> find_first_points(double spacing_m) = 0;
 

@@ -36,7 +36,7 @@ class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
   }
 
  private:
-  void make_domain() override {
+  void make_domain(std::size_t) override {
     domain_ = std::make_unique<Domain>(mesh_);
     if (has_curves_) domain_->add_features(curves_.begin(), curves_.end());
   }

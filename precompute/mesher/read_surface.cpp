@@ -14,7 +14,9 @@
 #include <fstream>
 #include <new>
 #include <sstream>
+#include <stdexcept>
 
+#include "precompute/mesher/scan_text.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "runtime/config/error.hpp"
 
@@ -127,11 +129,14 @@ void add_polygon(const std::vector<Vec3>& points, std::vector<std::size_t> polyg
 TriangleSurface read_surface(const std::filesystem::path& path) {
   const std::string format = find_format(path), name = path.string();
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) throw InputError(fmt::format("{}: there is no such file", name));
+  if (!std::filesystem::exists(path, error)) throw InputError(fmt::format("{}: there is no such file", name));
+  if (!std::filesystem::is_regular_file(path, error))
+    throw InputError(fmt::format("{}: this is a folder or a device, not a file; give the file of a surface", name));
   const auto bytes = std::filesystem::file_size(path, error);
   if (error) throw InputError(fmt::format("{}: cannot be read: {}", name, error.message()));
   if (bytes == 0) throw InputError(fmt::format("{}: the file is empty", name));
   check_counts(path, format, bytes);
+  scan_text(path, format);
 
   std::vector<Kernel::Point_3> soup_points;
   Soup polygons;
@@ -141,6 +146,10 @@ TriangleSurface read_surface(const std::filesystem::path& path) {
             : format == "off" ? CGAL::IO::read_OFF(name, soup_points, polygons)
             : format == "ply" ? CGAL::IO::read_PLY(name, soup_points, polygons)
                               : CGAL::IO::read_STL(name, soup_points, polygons);
+  } catch (const std::bad_alloc&) {
+    throw InputError(fmt::format("{}: a count in it is larger than the memory; it is damaged, export it again", name));
+  } catch (const std::length_error&) {
+    throw InputError(fmt::format("{}: a count in it is negative or far too large; it is damaged, export it again", name));
   } catch (const std::exception& failure) {
     throw InputError(fmt::format("{}: cannot be read as {}: {}; export it again", name, format, failure.what()));
   }
@@ -160,14 +169,14 @@ TriangleSurface read_surface(const std::filesystem::path& path) {
     surface.points.push_back({p.x(), p.y(), p.z()});
     for (const double x : surface.points.back())
       if (!(std::abs(x) <= 1e30))
-        throw InputError(
-            fmt::format("{}: vertex {} has the coordinate {}; every coordinate must be a finite number", name, surface.points.size(), x));
+        throw InputError(fmt::format("{}: vertex {} has the coordinate {}; every coordinate must be a finite number below 1e30", name,
+                                     surface.points.size(), x));
   }
   for (std::size_t f = 0; f < polygons.size(); ++f) {
     for (const std::size_t v : polygons[f])
       if (v >= surface.points.size())
-        throw InputError(fmt::format("{}: face {} names vertex {} of {}; the file is damaged, export it again", name, f + 1, v + 1,
-                                     surface.points.size()));
+        throw InputError(fmt::format("{}: face {} names vertex {} of {}; the file is damaged, export it again", name, f + 1,
+                                     static_cast<std::int64_t>(v) + 1, surface.points.size()));
     if (polygons[f].size() >= 3) add_polygon(surface.points, polygons[f], surface.triangles);
   }
   if (surface.triangles.empty()) throw InputError(fmt::format("{}: no triangles in it; a closed triangle surface is needed", name));

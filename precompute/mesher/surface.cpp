@@ -25,9 +25,10 @@ namespace carillon::mesher {
 namespace {
 
 constexpr double kMostNodes = 2e7;
-constexpr double kCountTolerance = 0.10;  // promised
-constexpr double kCountAim = 0.04;        // where the search is content
-constexpr int kMostFinishes = 4;          // meshes that are finished, as what that changes in the count is learned
+constexpr double kCountTolerance = 0.10;             // promised
+constexpr double kCountAim = 0.04;                   // where the search is content
+constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
+constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kSliverDeg = 12;
 // Edges longer than the body is thick do not make the mesh coarser: on plates and cubes its count levels out at what the model gives for
 // this multiple of the mean thickness. A target under this part of that count is refused at once.
@@ -94,7 +95,18 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
     if (!(extent[c] > 1e-9 * calc_box(used.points).diagonal()))
       throw InputError(fmt::format("{}: the surface is flat: its extent along {} is {}; a closed surface that encloses a volume is needed",
                                    options.surface.string(), "xyz"[c], extent[c]));
+  double farthest = 0;
+  for (const Vec3& p : used.points) farthest = std::max({farthest, std::abs(p[0]), std::abs(p[1]), std::abs(p[2])});
+  if (std::max({extent[0], extent[1], extent[2]}) < 1e-10 * farthest)
+    throw InputError(
+        fmt::format("{}: the surface lies {:.3g} of its own lengths from the origin, so that its coordinates have lost their digits; "
+                    "move it to the origin and export it again",
+                    options.surface.string(), farthest / std::max({extent[0], extent[1], extent[2]})));
   report.scale = options.height_m ? *options.height_m / extent[up] : options.scale.value_or(1);
+  const double size = report.scale * std::max({extent[0], extent[1], extent[2]});
+  if (!(size >= kSmallest && size <= kLargest))
+    throw InputError(fmt::format("{}: the body would be {:.3g} m long; it must be from {:.0e} to {:.0e} m; give its height or a scale",
+                                 options.surface.string(), size, kSmallest, kLargest));
   for (Vec3& p : surface.points) p = report.scale * p;
   report.extent_m = report.scale * extent;
   const double largest = std::max({report.extent_m[0], report.extent_m[1], report.extent_m[2]});
@@ -113,6 +125,13 @@ struct Body {
   CountModel model{};
 };
 
+[[noreturn]] void throw_solid(const SurfaceOptions& options, double deepest_m) {
+  throw InputError(
+      fmt::format("{}: a wall of {:.4g} m leaves no hollow: no point of the body is deeper than {:.4g} m under its surface; "
+                  "give a thinner wall, or none for a solid",
+                  options.surface.string(), *options.wall_m, deepest_m));
+}
+
 DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m) {
   const Vec3 extent = calc_box(body.mended.surface.points).extent();
   const double diagonal = norm(extent);
@@ -121,18 +140,22 @@ DistanceField make_field(const Body& body, const SurfaceOptions& options, double
   double voxel = std::min({edge_m / 3, diagonal / 80, body.wall_m > 0 ? body.wall_m / 8 : diagonal});
   voxel = std::max(voxel, std::cbrt(extent[0] * extent[1] * extent[2] / kPleasantSamples));
   if (body.wall_m > 0) voxel = std::min(voxel, body.wall_m / 4);
-  DistanceField field = calc_distance_field(body.mended.surface, voxel, body.wall_m + 4 * voxel, body.mended.offset_m);
+  const double half = 0.5 * std::min({extent[0], extent[1], extent[2]});
+  if (body.wall_m >= half) throw_solid(options, half);
+  DistanceField field = [&] {
+    try {
+      return calc_distance_field(body.mended.surface, voxel, body.wall_m + 4 * voxel, body.mended.offset_m);
+    } catch (const InputError& failure) {
+      throw InputError(fmt::format("{}: {}", options.surface.string(), failure.what()));
+    }
+  }();
   const auto deepest = *std::min_element(field.samples.begin(), field.samples.end());
   if (deepest >= 0)
     throw InputError(
         fmt::format("{}: the surface encloses nothing thicker than {:.3g} m, the resolution for edges of {:.3g} m; "
                     "ask for shorter edges or more nodes",
                     options.surface.string(), voxel, edge_m));
-  if (body.wall_m > 0 && deepest >= -body.wall_m)
-    throw InputError(
-        fmt::format("{}: a wall of {:.4g} m leaves no hollow: no point of the body is deeper than {:.4g} m under its surface; "
-                    "give a thinner wall, or none for a solid",
-                    options.surface.string(), body.wall_m, -static_cast<double>(deepest)));
+  if (body.wall_m > 0 && deepest >= -body.wall_m) throw_solid(options, -static_cast<double>(deepest));
   return field;
 }
 
@@ -158,7 +181,9 @@ std::unique_ptr<DelaunayBody> make_delaunay(const Body& body, const SurfaceOptio
 DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m) {
   const double distance = body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m;
   // Far more than any body needs at this edge length, so that only a runaway meets it.
-  const double most = 3000 + 5 * std::max(body.model.calc_nodes(edge_m), static_cast<double>(options.nodes.value_or(0)));
+  // Without a target, a thin body takes what its thickness needs.
+  const double effective = options.nodes ? edge_m : std::min(edge_m, kEdgePerThickness * body.thickness_m);
+  const double most = 3000 + 5 * std::max(body.model.calc_nodes(effective), static_cast<double>(options.nodes.value_or(0)));
   return {edge_m, distance, static_cast<std::size_t>(std::min(most, 3 * kMostNodes))};
 }
 
@@ -223,7 +248,11 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
 }
 
 [[noreturn]] void throw_count(const SurfaceOptions& options, const CountError& failure) {
-  const auto asked = static_cast<double>(*options.nodes);
+  const auto asked = static_cast<double>(options.nodes.value_or(0));
+  if (failure.fewest > 0.9 * kMostNodes)
+    throw InputError(fmt::format("{}: the {} is so thin that about {:.2g} nodes are needed, more than {:.0g}; give a thicker {}",
+                                 options.surface.string(), options.wall_m ? "wall" : "body", failure.fewest, kMostNodes,
+                                 options.wall_m ? "wall" : "body"));
   if (failure.fewest > asked)
     throw InputError(
         fmt::format("{}: {} nodes cannot be met within 10 %: the thickness of the body{} needs at least about {:.0f}; ask for that many",
@@ -231,6 +260,11 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
   throw InputError(fmt::format("{}: {} nodes cannot be met within 10 %: the nearest mesh has {:.0f}; ask for that many",
                                options.surface.string(), *options.nodes, failure.nearest));
 }
+
+/// The surface defeats Delaunay refinement, but perhaps not stuffing.
+struct DelaunayError : InputError {
+  using InputError::InputError;
+};
 
 /// The linear mesh by Delaunay refinement.
 mesh::TetMesh make_delaunay_mesh(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases) {
@@ -248,8 +282,8 @@ mesh::TetMesh make_delaunay_mesh(const Body& body, const SurfaceOptions& options
   };
   const auto refuse = [&](const std::exception& failure) {
     if (with_sharp) throw_count(options, *with_sharp);
-    throw SolveError(
-        fmt::format("{}: the mesher failed: {}; try another edge length or node count", options.surface.string(), failure.what()));
+    throw DelaunayError(fmt::format("{}: the mesher failed: {}; part or join what touches, or try another edge length or node count",
+                                    options.surface.string(), failure.what()));
   };
   try {
     return make(true);
@@ -353,11 +387,13 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
                     ? *options.edge_m
                     : body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : (options.order == 2 ? 30000 : 10000));
   if (options.edge_m && edge > diagonal)
-    throw InputError(fmt::format("edges of {:.3g} m are longer than the body ({:.3g} m)", edge, diagonal));
+    throw InputError(fmt::format("{}: edges of {:.3g} m are longer than the body ({:.3g} m); ask for shorter ones",
+                                 options.surface.string(), edge, diagonal));
   if (const double nodes = body.model.calc_nodes(edge); nodes > 1.5 * kMostNodes)
-    throw InputError(
-        fmt::format("edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones", edge, nodes, kMostNodes));
+    throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
+                                 options.surface.string(), edge, nodes, kMostNodes));
   const double least = body.model.calc_nodes(kEdgePerThickness * body.thickness_m);
+  if (!options.nodes && least > 1.5 * kMostNodes) throw_count(options, CountError("", least, least));
   if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * least)
     throw_count(options, CountError("", least, least));
   if (!options.edge_m && !options.nodes)
@@ -369,16 +405,26 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     body.field = phases.run("computing distances", [&] { return make_field(body, options, edge); });
   report.expected_volume_m3 = body.field ? calc_volume(*body.field, body.wall_m) : report.input_volume_m3;
 
-  mesh::TetMesh linear;
-  if (report.method == Method::kStuffing) {
+  const auto stuff_body = [&] {
     const auto refine = [&](double e) { return stuff(*body.field, body.wall_m, e); };
     try {
-      linear = meet_count(body, options, edge, report, phases, refine, [&](mesh::TetMesh& mesh) { finish_mesh(mesh, body, report); });
+      return meet_count(body, options, edge, report, phases, refine, [&](mesh::TetMesh& mesh) { finish_mesh(mesh, body, report); });
     } catch (const CountError& failure) {
       throw_count(options, failure);
     }
-  } else {
-    linear = make_delaunay_mesh(body, options, edge, report, phases);
+  };
+  mesh::TetMesh linear;
+  try {
+    linear = report.method == Method::kStuffing ? stuff_body() : make_delaunay_mesh(body, options, edge, report, phases);
+  } catch (const DelaunayError&) {
+    if (options.method != Method::kAutomatic || !body.field) throw;
+    report.notes.push_back(
+        "Delaunay refinement did not end on this surface, parts of which touch; isosurface stuffing was used in its place.");
+    report.method = Method::kStuffing;
+    report.sharp_curves = 0;
+    report.sharp_edges_m = 0;
+    edge = body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : body.model.calc_nodes(edge));
+    linear = stuff_body();
   }
   if (report.removed_tets > 0)
     report.notes.push_back(fmt::format("{} elements were removed where the body only touched itself or was cut off.", report.removed_tets));

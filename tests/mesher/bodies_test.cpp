@@ -53,11 +53,25 @@ void expect_sound(const mesh::TetMesh& m) {
     if (count[0] == 1) ++edges[{f[0], f[1]}], ++edges[{f[1], f[2]}], ++edges[{f[0], f[2]}];
   }
   for (const auto& [edge, count] : edges) EXPECT_EQ(count, 2) << edge[0] << " " << edge[1];
+  // Around a node of a surface the boundary faces form one ring, and a ring has as many edges at the node as it has faces; two rings are
+  // found by walking one of them.
+  std::map<std::int32_t, std::vector<std::array<std::int32_t, 2>>> rings;
+  for (const auto& [f, count] : faces)
+    if (count[0] == 1) rings[f[0]].push_back({f[1], f[2]}), rings[f[1]].push_back({f[0], f[2]}), rings[f[2]].push_back({f[0], f[1]});
+  for (const auto& [v, ring] : rings) {
+    std::set<std::int32_t> reached{ring[0][0]};
+    for (std::size_t before = 0; before != reached.size();) {
+      before = reached.size();
+      for (const auto& [a, b] : ring)
+        if (reached.contains(a) || reached.contains(b)) reached.insert({a, b});
+    }
+    EXPECT_EQ(reached.size(), ring.size()) << "the boundary touches itself at node " << v;
+  }
   EXPECT_EQ(used.size(), m.nodes.size());
   EXPECT_EQ(m.regions.size(), static_cast<std::size_t>(m.tet_count()));
   mesh::TetMesh copy = m;
   const auto check = mesh::check_mesh(copy, "the mesher's");
-  EXPECT_EQ(check.reoriented + check.unreferenced + check.welded, 0);
+  EXPECT_EQ(check.reoriented + check.unreferenced + check.welded + check.pinched_nodes, 0);
 }
 
 void expect_count(const mesh::TetMesh& m, std::int64_t target) {
@@ -143,6 +157,41 @@ TEST(bodies, stuffing_fills_a_hollow_sphere_within_the_count) {
   const double exact = 4 * std::numbers::pi / 3 * (std::pow(0.05, 3) - std::pow(0.04, 3));
   EXPECT_NEAR(calc_volume_of(m) / exact, 1, 0.05);
   EXPECT_GT(report.min_dihedral_deg, 5);
+}
+
+TEST(bodies, thin_plate_keeps_its_edges_where_elements_are_as_long_as_it_is_thick) {
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = write_text("plate.obj", to_obj(make_box(0.3, 0.2, 0.01))), .nodes = 5000}, report);
+  expect_sound(m);
+  expect_count(m, 5000);
+  EXPECT_EQ(report.sharp_curves, 12);
+  EXPECT_NEAR(calc_volume_of(m) / (0.3 * 0.2 * 0.01), 1, 1e-3);
+  EXPECT_GT(report.min_dihedral_deg, 8);
+}
+
+TEST(bodies, coarse_hollow_sphere_is_mended_where_its_skins_meet) {
+  SurfaceReport report;
+  const auto m = mesh_surface({.surface = write_text("coarse.off", to_off(make_sphere(0.05, 4))), .wall_m = 0.004, .nodes = 2000}, report);
+  expect_sound(m);
+  expect_count(m, 2000);
+  EXPECT_NEAR(calc_volume_of(m) / report.expected_volume_m3, 1, 0.03);
+}
+
+TEST(bodies, small_and_slender_targets_are_met) {
+  const struct {
+    const char* name;
+    Polygons surface;
+    std::int64_t nodes;
+  } cases[] = {{"s200.off", make_sphere(0.05, 4), 200},      {"c200.off", make_box(1, 1, 1), 200},
+               {"c500.off", make_box(1, 1, 1), 500},         {"s700.off", make_sphere(1, 4), 700},
+               {"r3000.off", make_box(1, 0.01, 0.01), 3000}, {"b1500.off", make_box(3, 2, 1), 1500}};
+  for (const auto& c : cases) {
+    SCOPED_TRACE(c.name);
+    SurfaceReport report;
+    const auto m = mesh_surface({.surface = write_text(c.name, to_off(c.surface)), .nodes = c.nodes}, report);
+    expect_sound(m);
+    expect_count(m, c.nodes);
+  }
 }
 
 TEST(bodies, second_order_counts_the_mid_side_nodes_and_puts_them_in_the_middle) {

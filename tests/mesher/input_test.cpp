@@ -100,6 +100,52 @@ TEST(input, a_closed_cavity_stays_hollow) {
   EXPECT_NEAR(report.volume_m3, 1 - 0.125, 0.01);
 }
 
+/// A copy of the box after the first, its points moved.
+Polygons join_boxes(const Polygons& a, Polygons b, double x, double y, double z) {
+  Polygons both = a;
+  for (auto& p : b.points) both.points.push_back({p[0] + x, p[1] + y, p[2] + z});
+  for (auto f : b.faces) {
+    for (int& v : f) v += static_cast<int>(a.points.size());
+    both.faces.push_back(f);
+  }
+  return both;
+}
+
+TEST(input, bodies_that_lie_apart_or_touch_along_an_edge_are_meshed) {
+  const Polygons cube = make_box(1, 1, 1);
+  SurfaceReport report;
+  mesh_surface({.surface = write_text("apart.off", to_off(join_boxes(cube, cube, 3, 0, 0))), .nodes = 500}, report);
+  EXPECT_EQ(report.components, 2);
+  EXPECT_NEAR(report.volume_m3, 2, 1e-3);
+  mesh_surface({.surface = write_text("edge.off", to_off(join_boxes(cube, cube, 1, 1, 0))), .nodes = 500}, report);
+  EXPECT_NEAR(report.volume_m3, 2, 0.02);
+}
+
+TEST(input, sizes_from_nanometres_to_megametres_are_meshed_alike) {
+  for (const double size : {1e-9, 1e6}) {
+    SurfaceReport report;
+    mesh_surface({.surface = write_text("size.off", to_off(make_box(size, size, size))), .nodes = 300}, report);
+    EXPECT_NEAR(report.volume_m3 / (size * size * size), 1, 1e-3);
+  }
+}
+
+TEST(input, nothing_but_files_is_read) {
+  const auto folder = get_path("folder.off");
+  std::filesystem::create_directories(folder);
+  const auto device = get_path("device.off");
+  std::filesystem::remove(device);
+  std::filesystem::create_symlink("/dev/zero", device);
+  for (const auto& path : {folder, device}) {
+    SurfaceReport report;
+    try {
+      mesh_surface({.surface = path}, report);
+      ADD_FAILURE() << "was meshed";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("not a file"), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
   const std::string box = to_off(make_box(1, 1, 1));
   Polygons open = make_box(1, 1, 1);
@@ -111,6 +157,13 @@ TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
   with_nan.replace(with_nan.find("\n1 0 0"), 6, "\n1e40 0 0");
   std::string bad_index = box;
   bad_index.replace(bad_index.rfind("1 7 5"), 5, "1 7 55");
+  const Polygons cube = make_box(1, 1, 1);
+  Polygons far = cube;
+  for (auto& p : far.points) p[0] += 1e15;
+  const auto replaced = [](std::string text, const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
   struct Case {
     const char* name;
     std::string content;
@@ -147,6 +200,24 @@ TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
       {"long.off", box, surface([](auto& o) { o.nodes.reset(), o.edge_m = 5; }), "longer than the body"},
       {"short.off", box, surface([](auto& o) { o.nodes.reset(), o.edge_m = 1e-5; }), "ask for longer ones"},
       {"order.off", box, surface([](auto& o) { o.order = 3; }), "order is 3"},
+      {"nan.off", replaced(box, "\n1 0 0", "\nnan 0 0"), plain, "line 4: the coordinate 'nan' must be a finite number"},
+      {"nan.obj", replaced(to_obj(cube), "v 1 0 0", "v nan 0 0"), plain, "line 4: the coordinate 'nan'"},
+      {"word.obj", replaced(to_obj(cube), "v 1 0 0", "v one 0 0"), plain, "the coordinate 'one'"},
+      {"nan.ply", replaced(to_ply(cube), "\n1 0 0", "\ninf 0 0"), plain, "line 11: the coordinate 'inf'"},
+      {"nan.stl", replaced(to_stl(cube), "vertex 1 ", "vertex nan "), plain, "the coordinate 'nan'"},
+      {"beyond.obj", to_obj(cube) + "f 1 2 99\n", plain, "line 23: the face names vertex 99, but there are only 8"},
+      {"huge_index.obj", to_obj(cube) + "f 1 2 99999999999999999999\n", plain, "names the vertex '99999999999999999999'"},
+      {"zeroth.obj", to_obj(cube) + "f 0 1 2\n", plain, "names the vertex '0'"},
+      {"negative.ply", replaced(to_ply(cube), "3 0 2 3", "3 0 2 -3"), plain, "names the vertex '-3'"},
+      {"corners.off", replaced(box, "3 0 2 3", "999999999 0 2 3"), plain, "promises '999999999' corners and has 3"},
+      {"cut.off", box.substr(0, box.rfind("3 1 7 5")), plain, "the file ends after 11 of 12 faces; it is cut off"},
+      {"billions.stl", std::string(80, ' ') + "\xff\xff\xff\xff", plain, "the header promises 4294967295 triangles"},
+      {"plate.off", to_off(make_box(1, 1, 0.01)), plain, "the thickness of the body needs at least about"},
+      {"thin_wall.off", box, surface([](auto& o) { o.wall_m = 1e-6; }), "the wall is so thin"},
+      {"wide_wall.off", box, surface([](auto& o) { o.wall_m = 5; }), "leaves no hollow"},
+      {"large_body.off", box, surface([](auto& o) { o.height_m = 1e300; }), "the body would be 1e+300 m long"},
+      {"small_body.off", box, surface([](auto& o) { o.scale = 1e-30; }), "the body would be 1e-30 m long"},
+      {"far.off", to_off(far), plain, "have lost their digits"},
   };
   for (const Case& c : cases) {
     SCOPED_TRACE(c.name);
