@@ -90,7 +90,7 @@ KrylovResult run_krylov_schur(const KrylovRequest& request) {
   const PetscInt wanted = std::min(request.wanted, room);
   // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the
   // modes on both sides of it and needs less.
-  const PetscInt ncv = std::min(room, wanted + (request.sigma > 0 ? 2 * wanted / 5 : wanted) + 30);
+  const PetscInt ncv = std::min(room, wanted + (request.sigma > 0 ? wanted / 2 : wanted) + 30);
   check(EPSSetDimensions(eps, wanted, ncv, ncv));
   check(EPSSetTolerances(eps, request.tolerance, 200));
   check(EPSSetConvergenceTestFunction(eps, calc_error, const_cast<KrylovRequest*>(&request), nullptr));
