@@ -197,9 +197,41 @@ Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std
       high[k] = std::max(high[k], vertex(v)[k]);
     }
   }
+  for (int f = 0; f < mesh_.getNumFaces(); ++f) {
+    face_middles_m_.push_back(mesh_.findCentroid(f));
+    double radius = 0.0;
+    for (int k = 0; k < 3; ++k) radius = std::max(radius, (vertex(mesh_.getFaceVertex(f, k)) - face_middles_m_[f]).norm());
+    face_radii_m_.push_back(radius);
+  }
+  find_corners();
   middle_m_ = (low + high) / 2;
   size_m_ = (high - low).norm();
   thickness_m_ = SimTK::min(high - low);
+}
+
+void Surface::find_corners() {
+  constexpr double kStraight = 2e-4;  // rad
+  const int count = mesh_.getNumVertices();
+  is_corner_.assign(count, 0);
+  std::vector<int> any_face(count, -1);
+  for (int f = 0; f < mesh_.getNumFaces(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const int v = mesh_.getFaceVertex(f, k);
+      if (any_face[v] < 0) any_face[v] = f;
+      const Vec3 bend = Vec3(mesh_.getFaceNormal(f)) - Vec3(mesh_.getFaceNormal(any_face[v]));
+      if (bend.norm() > kStraight) is_corner_[v] = 1;
+    }
+  }
+  for (int v = 0; v < count; ++v) {
+    const auto& around = neighbours_[v];
+    for (std::size_t i = 0; i < around.size() && is_corner_[v] != 0; ++i) {
+      const Vec3 to = vertex(around[i]) - vertex(v);
+      for (std::size_t j = 0; j < i; ++j) {
+        const Vec3 fro = vertex(around[j]) - vertex(v);
+        if ((to / to.norm() + fro / fro.norm()).norm() < kStraight) is_corner_[v] = 0;
+      }
+    }
+  }
 }
 
 double Surface::calc_curvature(const Vec3& point, const Vec3& normal) const {

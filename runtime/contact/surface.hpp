@@ -30,9 +30,14 @@ class Surface {
   const SimTK::ContactGeometry::TriangleMesh& mesh() const { return mesh_; }
   const SimTK::Vec3& vertex(int v) const { return mesh_.getVertexPosition(v); }
   const std::vector<int>& neighbours(int v) const { return neighbours_[v]; }
+  /// Is v a corner of the shape, not merely of its mesh? One amid a flat face or on a straight edge is never the first to touch.
+  bool is_corner(int v) const { return is_corner_[v] != 0; }
   /// Ridges of a face, as indices into ridges().
   const std::vector<int>& face_ridges(int face) const { return face_ridges_[face]; }
   const RidgeEdge& ridge(int r) const { return ridges_[r]; }
+  /// A ball about a face.
+  const SimTK::Vec3& face_middle_m(int face) const { return face_middles_m_[face]; }
+  double face_radius_m(int face) const { return face_radii_m_[face]; }
 
   /// The bank's triangle of a face of mesh(); its corners are in the same order.
   std::int32_t bank_triangle(int face) const { return bank_triangle_[face]; }
@@ -48,9 +53,14 @@ class Surface {
  private:
   std::vector<std::int32_t> bank_triangle_;  // before mesh_, whose making fills it
   SimTK::ContactGeometry::TriangleMesh mesh_;
+  void find_corners();
+
   std::vector<std::vector<int>> neighbours_;
+  std::vector<char> is_corner_;
   std::vector<std::vector<int>> face_ridges_;
   std::vector<RidgeEdge> ridges_;
+  std::vector<SimTK::Vec3> face_middles_m_;
+  std::vector<double> face_radii_m_;
   SimTK::Vec3 middle_m_{0};
   double size_m_ = 0.0;
   double thickness_m_ = 0.0;

@@ -27,11 +27,15 @@ constexpr double kFlat =
     0.02;  // rad; how far below the plane a neighbour may point: a flat face that lands nearly flat lands with all of itself
 
 constexpr double kSunk = 2e-3;        // of the size
+constexpr double kEnd = 1e-6;         // of an edge: two that cross where the next one begins must not be missed
+constexpr double kFlush = 1e-3;       // rad; the edges of two faces that lie on each other cross as well
 constexpr std::size_t kProbes = 200;  // faces of each body that calc_overlap looks behind
 constexpr double kBrim = 1e-4;        // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
 
-/// Does vertex v carry against a plane with this outward normal (frame of the surface)?
+/// Does vertex v carry against a plane with this outward normal (frame of the surface)? Only corners do: what lies between them on a flat
+/// face or a straight edge is never lower than the lowest of them, so that a finer mesh of the same shape touches in the same points.
 bool carries(const Surface& surface, int v, const Vec3& normal) {
+  if (!surface.is_corner(v)) return false;
   for (const int w : surface.neighbours(v)) {
     const Vec3 d = surface.vertex(w) - surface.vertex(v);
     if (dot(d, normal) < -kFlat * d.norm()) return false;
@@ -105,7 +109,10 @@ bool may_be_inside(const Surface& theirs, const std::set<int>& their_faces, cons
   const auto& mesh = theirs.mesh();
   double least = SimTK::Infinity;
   bool inside = false;
+  double least_root = SimTK::Infinity;
   for (const int f : their_faces) {
+    const double reach = least_root + theirs.face_radius_m(f);
+    if ((x - theirs.face_middle_m(f)).normSqr() > reach * reach * (1.0 + 1e-9)) continue;
     SimTK::Vec2 uv;
     const Vec3 d = x - mesh.findNearestPointToFace(x, f, uv);
     const double dist2 = d.normSqr();
@@ -113,6 +120,7 @@ bool may_be_inside(const Surface& theirs, const std::set<int>& their_faces, cons
     // Where two faces are equally near, inside either will do.
     inside = (dist2 == least && inside) || dot(d, Vec3(mesh.getFaceNormal(f))) < 0.0;
     least = dist2;
+    least_root = std::sqrt(dist2);
   }
   const double reach = 0.1 * theirs.size_m();
   return (inside && least < reach * reach) || least < brim * brim;
@@ -122,6 +130,7 @@ bool may_be_inside(const Surface& theirs, const std::set<int>& their_faces, cons
 void add_vertex_touches(TouchPoint base, int kind, const Surface& mine, const Surface& theirs, const Transform& X_theirs_mine,
                         const std::set<int>& faces, const std::set<int>& their_faces, std::vector<TouchPoint>& out) {
   for (const int v : find_vertices(mine, faces)) {
+    if (!mine.is_corner(v)) continue;
     TouchPoint t = base;
     const Vec3 x = X_theirs_mine * mine.vertex(v);
     if (!may_be_inside(theirs, their_faces, x, kBrim * mine.size_m())) continue;
@@ -146,6 +155,8 @@ bool find_closest(const Vec3& p, const Vec3& d, const Vec3& q, const Vec3& e, do
 
 void add_ridge_touches(TouchPoint base, const Surface& sa, const Surface& sb, const Transform& X_ba, const std::set<int>& faces_a,
                        const std::set<int>& faces_b, std::vector<TouchPoint>& out) {
+  // Deeper than a step may go (Engine::calc_largest_step), two ridges are on the far sides of their bodies.
+  const double deepest = 0.3 * std::min(sa.thickness_m(), sb.thickness_m());
   std::set<int> ridges_a, ridges_b;
   for (const int f : faces_a) ridges_a.insert(sa.face_ridges(f).begin(), sa.face_ridges(f).end());
   for (const int f : faces_b) ridges_b.insert(sb.face_ridges(f).begin(), sb.face_ridges(f).end());
@@ -159,14 +170,16 @@ void add_ridge_touches(TouchPoint base, const Surface& sa, const Surface& sb, co
       const Vec3 q = sb.vertex(rb.vertices[0]);
       const Vec3 e = sb.vertex(rb.vertices[1]) - q;
       double s = 0.0, t = 0.0;
-      if (!find_closest(p, d, q, e, s, t) || s <= 0.0 || s >= 1.0 || t <= 0.0 || t >= 1.0) continue;
+      if (!find_closest(p, d, q, e, s, t) || s < -kEnd || s > 1.0 + kEnd || t < -kEnd || t > 1.0 + kEnd) continue;
       Vec3 n = cross(d, e);
       n /= n.norm();
       if (dot(n, rb.into_face[0] + rb.into_face[1]) > 0.0) n = -n;  // outward of b
-      if (dot(n, rb.into_face[0]) > 0.0 || dot(n, rb.into_face[1]) > 0.0 || dot(n, into_a[0]) < 0.0 || dot(n, into_a[1]) < 0.0) continue;
+      if (dot(n, rb.into_face[0]) > kFlush || dot(n, rb.into_face[1]) > kFlush || dot(n, into_a[0]) < -kFlush ||
+          dot(n, into_a[1]) < -kFlush)
+        continue;
       const Vec3 xa = p + s * d, xb = q + t * e;
       const double depth = dot(n, xb - xa);
-      if (depth <= 0.0 || depth > 0.25 * std::min(d.norm(), e.norm()) + 1e-3) continue;
+      if (depth <= 0.0 || depth > std::min(0.25 * std::min(d.norm(), e.norm()) + 1e-3, deepest)) continue;
       TouchPoint touch = base;
       touch.feature = {2, i, j};
       touch.plane_on_b = true;

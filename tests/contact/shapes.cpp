@@ -44,6 +44,42 @@ TEST_P(Pinched, BodyFallsAndIsHeardAsAnyOther) {
   EXPECT_GT(push, 0.3 * bank.rigid.mass_kg * std::sqrt(2 * 9.81 * height));
 }
 
+TEST(FlatBody, IsStruckAtItsCornersHoweverFineItsMesh) {
+  std::vector<Simulation> runs;
+  for (const int cells : {1, 7}) {
+    const bank::Bank box = make_box({0.1, 0.06, 0.04}, {cells, cells, cells});
+    runs.push_back(simulate(make_fall(box, 0.22), 0.5));
+    for (const Impulse& p : runs.back().impulses) {
+      const Vec3 x = point_on_body(box, p);
+      EXPECT_NEAR(std::abs(x[0]), 0.05, 1e-6);
+      EXPECT_NEAR(std::abs(x[1]), 0.03, 1e-6);
+    }
+  }
+  ASSERT_EQ(runs[0].impulses.size(), runs[1].impulses.size());
+  for (std::size_t i = 0; i < runs[0].impulses.size(); ++i) EXPECT_NEAR(runs[0].impulses[i].time_s, runs[1].impulses[i].time_s, 2e-4);
+}
+
+TEST(FlatBody, FallsFlushAcrossANarrowShelfAndStaysThere) {
+  // A cross: no corner of one is over the other; only their edges cross. With six cells they cross exactly where the next edge begins.
+  for (const int cells : {1, 5, 6}) {
+    const bank::Bank across = make_box({0.3, 0.06, 0.02}, {cells, cells, 1}), along = make_box({0.06, 0.3, 0.02}, {cells, cells, 1});
+    WorldSpec w = make_fall(across, 0.12);
+    w.bodies.push_back(w.bodies[0]);
+    w.bodies[1].name = "shelf";
+    w.bodies[1].bank = &along;
+    w.bodies[1].fixed = true;
+    w.bodies[1].initial.position_m = {};
+    w.ground.reset();
+    const Simulation s = simulate(w, 0.6);
+    double push = 0.0;
+    for (const Impulse& p : s.impulses) {
+      if (p.body == 0 && p.time_s < std::sqrt(2 * 0.1 / 9.81) + 2e-3) push += p.impulse_n_s[2];
+    }
+    EXPECT_NEAR(push, 1.4 * across.rigid.mass_kg * std::sqrt(2 * 9.81 * 0.1), 1e-3) << cells;
+    EXPECT_NEAR(s.poses[0].back().position_m[2], 0.02, 1e-4) << cells;
+  }
+}
+
 struct Fall {
   double restitution, friction;
   std::array<double, 4> rotation;
