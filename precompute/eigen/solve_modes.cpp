@@ -272,7 +272,10 @@ void BandSolver::solve_slice(const Slice& slice, bool is_only) {
   std::int64_t missing = slice.count();
   int idle = 0;
   for (int round = 0; round < kRounds && idle < kIdleRounds && missing > 0; ++round) {
-    const std::int64_t added = run_round(slice, *factor, sigma, wanted - slice.count() + missing, kKrylovTolerance * options_.tolerance);
+    // A copy that rounding alone brings in comes late: later runs ask for some more, beyond the slice.
+    const std::int64_t extra = std::min(round, 4) * 10;
+    const std::int64_t added =
+        run_round(slice, *factor, sigma, wanted - slice.count() + missing + extra, kKrylovTolerance * options_.tolerance);
     missing -= added;
     idle = added > 0 ? 0 : idle + 1;
   }
