@@ -260,10 +260,12 @@ Json::Value describe_run(const Run& run, const MeshFacts& facts, const fem::Dist
   solver["rigid_modes"] = Json::Int64(modes.rigid_count);
   solver["mechanisms"] = Json::Int64(modes.mechanism_count);
   solver["orthonormality_error"] = modes.orthonormality_error;
+  solver["above_tolerance"] = Json::Int64(modes.above_tolerance_count);  // rounding allows no better, see eigen::Modes::residual
   solver["seconds"]["rigid"] = modes.seconds.rigid;
   solver["seconds"]["analyse"] = modes.seconds.analyse;
   solver["seconds"]["factor"] = modes.seconds.factor;
   solver["seconds"]["iterate"] = modes.seconds.iterate;
+  solver["seconds"]["solve"] = modes.seconds.solve;
   solver["seconds"]["check"] = modes.seconds.check;
   return root;
 }
