@@ -163,7 +163,7 @@ std::vector<TouchPoint> Engine::find_touches(const std::vector<Transform>& poses
     }
     for (int b = a + 1; b < count; ++b) {
       if (is_fixed(a) && is_fixed(b)) continue;
-      const auto touches = contact::find_touches(a, surface(a), poses[a], b, surface(b), poses[b]);
+      const auto touches = contact::find_touches(a, surface(a), poses[a], b, surface(b), poses[b], near_[{a, b}]);
       all.insert(all.end(), touches.begin(), touches.end());
     }
   }

@@ -3,8 +3,10 @@
 
 #include <Simbody.h>
 
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/contact/impact.hpp"
@@ -71,6 +73,7 @@ class Engine {
   SimTK::GeneralForceSubsystem forces_;
   RestingForce* resting_ = nullptr;  // owned by forces_
   SimTK::State initial_;
+  mutable std::map<std::pair<int, int>, NearFaces> near_;  // a memory only
   std::unique_ptr<SimTK::RungeKuttaMersonIntegrator> integrator_;
 };
 

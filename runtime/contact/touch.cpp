@@ -27,6 +27,7 @@ constexpr double kFlat =
     0.02;  // rad; how far below the plane a neighbour may point: a flat face that lands nearly flat lands with all of itself
 
 constexpr double kSunk = 2e-3;        // of the size
+constexpr double kMargin = 0.01;      // of the thinner body's thickness
 constexpr double kEnd = 1e-6;         // of an edge: two that cross where the next one begins must not be missed
 constexpr double kFlush = 1e-3;       // rad; the edges of two faces that lie on each other cross as well
 constexpr std::size_t kProbes = 200;  // faces of each body that calc_overlap looks behind
@@ -43,9 +44,10 @@ bool carries(const Surface& surface, int v, const Vec3& normal) {
   return true;
 }
 
-/// The faces of both meshes whose leaves cut each other.
-void find_near_faces(const Node& a, const Node& b, const Transform& X_ba, std::set<int>& faces_a, std::set<int>& faces_b) {
-  SimTK::OrientedBoundingBox box = X_ba * a.getBounds();
+/// The faces of both meshes whose leaves cut each other or are within the margin.
+void find_near_faces(const Node& a, const Node& b, const Transform& X_ba, double margin_m, std::set<int>& faces_a, std::set<int>& faces_b) {
+  const Transform X_box = X_ba * a.getBounds().getTransform();  // of a corner of the box
+  const SimTK::OrientedBoundingBox box(Transform(X_box.R(), X_box * Vec3(-margin_m)), a.getBounds().getSize() + Vec3(2 * margin_m));
   if (!box.intersectsBox(b.getBounds())) return;
   if (a.isLeafNode() && b.isLeafNode()) {
     for (const int f : a.getTriangles()) faces_a.insert(f);
@@ -53,11 +55,11 @@ void find_near_faces(const Node& a, const Node& b, const Transform& X_ba, std::s
     return;
   }
   if (b.isLeafNode() || (!a.isLeafNode() && a.getNumTriangles() >= b.getNumTriangles())) {
-    find_near_faces(a.getFirstChildNode(), b, X_ba, faces_a, faces_b);
-    find_near_faces(a.getSecondChildNode(), b, X_ba, faces_a, faces_b);
+    find_near_faces(a.getFirstChildNode(), b, X_ba, margin_m, faces_a, faces_b);
+    find_near_faces(a.getSecondChildNode(), b, X_ba, margin_m, faces_a, faces_b);
   } else {
-    find_near_faces(a, b.getFirstChildNode(), X_ba, faces_a, faces_b);
-    find_near_faces(a, b.getSecondChildNode(), X_ba, faces_a, faces_b);
+    find_near_faces(a, b.getFirstChildNode(), X_ba, margin_m, faces_a, faces_b);
+    find_near_faces(a, b.getSecondChildNode(), X_ba, margin_m, faces_a, faces_b);
   }
 }
 
@@ -234,12 +236,19 @@ std::vector<TouchPoint> find_ground_touches(int a, const Surface& surface, const
   return out;
 }
 
-std::vector<TouchPoint> find_touches(int a, const Surface& sa, const Transform& X_a, int b, const Surface& sb, const Transform& X_b) {
+std::vector<TouchPoint> find_touches(int a, const Surface& sa, const Transform& X_a, int b, const Surface& sb, const Transform& X_b,
+                                     NearFaces& near) {
   std::vector<TouchPoint> out;
   if (far_apart(sa, X_a, sb, X_b)) return out;
   const Transform X_ba = ~X_b * X_a;
-  std::set<int> faces_a, faces_b;
-  find_near_faces(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), X_ba, faces_a, faces_b);
+  const double margin = kMargin * std::min(sa.thickness_m(), sb.thickness_m());
+  const double turned = (X_ba.R().asMat33() - near.X_ba.R().asMat33()).norm();
+  const double moved = (X_ba * sa.middle_m() - near.X_ba * sa.middle_m()).norm() + turned * sa.radius_m();
+  if (!near.known || moved > margin) {
+    near = {true, X_ba, {}, {}};
+    find_near_faces(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), X_ba, margin, near.faces_a, near.faces_b);
+  }
+  const std::set<int>&faces_a = near.faces_a, &faces_b = near.faces_b;
   if (faces_a.empty()) return out;
   TouchPoint base;
   base.a = a;
@@ -303,7 +312,7 @@ double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, 
     }
   };
   std::set<int> faces_a, faces_b;
-  find_near_faces(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), ~X_b * X_a, faces_a, faces_b);
+  find_near_faces(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), ~X_b * X_a, 0.0, faces_a, faces_b);
   test_edges(sa, X_a, sb, X_b, faces_a);
   test_edges(sb, X_b, sa, X_a, faces_b);
   // Two bodies whose faces coincide (the same body twice at the same place) have vertices and edges on, not in, each other. Their insides

@@ -4,6 +4,7 @@
 #include <SimTKmath.h>
 
 #include <array>
+#include <set>
 #include <vector>
 
 #include "runtime/contact/surface.hpp"
@@ -31,9 +32,16 @@ void place_touch(TouchPoint& touch, const SimTK::Transform& X_a, const SimTK::Tr
 /// The vertices of `surface` below the plane z = height_m that carry: those with no neighbour below themselves.
 std::vector<TouchPoint> find_ground_touches(int a, const Surface& surface, const SimTK::Transform& X_a, double height_m);
 
-/// The carrying features of two surfaces that cut into each other; empty when they are apart.
+/// The faces of two surfaces that are near each other, kept while the two hardly move against each other: what lies flush has thousands.
+struct NearFaces {
+  bool known = false;
+  SimTK::Transform X_ba;  // of a in b when they were found
+  std::set<int> faces_a, faces_b;
+};
+
+/// The carrying features of two surfaces that cut into each other; empty when they are apart. `near` is the caller's memory of this pair.
 std::vector<TouchPoint> find_touches(int a, const Surface& surface_a, const SimTK::Transform& X_a, int b, const Surface& surface_b,
-                                     const SimTK::Transform& X_b);
+                                     const SimTK::Transform& X_b, NearFaces& near);
 
 /// How deep the two surfaces are in each other, whatever the features [m]; 0 when they are apart. `where` gets the deepest point (world).
 double calc_overlap(const Surface& surface_a, const SimTK::Transform& X_a, const Surface& surface_b, const SimTK::Transform& X_b,

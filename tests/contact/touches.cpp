@@ -35,7 +35,9 @@ class SunkBall : public testing::Test {
   /// The ball's vertices that touch when its lowest point is so deep in the brick's upper face, and how deep each is.
   std::vector<TouchPoint> find(double depth_m) const {
     std::vector<TouchPoint> on_ball;
-    for (const TouchPoint& t : find_touches(0, ball, Transform(Vec3(0.031, 0.017, 0.05 + kRadius - depth_m)), 1, brick, Transform())) {
+    NearFaces near;
+    for (const TouchPoint& t :
+         find_touches(0, ball, Transform(Vec3(0.031, 0.017, 0.05 + kRadius - depth_m)), 1, brick, Transform(), near)) {
       if (t.feature[0] == 0) on_ball.push_back(t);
     }
     return on_ball;
