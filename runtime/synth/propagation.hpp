@@ -14,7 +14,7 @@ namespace carillon::synth {
 using Vec3 = std::array<double, 3>;
 
 using bank::kSoundSpeedMs;
-inline constexpr double kNearestM = 0.05;       // a source never counts as nearer than this (1/r has no bound)
+inline constexpr double kNearestM = 0.05;  // a source never counts as nearer than this (1/r has no bound)
 
 /// Where a source is over time: cubic between the given points, with slopes from their neighbours, so that its speed is continuous.
 /// Before the first and after the last point it rests there.
