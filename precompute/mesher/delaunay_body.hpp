@@ -13,15 +13,62 @@
 #include <CGAL/make_mesh_3.h>
 #include <CGAL/perturb_mesh_3.h>
 #include <CGAL/refine_mesh_3.h>
+#include <pthread.h>
+#include <time.h>
 
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
+#include <thread>
 #include <unordered_map>
 #include <utility>
 
 #include "precompute/mesher/delaunay.hpp"
 
 namespace carillon::mesher {
+
+/// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can turn on the spot for ever where skins
+/// touch at a point; only this ends it. The limit is far above what a sound body takes, so that meshes do not depend on it.
+class Watchdog {
+ public:
+  explicit Watchdog(double limit_s) {
+    ::pthread_getcpuclockid(::pthread_self(), &clock_);
+    const double end_s = read_clock() + limit_s;
+    thread_ = std::thread([this, end_s] {
+      std::unique_lock lock(mutex_);
+      while (!wake_.wait_for(lock, std::chrono::milliseconds(100), [this] { return done_; }))
+        if (read_clock() > end_s) stop = true;
+    });
+  }
+  ~Watchdog() {
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+    }
+    wake_.notify_all();
+    thread_.join();
+  }
+  Watchdog(const Watchdog&) = delete;
+  Watchdog& operator=(const Watchdog&) = delete;
+
+  std::atomic<bool> stop{false};
+
+ private:
+  double read_clock() const {
+    timespec now{};
+    ::clock_gettime(clock_, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
+
+  clockid_t clock_{};
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool done_ = false;
+  std::thread thread_;
+};
 
 template <class Domain, class Index>
 class Mesh3Body : public DelaunayBody {
@@ -37,6 +84,7 @@ class Mesh3Body : public DelaunayBody {
     namespace p = CGAL::parameters;
     // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
     CGAL::get_default_random() = CGAL::Random(0);
+    stop_ = nullptr;
     make_domain(sizes.most_nodes);
     complex_ = Complex();
     const double radius = kRadiusPerEdge * sizes.edge_m;
@@ -54,8 +102,13 @@ class Mesh3Body : public DelaunayBody {
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
     if (has_curves_) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
     insert_first_points(sizes.edge_m);
+    Watchdog watchdog(5 + 5e-4 * static_cast<double>(sizes.most_nodes));
+    stop_ = &watchdog.stop;
     CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
-                        p::mesh_3_options(p::maximal_number_of_vertices = sizes.most_nodes, p::pointer_to_error_code = &unused));
+                        p::mesh_3_options(p::maximal_number_of_vertices = sizes.most_nodes, p::pointer_to_error_code = &unused,
+                                          p::pointer_to_stop_atomic_boolean = &watchdog.stop));
+    stop_ = nullptr;
+    if (watchdog.stop) throw std::runtime_error("parts of the surface touch, or nearly so");
     return extract();
   }
 
@@ -75,6 +128,8 @@ class Mesh3Body : public DelaunayBody {
   std::unique_ptr<Domain> domain_;
   std::vector<Polyline> polylines_;  // the sharp curves
   bool has_curves_ = false;
+  // Set while refinement runs: once it is true, the domain must throw, for CGAL's loop over facets does not look at it itself.
+  const std::atomic<bool>* stop_ = nullptr;
 
  private:
   // Mesh_3 bounds circumradii; the mean edge of the tetrahedra it makes is about 1.1 times that bound.

@@ -32,7 +32,7 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
     // Refinement can try for ever to part what touches at a point; no node comes of it, so their bound does not end it.
     evaluations_ = 0;
     const auto body = [this](const Kernel::Point_3& p) {
-      if (++evaluations_ > most_evaluations_) throw std::runtime_error("parts of its surface touch, or nearly so");
+      if (++evaluations_ > most_evaluations_ || (stop_ && *stop_)) throw std::runtime_error("parts of its surface touch, or nearly so");
       return calc_body(field_, wall_m_, {p.x(), p.y(), p.z()});
     };
     const Vec3 low = field_.origin;
