@@ -118,7 +118,7 @@ JobSpec read_root(config::Object job, const fs::path& file) {
   }
   if (spec.band_hz[1] > kMostHz)
     job.fail("band_hz", fmt::format("must end at {:g} Hz at most, and ends at {:g}", kMostHz, spec.band_hz[1]));
-  if (auto count = job.integer_if("max_modes", 1, 100000)) spec.max_modes = static_cast<int>(*count);
+  if (auto count = job.integer_if("max_modes", 1, 40000)) spec.max_modes = static_cast<int>(*count);
   if (job.has_string("fixed")) {
     spec.fixed = Fixed{job.string("fixed"), {}};  // short for {"node_set": name}
   } else if (auto fixed = job.object_if("fixed")) {

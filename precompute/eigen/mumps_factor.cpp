@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
 
 #include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/petsc/handle.hpp"
@@ -178,7 +179,9 @@ MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t
 }
 
 MumpsFactor::~MumpsFactor() {
-  if (state_ != nullptr && state_->is_alive) (void)state_->call(kJobEnd);
+  // Ending MUMPS is collective. A rank that unwinds alone (out of memory, say) must not wait here for the others: the process ends anyway.
+  const bool unwinds = std::uncaught_exceptions() > 0;
+  if (state_ != nullptr && state_->is_alive && !(unwinds && state_->size > 1)) (void)state_->call(kJobEnd);
 }
 
 bool MumpsFactor::factorise(double sigma) {

@@ -5,7 +5,10 @@ find_program(git git)
 if(git)
   execute_process(COMMAND ${git} -C ${SOURCE} rev-parse HEAD OUTPUT_VARIABLE commit RESULT_VARIABLE status
     OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
-  if(status EQUAL 0)
+  # A tree unpacked inside another repository must not take that one's commit for its own.
+  execute_process(COMMAND ${git} -C ${SOURCE} rev-parse --show-toplevel OUTPUT_VARIABLE top OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  file(REAL_PATH ${SOURCE} here)
+  if(status EQUAL 0 AND top STREQUAL here)
     execute_process(COMMAND ${git} -C ${SOURCE} --no-optional-locks diff --quiet HEAD -- RESULT_VARIABLE dirty OUTPUT_QUIET ERROR_QUIET)
     set(id "${commit}")
     if(NOT dirty EQUAL 0)
