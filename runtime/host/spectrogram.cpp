@@ -111,12 +111,12 @@ void set_pixel(cairo_surface_t* image, int x, int y, const Color& color) {
 void draw_spectrum(cairo_t* cr, const SpectrogramLayout& at, const ShortTimeSpectrum& spectrum, double top_db) {
   const Surface image = make_image(at.plot_width, at.plot_height);
   cairo_surface_flush(image.get());
+  const double octaves = std::log2(static_cast<double>(spectrum.bins - 1) * spectrum.bin_hz / at.lowest_hz);
+  const auto find_bin = [&](int y) { return at.lowest_hz / spectrum.bin_hz * std::exp2(octaves * (at.plot_height - y) / at.plot_height); };
   for (int x = 0; x < at.plot_width; ++x) {
     const auto frame = static_cast<std::size_t>(x);
     for (int y = 0; y < at.plot_height; ++y) {
-      const double bins_per_row = static_cast<double>(spectrum.bins - 1) / at.plot_height;
-      const double low = (at.plot_height - 1 - y) * bins_per_row;
-      const double level = find_row_level(spectrum, frame, low, low + bins_per_row);
+      const double level = find_row_level(spectrum, frame, find_bin(y + 1), find_bin(y));
       set_pixel(image.get(), x, y, calc_color((level - top_db + kRangeDb) / kRangeDb));
     }
   }
@@ -137,11 +137,16 @@ void draw_axes(cairo_t* cr, const SpectrogramLayout& at, double duration_s, doub
     draw_text(cr, x, bottom + 26, fmt::format("{:g}", std::round(i * time_step * 1e9) / 1e9), Anchor::kCentre);
   }
   draw_text(cr, at.left + at.plot_width / 2, bottom + 56, "Time (s)", Anchor::kCentre);
-  const double freq_step = calc_tick_step(nyquist_hz, 12);
-  for (int i = 0; i * freq_step <= nyquist_hz * (1 + 1e-9); ++i) {
-    const double y = std::round(bottom - i * freq_step / nyquist_hz * at.plot_height) + 0.5;
-    draw_line(cr, at.left - 8, y, at.left - 1, y);
-    draw_text(cr, at.left - 13, y + 6, fmt::format("{:g}", i * freq_step), Anchor::kRight);
+  const double octaves = std::log2(nyquist_hz / at.lowest_hz);
+  for (double decade = 10; decade <= nyquist_hz; decade *= 10) {
+    for (int digit = 1; digit < 10; ++digit) {
+      const double freq_hz = digit * decade;
+      if (freq_hz < at.lowest_hz || freq_hz > nyquist_hz) continue;
+      const bool labelled = digit == 1 || digit == 2 || digit == 5;
+      const double y = std::round(bottom - std::log2(freq_hz / at.lowest_hz) / octaves * at.plot_height) + 0.5;
+      draw_line(cr, at.left - (labelled ? 8 : 5), y, at.left - 1, y);
+      if (labelled) draw_text(cr, at.left - 13, y + 6, fmt::format("{:g}", freq_hz), Anchor::kRight);
+    }
   }
   draw_upright_text(cr, 28, at.top + at.plot_height / 2, "Frequency (Hz)");
 }

@@ -23,9 +23,10 @@ inline constexpr double kFloorDb = -120.0;  // what silence counts as
 /// `frames` spectra spread evenly over the sound; where they lie further apart than half a window, the ones between are averaged in.
 ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frames);
 
-/// Where the picture of the spectrum lies in the image, in pixels; frequency runs linearly from 0 at the bottom to the Nyquist frequency at
-/// the top.
+/// Where the picture of the spectrum lies in the image, in pixels; frequency runs logarithmically, as it is heard, from lowest_hz at the
+/// bottom to the Nyquist frequency at the top.
 struct SpectrogramLayout {
+  double lowest_hz = 50.0;
   int width = 1400, height = 900;
   int left = 112, top = 190, plot_width = 1140, plot_height = 620;
 };
