@@ -1,6 +1,8 @@
 #!/usr/bin/python3
 """carillon-draw: pictures of mode banks and of simulated scenes, drawn off-screen with VTK.
 
+One file, so that it runs wherever it is copied to; two parts: pictures of modes, pictures of scenes, and what both share.
+
     carillon-draw modes BANK -o OUT.png [--modes 1,2,3] [--up x|y|z]
     carillon-draw scene TRAJECTORY.json -o OUT.png
 
