@@ -110,7 +110,7 @@ mesh::TetMesh read_checked_mesh(const Run& run, MeshFacts& facts) {
   facts.vertices_m.reserve(surface.nodes.size());
   for (const std::int32_t node : surface.nodes) facts.vertices_m.push_back(mesh.nodes[node]);
   facts.triangles = std::move(surface.triangles);
-  facts.row = std::move(surface.nodes);  // nodes for now; rows once the mesh is distributed
+  facts.row = std::move(surface.nodes);  // nodes here; distribute_mesh() turns them into rows
   return mesh;
 }
 
