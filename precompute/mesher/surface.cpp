@@ -1,5 +1,6 @@
-// From a surface file to tetrahedra: reads, scales, mends, then makes meshes until the node count is met, and finishes the last one. One file,
-// because it is one path whose every step decides what the next one gets; the steps themselves live in the other files of this folder.
+// From a surface file to tetrahedra: reads, scales, mends, then makes meshes until the node count is met, and finishes the last one. One
+// file, because it is one path whose every step decides what the next one gets; the steps themselves live in the other files of this
+// folder.
 #include "precompute/mesher/surface.hpp"
 
 #include <fmt/core.h>
