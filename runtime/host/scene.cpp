@@ -168,7 +168,11 @@ Scene parse_scene(const config::Document& document) {
   if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground);
 
   std::vector<config::Object> bodies = root.objects("bodies");
-  if (bodies.empty()) root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
+  if (bodies.empty()) {
+    for (const char* later : {"listener", "output"}) root.has(later);
+    root.finish();  // a mistyped key is the likeliest reason
+    root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
+  }
   if (bodies.size() > kMostBodies) root.fail("bodies", fmt::format("lists {} bodies; a scene may hold {}", bodies.size(), kMostBodies));
   std::set<std::string> names;
   for (config::Object& object : bodies) {

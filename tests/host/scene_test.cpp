@@ -113,6 +113,7 @@ INSTANTIATE_TEST_SUITE_P(
                                {"duration_s", "memory", "sample_rate_hz"}},
                       BadScene{"low_rate", with_root("\"sample_rate_hz\": 100"), {":2:", "sample_rate_hz", "8000"}},
                       BadScene{"no_bodies", "{\"duration_s\": 1}", {"bodies", "at least one"}},
+                      BadScene{"mistyped_bodies", "{\"duration_s\": 1,\n \"bodys\": []}", {":2:", "bodys", "did you mean \"bodies\"?"}},
                       BadScene{"empty_bodies", "{\"duration_s\": 1, \"bodies\": []}", {"bodies", "at least one"}},
                       BadScene{"misspelt_key", with_root("\"gravity_ms2\": [0, 0, 0]"), {":2:", "gravity_ms2", "gravity_m_s2"}},
                       BadScene{"misspelt_body_key", with_body("\"positon_m\": [0, 0, 0]"), {":3:", "positon_m", "position_m"}},
