@@ -100,7 +100,7 @@ class Mesh3Body : public DelaunayBody {
                             p::cell_radius_edge_ratio = 2, p::cell_size = radius);
     // A bound on the nodes ends what would otherwise go on for ever: balls between curves that nearly touch.
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
-    if (has_curves_) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
+    if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
     insert_first_points(sizes.edge_m);
     Watchdog watchdog(5 + 5e-4 * static_cast<double>(sizes.most_nodes));
     stop_ = &watchdog.stop;
@@ -120,18 +120,29 @@ class Mesh3Body : public DelaunayBody {
   }
 
  protected:
+  explicit Mesh3Body(const std::vector<Polyline>& curves) : polylines_(curves) {
+    for (const Polyline& curve : curves) {
+      curves_.emplace_back();
+      for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
+    }
+  }
+  /// Hands the sharp curves to a domain that was just made.
+  void add_curves() {
+    if (!curves_.empty()) domain_->add_features(curves_.begin(), curves_.end());
+  }
   /// Sets domain_, which may end a refinement that does not by an exception; `most_nodes` says how much work to expect.
   virtual void make_domain(std::size_t most_nodes) = 0;
   /// Points on the boundary about three edges apart, on every part of it, each with its index in the domain.
   virtual std::vector<std::pair<Vec3, Index>> find_first_points(double spacing_m) = 0;
 
   std::unique_ptr<Domain> domain_;
-  std::vector<Polyline> polylines_;  // the sharp curves
-  bool has_curves_ = false;
   // Set while refinement runs: once it is true, the domain must throw, for CGAL's loop over facets does not look at it itself.
   const std::atomic<bool>* stop_ = nullptr;
 
  private:
+  std::vector<Polyline> polylines_;         // the sharp curves,
+  std::vector<std::vector<Point>> curves_;  // and the same for CGAL
+
   // Mesh_3 bounds circumradii; the mean edge of the tetrahedra it makes is about 1.1 times that bound.
   static constexpr double kRadiusPerEdge = 0.9;
 

@@ -17,14 +17,8 @@ using Domain = CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_dom
 
 class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
  public:
-  FieldBody(const DistanceField& field, double wall_m, const std::vector<Polyline>& curves) : field_(field), wall_m_(wall_m) {
-    for (const Polyline& curve : curves) {
-      curves_.emplace_back();
-      for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
-    }
-    polylines_ = curves;
-    has_curves_ = !curves_.empty();
-  }
+  FieldBody(const DistanceField& field, double wall_m, const std::vector<Polyline>& curves)
+      : Mesh3Body(curves), field_(field), wall_m_(wall_m) {}
 
  private:
   void make_domain(std::size_t most_nodes) override {
@@ -43,7 +37,7 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
     const double radius = 0.5 * norm(high - low);
     domain_ = std::make_unique<Domain>(
         Domain::create_implicit_mesh_domain(body, box, CGAL::parameters::relative_error_bound = 0.01 * field_.voxel_m / radius));
-    if (has_curves_) domain_->add_features(curves_.begin(), curves_.end());
+    add_curves();
   }
 
   std::vector<std::pair<Vec3, Domain::Index>> find_first_points(double spacing_m) override {
@@ -79,7 +73,6 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
   const DistanceField& field_;
   double wall_m_;
   std::size_t evaluations_ = 0, most_evaluations_ = 0;
-  std::vector<std::vector<Kernel::Point_3>> curves_;
 };
 
 }  // namespace

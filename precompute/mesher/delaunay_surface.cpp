@@ -20,25 +20,19 @@ using Domain = CGAL::Mesh_domain_with_polyline_features_3<CGAL::Polyhedral_mesh_
 
 class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
  public:
-  SurfaceBody(const TriangleSurface& surface, const std::vector<Polyline>& curves) : surface_(surface) {
+  SurfaceBody(const TriangleSurface& surface, const std::vector<Polyline>& curves) : Mesh3Body(curves), surface_(surface) {
     std::vector<Kernel::Point_3> points;
     for (const Vec3& p : surface.points) points.emplace_back(p[0], p[1], p[2]);
     std::vector<std::vector<std::size_t>> polygons;
     for (const Triangle& t : surface.triangles)
       polygons.push_back({static_cast<std::size_t>(t[0]), static_cast<std::size_t>(t[1]), static_cast<std::size_t>(t[2])});
     CGAL::Polygon_mesh_processing::polygon_soup_to_polygon_mesh(points, polygons, mesh_);
-    for (const Polyline& curve : curves) {
-      curves_.emplace_back();
-      for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
-    }
-    polylines_ = curves;
-    has_curves_ = !curves_.empty();
   }
 
  private:
   void make_domain(std::size_t) override {
     domain_ = std::make_unique<Domain>(mesh_);
-    if (has_curves_) domain_->add_features(curves_.begin(), curves_.end());
+    add_curves();
   }
 
   std::vector<std::pair<Vec3, Domain::Index>> find_first_points(double spacing_m) override {
@@ -69,7 +63,6 @@ class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
 
   const TriangleSurface& surface_;
   Mesh mesh_;
-  std::vector<std::vector<Kernel::Point_3>> curves_;
 };
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -46,21 +45,6 @@ std::map<std::int32_t, std::vector<Fan>> find_pinched(const mesh::TetMesh& mesh)
     if (fans.size() > 1) pinched.emplace(static_cast<std::int32_t>(v), fans);
   }
   return pinched;
-}
-
-/// The smallest dihedral angle of a tetrahedron, or of 180 degrees less its largest; negative if it is inverted.
-double calc_flatness(const std::array<Vec3, 4>& p) {
-  if (!(dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) > 0)) return -1;
-  std::array<Vec3, 4> normal;
-  for (int f = 0; f < 4; ++f)
-    normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
-  double worst = 180;
-  for (int i = 0; i < 4; ++i)
-    for (int j = i + 1; j < 4; ++j) {
-      const double turn = std::atan2(norm(cross(normal[i], normal[j])), dot(normal[i], normal[j])) * 180 / std::numbers::pi;
-      worst = std::min({worst, turn, 180 - turn});
-    }
-  return worst;
 }
 
 bool is_inside(const mesh::TetMesh& mesh, std::int32_t e, const Vec3& x) {

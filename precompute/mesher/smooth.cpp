@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "precompute/mesher/tet_quality.hpp"
@@ -19,24 +18,13 @@ constexpr int kMostPasses = 12;
 // A boundary node whose faces turn away from their mean by more than this lies on an edge (cosine of 25 degrees).
 constexpr double kSmooth = 0.906;
 
-enum class Place : char { kInside, kSkin, kEdge };
-
-/// The smallest of all dihedral angles and of 180 degrees minus them, in degrees; negative if the element is inverted.
-double calc_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
+/// Of element e of a linear mesh.
+double calc_element_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
   const auto tet = mesh.tet(e);
-  std::array<Vec3, 4> p, normal;
-  for (int c = 0; c < 4; ++c) p[c] = mesh.nodes[tet[c]];
-  if (!(dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) > 0)) return -1;
-  for (int f = 0; f < 4; ++f)
-    normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
-  double worst = 180;
-  for (int i = 0; i < 4; ++i)
-    for (int j = i + 1; j < 4; ++j) {
-      const double turn = std::atan2(norm(cross(normal[i], normal[j])), dot(normal[i], normal[j])) * 180 / std::numbers::pi;
-      worst = std::min({worst, turn, 180 - turn});
-    }
-  return worst;
+  return calc_flatness({mesh.nodes[tet[0]], mesh.nodes[tet[1]], mesh.nodes[tet[2]], mesh.nodes[tet[3]]});
 }
+
+enum class Place : char { kInside, kSkin, kEdge };
 
 std::vector<Place> find_places(const mesh::TetMesh& mesh) {
   std::vector<Place> places(mesh.nodes.size(), Place::kInside);
@@ -64,7 +52,7 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
     for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
   const auto calc_worst = [&](std::int32_t v) {
     double worst = 180;
-    for (const std::int32_t e : around[v]) worst = std::min(worst, calc_flatness(mesh, e));
+    for (const std::int32_t e : around[v]) worst = std::min(worst, calc_element_flatness(mesh, e));
     return worst;
   };
   const auto climb = [&](std::int32_t v) {
@@ -93,12 +81,12 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
   for (int pass = 0; pass < kMostPasses; ++pass) {
     std::vector<std::pair<double, std::int32_t>> flat;
     for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
-      if (const double angle = calc_flatness(mesh, e); angle < angle_deg) flat.emplace_back(angle, e);
+      if (const double angle = calc_element_flatness(mesh, e); angle < angle_deg) flat.emplace_back(angle, e);
     std::sort(flat.begin(), flat.end());
     std::int64_t moves = 0;
     for (const auto& [angle, e] : flat)
       for (const std::int32_t v : mesh.tet(e))
-        if (places[v] != Place::kEdge && calc_flatness(mesh, e) < angle_deg && climb(v)) ++moves;
+        if (places[v] != Place::kEdge && calc_element_flatness(mesh, e) < angle_deg && climb(v)) ++moves;
     moved += moves;
     if (moves == 0) break;
   }

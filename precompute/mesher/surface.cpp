@@ -10,6 +10,7 @@
 #include <cmath>
 #include <new>
 
+#include "precompute/mesh/check.hpp"
 #include "precompute/mesher/count_search.hpp"
 #include "precompute/mesher/delaunay.hpp"
 #include "precompute/mesher/distance_field.hpp"
@@ -438,7 +439,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
         fmt::format("{}: with edges of {:.3g} m only {:.0f} % of the body's volume can be meshed; ask for shorter edges or more nodes",
                     options.surface.string(), edge, 100 * report.volume_m3 / report.expected_volume_m3));
   report.edge_m = edge;
-  mesh::TetMesh out = options.order == 2 ? make_second_order(linear) : std::move(linear);
+  mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
   report.nodes = static_cast<std::int64_t>(out.nodes.size());
   add_notes(options, body, report);
   return out;

@@ -215,23 +215,19 @@ std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components) {
   return before - mesh.tet_count();
 }
 
-mesh::TetMesh make_second_order(const mesh::TetMesh& linear) {
-  mesh::TetMesh out;
-  out.order = 2;
-  out.nodes = linear.nodes;
-  out.regions = linear.regions;
-  out.tets.reserve(static_cast<std::size_t>(linear.tet_count()) * 10);
-  std::unordered_map<Edge, std::int32_t, KeyHash> middles;
-  for (std::int64_t e = 0; e < linear.tet_count(); ++e) {
-    const auto tet = linear.tet(e);
-    out.tets.insert(out.tets.end(), tet.begin(), tet.end());
-    for (const auto& [a, b] : mesh::kEdges) {
-      const auto [found, fresh] = middles.try_emplace(sorted(Edge{tet[a], tet[b]}), static_cast<std::int32_t>(out.nodes.size()));
-      if (fresh) out.nodes.push_back(0.5 * (linear.nodes[tet[a]] + linear.nodes[tet[b]]));
-      out.tets.push_back(found->second);
+double calc_flatness(const std::array<Vec3, 4>& corners) {
+  const auto& p = corners;
+  if (!(dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])) > 0)) return -1;
+  std::array<Vec3, 4> normal;
+  for (int f = 0; f < 4; ++f)
+    normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
+  double worst = 180;
+  for (int i = 0; i < 4; ++i)
+    for (int j = i + 1; j < 4; ++j) {
+      const double turn = std::atan2(norm(cross(normal[i], normal[j])), dot(normal[i], normal[j])) * 180 / std::numbers::pi;
+      worst = std::min({worst, turn, 180 - turn});
     }
-  }
-  return out;
+  return worst;
 }
 
 }  // namespace carillon::mesher

@@ -1,6 +1,7 @@
 // What a mesher does with tetrahedra of whatever origin: measures, boundary, repair, second order. Std only.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -30,7 +31,7 @@ std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components);
 /// Removes the elements that are marked, and the nodes that nothing uses then. Linear meshes.
 void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove);
 
-/// The same mesh with a node at the middle of every edge.
-mesh::TetMesh make_second_order(const mesh::TetMesh& linear);
+/// The smallest of all dihedral angles of a tetrahedron and of 180 degrees minus them, in degrees; negative if it is inverted.
+double calc_flatness(const std::array<Vec3, 4>& corners);
 
 }  // namespace carillon::mesher

@@ -142,6 +142,7 @@ bool Object::has(std::string_view key) {
 }
 
 bool Object::has_string(std::string_view key) { return has(key) && json(value_)[std::string(key)].isString(); }
+bool Object::has_number(std::string_view key) { return has(key) && json(value_)[std::string(key)].isNumeric(); }
 
 namespace {
 

@@ -38,6 +38,8 @@ class Object {
   bool has(std::string_view key);
   /// True when `key` is there and holds a text.
   bool has_string(std::string_view key);
+  /// True when `key` is there and holds a number.
+  bool has_number(std::string_view key);
 
   std::string string(std::string_view key);
   std::string string_or(std::string_view key, std::string_view fallback);

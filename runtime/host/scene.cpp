@@ -126,17 +126,9 @@ Listener parse_listener(config::Object& object) {
 Output parse_output(config::Object& object) {
   Output output;
   if (object.has("gain")) {
-    const std::string mend = "must be \"auto\" or a number, full scale per pascal";
-    try {
-      output.gain_per_pa = object.number("gain");
-    } catch (const InputError&) {
-      std::string word;
-      try {
-        word = object.string("gain");
-      } catch (const InputError&) {
-      }
-      if (word != "auto") object.fail("gain", mend);
-    }
+    const bool automatic = object.has_string("gain") && object.string("gain") == "auto";
+    if (!automatic && !object.has_number("gain")) object.fail("gain", "must be \"auto\" or a number, full scale per pascal");
+    if (!automatic) output.gain_per_pa = object.number("gain");
     if (output.gain_per_pa && !(*output.gain_per_pa > 0.0 && *output.gain_per_pa < 1e12)) {
       object.fail("gain", fmt::format("{}, and is {}", "must be greater than 0 and below 1e12", *output.gain_per_pa));
     }

@@ -24,13 +24,8 @@ inline Vec3 rotate(const std::array<double, 4>& q, const Vec3& v) {
   return v + q[0] * t + cross(u, t);
 }
 
-/// The pose at a time, between the recorded ones.
-inline Pose pose_at(const std::vector<Pose>& path, double time_s) {
-  std::size_t i = 1;
-  while (i + 1 < path.size() && path[i].time_s < time_s) ++i;
-  if (path.size() < 2) return path.front();
-  const Pose &a = path[i - 1], &b = path[i];
-  const double s = std::clamp((time_s - a.time_s) / (b.time_s - a.time_s), 0.0, 1.0);
+/// The pose a part s of the way from a to b; s may lie outside 0..1.
+inline Pose blend(const Pose& a, const Pose& b, double s, double time_s) {
   Pose p;
   p.time_s = time_s;
   p.position_m = (1 - s) * a.position_m + s * b.position_m;
@@ -44,6 +39,16 @@ inline Pose pose_at(const std::vector<Pose>& path, double time_s) {
   return p;
 }
 
+/// The pose at a time, between the recorded ones.
+inline Pose pose_at(const std::vector<Pose>& path, double time_s) {
+  std::size_t i = 1;
+  while (i + 1 < path.size() && path[i].time_s < time_s) ++i;
+  if (path.size() < 2) return path.front();
+  const Pose &a = path[i - 1], &b = path[i];
+  const double s = std::clamp((time_s - a.time_s) / (b.time_s - a.time_s), 0.0, 1.0);
+  return blend(a, b, s, time_s);
+}
+
 /// The pose at the instant of a touch, from the poses before it alone: at the touch itself the path has a kink.
 inline Pose pose_before(const std::vector<Pose>& path, double touch_s) {
   if (path.size() < 3) return path.front();
@@ -51,17 +56,7 @@ inline Pose pose_before(const std::vector<Pose>& path, double touch_s) {
   while (i > 1 && path[i].time_s > touch_s) --i;
   const Pose &a = path[i - 1], &b = path[i];
   const double s = (touch_s - a.time_s) / (b.time_s - a.time_s);
-  Pose p;
-  p.time_s = touch_s;
-  p.position_m = (1 - s) * a.position_m + s * b.position_m;
-  double dot = 0.0, length = 0.0;
-  for (int k = 0; k < 4; ++k) dot += a.rotation[k] * b.rotation[k];
-  for (int k = 0; k < 4; ++k) {
-    p.rotation[k] = (1 - s) * a.rotation[k] + (dot < 0 ? -s : s) * b.rotation[k];
-    length += p.rotation[k] * p.rotation[k];
-  }
-  for (double& c : p.rotation) c /= std::sqrt(length);
-  return p;
+  return blend(a, b, s, touch_s);
 }
 
 /// The contact point of a pulse in the frame of the body's mesh.
