@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,7 +16,7 @@
 namespace carillon::bank {
 
 inline constexpr int kVersionMajor = 1;
-inline constexpr int kVersionMinor = 0;
+inline constexpr int kVersionMinor = 1;
 
 /// Air, as OCE01 section 4 has it: radiation gains are made with it and sound travels in it.
 inline constexpr double kAirDensityKgM3 = 1.21;
@@ -31,13 +32,43 @@ struct RigidBody {
   double volume_m3 = 0.0;
 };
 
-/// Isotropic elastic material and the damping law c = alpha1 lambda + alpha2 (OSG02 section 3.3, corrected).
+/// Isotropic elastic material and the damping law c = alpha1 lambda + alpha2 (OSG02 section 3.3, corrected). A body that is orthotropic or
+/// of several materials has its isotropic equivalent here, for contact and for edits: density_kg_m3 is mass over volume, and the alphas are
+/// 0 when the law is another one (Bank::damping).
 struct Material {
   double young_modulus_pa = 0.0;
   double poisson_ratio = 0.0;
   double density_kg_m3 = 0.0;
   double alpha1_s = 0.0;      // stiffness-proportional
   double alpha2_per_s = 0.0;  // mass-proportional
+};
+
+/// How the decays came about, by name and numbers. d in 1/s, lambda = omega^2, f = omega / 2 pi:
+///   "rayleigh"           d = (alpha1 lambda + alpha2) / 2, with the alphas of Material; no numbers here
+///   "internal_friction"  d = coefficient[0] omega / 2: the loss tangent (vdDP96)
+///   "caughey"            d = sum of coefficient[k] lambda^k / 2, k = 0, 1, ...; coefficient[k] in s^(2k-1)
+///   "table"              d = loss(f) omega / 2, loss linear in log f between freq_hz[] and constant beyond them
+///   "mixed"              several materials, weighed by their energies in each mode: decays are only checked for their sign
+struct Damping {
+  std::string law = "rayleigh";
+  std::vector<double> coefficient;
+  std::vector<double> freq_hz;  // (n), ascending
+  std::vector<double> loss;     // (n), loss factor
+};
+
+/// Why no mode of the band is missing. The inertia of K - sigma M counts the eigenvalues below sigma exactly (Sylvester's law); at both
+/// ends of the band and at cuts inside it the counts have to agree with the modes that were found. C cuts, P connected components.
+struct Proof {
+  std::vector<double> cut_hz;                     // (C), ascending; the first and the last enclose the band
+  std::vector<std::int64_t> below;                // (C) eigenvalues below the cut, rigid ones included
+  std::vector<double> margin;                     // (C) relative distance in lambda to the nearest mode found
+  std::vector<std::int64_t> rigid_per_component;  // (P) rigid motions, 6 where nothing is held
+  std::int64_t found = 0;                         // modes found between the first and the last cut
+  double orthonormality = 0.0;                    // max |phi_i^T M phi_j - delta_ij|
+  double backward_error = 0.0;                    // of the worst factorisation behind a count
+  std::vector<std::int64_t> cluster_first;        // groups of modes equal to the tolerance: their shapes are one subspace, in which the
+  std::vector<std::int64_t> cluster_count;        // basis is canonical; first mode and how many
+  std::string method;                             // in words
 };
 
 /// Sizes of the solve behind the bank.
@@ -54,14 +85,22 @@ struct Bank {
   std::vector<std::array<std::int32_t, 3>> triangles;  // (T), outward, counter-clockwise from outside
 
   std::vector<double> eigenvalue_rad2_s2;  // (m), ascending, lambda = omega^2
-  std::vector<double> decay_per_s;         // (m), d = (alpha1 lambda + alpha2) / 2
+  std::vector<double> decay_per_s;         // (m), d = (alpha1 lambda + alpha2) / 2, or as `damping` says
   std::vector<double> residual;            // (m), ||K phi - lambda M phi|| / (lambda ||M phi||)
   std::vector<double> radiation_gain;      // (m), Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s)
   std::vector<double> shape_scale;         // (m), kg^-1/2 per integer step
   std::vector<std::int16_t> shape;         // (V, m, 3); phi = shape * shape_scale, mass-normalised, error <= shape_scale / 2
 
+  // Error bars [cent]: the true frequency is within the modes of the mesh by the first (a bound) and of the body by the second (an
+  // estimate). Both are one-sided widths: f 2^(+-error / 1200).
+  std::vector<double> algebraic_error_cents;       // (m), or empty: unknown
+  std::vector<double> discretisation_error_cents;  // (m), or empty: unknown
+
   RigidBody rigid;
   Material material;
+  Damping damping;
+  std::string regions;         // JSON text: materials by region of the mesh, as the job gives them; empty when there is but one
+  std::optional<Proof> proof;  // banks of version 1.0 have none
   Counts counts;
   std::array<double, 2> band_hz{20.0, 20000.0};
   bool complete = true;    // every mode of the band is here (false only when max_modes cut the list)
