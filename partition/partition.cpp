@@ -12,7 +12,6 @@
 #include <array>
 #include <limits>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 namespace carillon::partition {
@@ -28,22 +27,10 @@ void check_metis(int status, const char* what) {
   throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));
 }
 
-/// Compressed rows from a list of directed pairs, sorted and without repetitions.
-Graph make_graph(std::vector<std::pair<std::int32_t, std::int32_t>>& pairs, std::int32_t vertices) {
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  if (pairs.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
+void check_entries(std::size_t entries) {
+  if (entries > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
     throw InputError(
-        fmt::format("the mesh is too large: its graph has {} entries, 32-bit indices end at 2147483647; use a coarser mesh", pairs.size()));
-  Graph graph;
-  graph.offsets.assign(static_cast<std::size_t>(vertices) + 1, 0);
-  graph.neighbours.reserve(pairs.size());
-  for (const auto& [from, to] : pairs) {
-    ++graph.offsets[from + 1];
-    graph.neighbours.push_back(to);
-  }
-  std::partial_sum(graph.offsets.begin(), graph.offsets.end(), graph.offsets.begin());
-  return graph;
+        fmt::format("the mesh is too large: its graph has {} entries, 32-bit indices end at 2147483647; use a coarser mesh", entries));
 }
 
 /// The number of connected pieces of each part (of the whole graph when `part` is all zero).
@@ -100,43 +87,93 @@ void fill_empty_parts(std::vector<std::int32_t>& part, int parts) {
 Graph make_dual_graph(std::span<const std::int32_t> corners) {
   constexpr std::array<std::array<int, 3>, 4> kFaceCorners{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
   const auto elements = static_cast<std::int32_t>(corners.size() / 4);
+  const std::int32_t nodes = corners.empty() ? 0 : *std::max_element(corners.begin(), corners.end()) + 1;
   struct Face {
-    std::array<std::int32_t, 3> nodes;
+    std::int32_t middle, high;  // with the bucket's, the corners in ascending order
     std::int32_t element;
-    bool operator<(const Face& other) const { return std::tie(nodes, element) < std::tie(other.nodes, other.element); }
   };
-  std::vector<Face> faces;
-  faces.reserve(4 * static_cast<std::size_t>(elements));
+  // Faces fall into buckets by their lowest corner: a face then meets its twin among the few faces of one node.
+  const auto make_face = [&](std::int32_t e, const std::array<int, 3>& local) {
+    std::array<std::int32_t, 3> v{corners[4 * e + local[0]], corners[4 * e + local[1]], corners[4 * e + local[2]]};
+    if (v[1] < v[0]) std::swap(v[0], v[1]);
+    if (v[2] < v[1]) std::swap(v[1], v[2]);
+    if (v[1] < v[0]) std::swap(v[0], v[1]);
+    return v;
+  };
+  std::vector<std::int64_t> begin(static_cast<std::size_t>(nodes) + 1, 0);
   for (std::int32_t e = 0; e < elements; ++e)
-    for (const auto& local : kFaceCorners) {
-      Face face{{corners[4 * e + local[0]], corners[4 * e + local[1]], corners[4 * e + local[2]]}, e};
-      std::sort(face.nodes.begin(), face.nodes.end());
-      faces.push_back(face);
-    }
-  std::sort(faces.begin(), faces.end());
-  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
-  for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
-    if (faces[i].nodes != faces[i + 1].nodes) continue;
-    if (i + 2 < faces.size() && faces[i].nodes == faces[i + 2].nodes)
-      throw InputError(fmt::format("tetrahedra {}, {} and {} share one face (nodes {}, {}, {}); at most two can. Mend the mesh",
-                                   faces[i].element, faces[i + 1].element, faces[i + 2].element, faces[i].nodes[0], faces[i].nodes[1],
-                                   faces[i].nodes[2]));
-    pairs.emplace_back(faces[i].element, faces[i + 1].element);
-    pairs.emplace_back(faces[i + 1].element, faces[i].element);
+    for (const auto& local : kFaceCorners) ++begin[make_face(e, local)[0] + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<Face> faces(4 * static_cast<std::size_t>(elements));
+  {
+    std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
+    for (std::int32_t e = 0; e < elements; ++e)
+      for (const auto& local : kFaceCorners) {
+        const auto v = make_face(e, local);
+        faces[next[v[0]]++] = {v[1], v[2], e};
+      }
   }
-  return make_graph(pairs, elements);
+  std::vector<std::array<std::int32_t, 4>> neighbours(elements);
+  std::vector<std::int8_t> degree(elements, 0);
+  for (std::int32_t low = 0; low < nodes; ++low) {
+    const auto first = faces.begin() + begin[low], last = faces.begin() + begin[low + 1];
+    std::sort(first, last, [](const Face& x, const Face& y) {
+      return x.middle != y.middle ? x.middle < y.middle : x.high != y.high ? x.high < y.high : x.element < y.element;
+    });
+    const auto same = [](const Face& x, const Face& y) { return x.middle == y.middle && x.high == y.high; };
+    for (auto face = first; face != last && face + 1 != last; ++face) {
+      if (!same(face[0], face[1])) continue;
+      if (face + 2 != last && same(face[0], face[2]))
+        throw InputError(fmt::format("tetrahedra {}, {} and {} share one face (nodes {}, {}, {}); at most two can. Mend the mesh",
+                                     face[0].element, face[1].element, face[2].element, low, face->middle, face->high));
+      neighbours[face[0].element][degree[face[0].element]++] = face[1].element;
+      neighbours[face[1].element][degree[face[1].element]++] = face[0].element;
+    }
+  }
+  Graph graph;
+  graph.offsets.reserve(static_cast<std::size_t>(elements) + 1);
+  graph.offsets.push_back(0);
+  graph.neighbours.reserve(4 * static_cast<std::size_t>(elements));
+  for (std::int32_t e = 0; e < elements; ++e) {
+    const auto first = neighbours[e].begin();
+    std::sort(first, first + degree[e]);
+    graph.neighbours.insert(graph.neighbours.end(), first, std::unique(first, first + degree[e]));
+    graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size()));
+  }
+  return graph;
 }
 
 Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
-  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
-  pairs.reserve(elements.size() * (width - 1));
-  for (std::size_t first = 0; first + width <= elements.size(); first += width) {
-    const auto element = elements.subspan(first, width);
-    for (const std::int32_t i : element)
-      for (const std::int32_t j : element)
-        if (i >= 0 && j >= 0 && i != j) pairs.emplace_back(i, j);
+  const std::size_t count = elements.size() / width;
+  // The elements of every node, then for every node the other nodes of its elements, each once.
+  std::vector<std::int64_t> begin(static_cast<std::size_t>(nodes) + 1, 0);
+  for (std::size_t i = 0; i < count * width; ++i)
+    if (elements[i] >= 0) ++begin[elements[i] + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<std::int32_t> element_of(begin.back());
+  {
+    std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
+    for (std::size_t i = 0; i < count * width; ++i)
+      if (elements[i] >= 0) element_of[next[elements[i]]++] = static_cast<std::int32_t>(i / width);
   }
-  return make_graph(pairs, nodes);
+  Graph graph;
+  graph.offsets.reserve(static_cast<std::size_t>(nodes) + 1);
+  graph.offsets.push_back(0);
+  std::vector<std::int32_t> seen_from(nodes, -1);
+  for (std::int32_t v = 0; v < nodes; ++v) {
+    seen_from[v] = v;
+    const auto first = static_cast<std::ptrdiff_t>(graph.neighbours.size());
+    for (std::int64_t k = begin[v]; k < begin[v + 1]; ++k)
+      for (const std::int32_t w : elements.subspan(static_cast<std::size_t>(element_of[k]) * width, width))
+        if (w >= 0 && seen_from[w] != v) {
+          seen_from[w] = v;
+          graph.neighbours.push_back(w);
+        }
+    std::sort(graph.neighbours.begin() + first, graph.neighbours.end());
+    check_entries(graph.neighbours.size());
+    graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size()));
+  }
+  return graph;
 }
 
 Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
@@ -146,10 +183,14 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
     throw InputError(fmt::format("the mesh has {} tetrahedra, fewer than the {} ranks; start at most {} ranks", elements, parts, elements));
   if (elements > std::numeric_limits<std::int32_t>::max() / 4)
     throw InputError(fmt::format("the mesh is too large: {} tetrahedra, 32-bit indices allow 536870911; use a coarser mesh", elements));
-  Graph dual = make_dual_graph(corners);
   Partition result;
   result.part.assign(elements, 0);
-  if (parts > 1) {
+  if (parts == 1) {
+    result.quality.elements.assign(1, elements);
+    return result;
+  }
+  Graph dual = make_dual_graph(corners);
+  {
     // METIS refuses contiguous parts of a graph that is itself in pieces, and prints where it should return: so ask first.
     const bool connected = count_pieces(dual, result.part, 1).front() == 1;
     std::array<idx_t, METIS_NOPTIONS> options{};

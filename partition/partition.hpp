@@ -25,7 +25,7 @@ struct Quality {
   std::vector<std::int64_t> elements;  // per part
   double balance = 1.0;                // largest part / mean part
   std::int64_t edge_cut = 0;           // pairs of elements that share a face and not a part
-  bool contiguous = true;              // every part is connected through faces
+  bool contiguous = true;              // every part is connected through faces; a single part counts as one
 };
 
 struct Partition {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -30,7 +31,7 @@ struct Plan {
 
 /// One rank's piece as it travels.
 struct Piece {
-  std::vector<std::int32_t> numbers;  // header, then tets, tet_in_mesh, node_in_mesh, row, component
+  std::vector<std::int32_t> numbers;  // header, then tets, tet_in_mesh, region, node_in_mesh, row, component
   std::vector<double> positions;
 };
 
@@ -90,12 +91,18 @@ void check_held(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held
       throw InputError(fmt::format("held node {} is not in the mesh, which has {} nodes", node, mesh.nodes.size()));
 }
 
-Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, int ranks, Distribution& out) {
-  check_held(mesh, held_nodes);
+partition::Partition cut_mesh(const mesh::TetMesh& mesh, int ranks) {
+  if (mesh.order == 1) return partition::partition_elements(mesh.tets, ranks);
   std::vector<std::int32_t> corners;
   corners.reserve(4 * mesh.tet_count());
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) corners.insert(corners.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
-  partition::Partition cut = partition::partition_elements(corners, ranks);
+  return partition::partition_elements(corners, ranks);
+}
+
+Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes, int ranks, const DistributeOptions& options,
+               Distribution& out) {
+  check_held(mesh, held_nodes);
+  partition::Partition cut = cut_mesh(mesh, ranks);
 
   Plan plan;
   plan.part = std::move(cut.part);
@@ -129,7 +136,9 @@ Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_
     out.held_m.assign(out.components, {});
     for (std::size_t v = 0; v < plan.held.size(); ++v)
       if (plan.held[v] && plan.owner[v] >= 0) out.held_m[plan.component[v]].push_back(mesh.nodes[v]);
+    for (auto& points : out.held_m) points = pick_holding_points(points);
   }
+  if (!options.elimination_order) return plan;
   std::vector<std::int32_t> rows(mesh.tets.size());
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = plan.row[mesh.tets[i]];
   const auto graph = partition::make_node_graph(rows, mesh.nodes_per_tet(), static_cast<std::int32_t>(out.free_nodes));
@@ -138,6 +147,7 @@ Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_
 }
 
 constexpr int kHeader = 6;
+constexpr std::int64_t kBlock = 1 << 28;  // entries of one message: MPI's counts are 32-bit
 
 /// Packs the piece of `rank`. `elements` are its elements; `local` is scratch of (N) entries, all -1 before and after.
 Piece pack(const mesh::TetMesh& mesh, const Plan& plan, const std::vector<std::int32_t>& elements, int rank,
@@ -163,6 +173,7 @@ Piece pack(const mesh::TetMesh& mesh, const Plan& plan, const std::vector<std::i
   for (const std::int32_t e : elements)
     for (const std::int32_t node : mesh.tet(e)) piece.numbers.push_back(local[node]);
   piece.numbers.insert(piece.numbers.end(), elements.begin(), elements.end());
+  for (const std::int32_t e : elements) piece.numbers.push_back(static_cast<std::size_t>(e) < mesh.regions.size() ? mesh.regions[e] : 0);
   piece.numbers.insert(piece.numbers.end(), touched.begin(), touched.end());
   for (const std::int32_t node : touched) piece.numbers.push_back(plan.row[node]);
   for (const std::int32_t node : touched) piece.numbers.push_back(plan.component[node]);
@@ -187,6 +198,7 @@ LocalMesh unpack(const Piece& piece) {
   };
   take(local.tets, static_cast<std::size_t>(n[1]) * local.nodes_per_tet());
   take(local.tet_in_mesh, n[1]);
+  take(local.region, n[1]);
   take(local.node_in_mesh, n[2]);
   take(local.row, n[2]);
   take(local.component, n[2]);
@@ -196,22 +208,82 @@ LocalMesh unpack(const Piece& piece) {
   return local;
 }
 
-/// Sends and receives of any length: MPI counts are 32-bit, so long arrays travel in blocks.
+/// Sends and receives of any length.
 template <typename T>
 void send(MPI_Comm comm, const std::vector<T>& data, int to, MPI_Datatype type) {
-  const std::int64_t size = static_cast<std::int64_t>(data.size());
-  MPI_Send(&size, 1, MPI_INT64_T, to, 0, comm);
-  for (std::int64_t done = 0; done < size; done += 1 << 28)
-    MPI_Send(data.data() + done, static_cast<int>(std::min<std::int64_t>(size - done, 1 << 28)), type, to, 1, comm);
+  const auto size = static_cast<std::int64_t>(data.size());
+  for (std::int64_t done = 0; done < size; done += kBlock)
+    MPI_Send(data.data() + done, static_cast<int>(std::min(size - done, kBlock)), type, to, 1, comm);
 }
 
 template <typename T>
 void receive(MPI_Comm comm, std::vector<T>& data, MPI_Datatype type) {
-  std::int64_t size = 0;
-  MPI_Recv(&size, 1, MPI_INT64_T, 0, 0, comm, MPI_STATUS_IGNORE);
-  data.resize(size);
-  for (std::int64_t done = 0; done < size; done += 1 << 28)
-    MPI_Recv(data.data() + done, static_cast<int>(std::min<std::int64_t>(size - done, 1 << 28)), type, 0, 1, comm, MPI_STATUS_IGNORE);
+  const auto size = static_cast<std::int64_t>(data.size());
+  for (std::int64_t done = 0; done < size; done += kBlock)
+    MPI_Recv(data.data() + done, static_cast<int>(std::min(size - done, kBlock)), type, 0, 1, comm, MPI_STATUS_IGNORE);
+}
+
+/// A piece travels in three steps, so that neither side waits for a side that ran out of memory: its sizes (-1: it could not be packed),
+/// the answer whether there is room for it, and then the piece itself.
+void send_piece(MPI_Comm comm, const Piece* piece, int to) {
+  std::array<std::int64_t, 2> sizes{-1, -1};
+  if (piece != nullptr) sizes = {static_cast<std::int64_t>(piece->numbers.size()), static_cast<std::int64_t>(piece->positions.size())};
+  MPI_Send(sizes.data(), 2, MPI_INT64_T, to, 0, comm);
+  if (piece == nullptr) return;
+  int has_room = 0;
+  MPI_Recv(&has_room, 1, MPI_INT, to, 0, comm, MPI_STATUS_IGNORE);
+  if (has_room == 0) return;
+  send(comm, piece->numbers, to, MPI_INT32_T);
+  send(comm, piece->positions, to, MPI_DOUBLE);
+}
+
+LocalMesh receive_piece(MPI_Comm comm) {
+  std::array<std::int64_t, 2> sizes{};
+  MPI_Recv(sizes.data(), 2, MPI_INT64_T, 0, 0, comm, MPI_STATUS_IGNORE);
+  if (sizes[0] < 0) return {};  // rank 0 says why
+  Piece piece;
+  int has_room = 1;
+  std::exception_ptr error;
+  try {
+    piece.numbers.resize(sizes[0]);
+    piece.positions.resize(sizes[1]);
+  } catch (...) {
+    has_room = 0;
+    error = std::current_exception();
+  }
+  MPI_Send(&has_room, 1, MPI_INT, 0, 0, comm);
+  if (error) std::rethrow_exception(error);
+  receive(comm, piece.numbers, MPI_INT32_T);
+  receive(comm, piece.positions, MPI_DOUBLE);
+  return unpack(piece);
+}
+
+/// Rank 0 packs and sends one rank's piece at a time and keeps its own.
+LocalMesh send_pieces(MPI_Comm comm, const mesh::TetMesh& mesh, const Plan& plan, int ranks) {
+  std::exception_ptr error;
+  std::vector<std::vector<std::int32_t>> elements;
+  std::vector<std::int32_t> scratch;
+  const auto attempt = [&](auto&& work) {
+    try {
+      if (!error) work();
+    } catch (...) {
+      error = std::current_exception();
+    }
+  };
+  attempt([&] {
+    elements.resize(ranks);
+    for (std::size_t e = 0; e < plan.part.size(); ++e) elements[plan.part[e]].push_back(static_cast<std::int32_t>(e));
+    scratch.assign(mesh.nodes.size(), -1);
+  });
+  for (int to = 1; to < ranks; ++to) {
+    Piece piece;
+    attempt([&] { piece = pack(mesh, plan, elements[to], to, scratch); });
+    send_piece(comm, error ? nullptr : &piece, to);
+  }
+  LocalMesh own;
+  attempt([&] { own = unpack(pack(mesh, plan, elements[0], 0, scratch)); });
+  if (error) std::rethrow_exception(error);
+  return own;
 }
 
 void share_facts(MPI_Comm comm, Distribution& out) {
@@ -252,32 +324,35 @@ void share_facts(MPI_Comm comm, Distribution& out) {
 
 }  // namespace
 
-Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes) {
+std::vector<Vec3> pick_holding_points(const std::vector<Vec3>& points) {
+  if (points.size() <= 3) return points;
+  const auto subtract = [](const Vec3& x, const Vec3& y) { return Vec3{x[0] - y[0], x[1] - y[1], x[2] - y[2]}; };
+  const auto square = [](const Vec3& x) { return x[0] * x[0] + x[1] * x[1] + x[2] * x[2]; };
+  const Vec3 first = points.front();
+  const Vec3 second = *std::max_element(
+      points.begin(), points.end(), [&](const Vec3& x, const Vec3& y) { return square(subtract(x, first)) < square(subtract(y, first)); });
+  const Vec3 line = subtract(second, first);
+  const auto off_line = [&](const Vec3& point) {
+    const Vec3 arm = subtract(point, first);
+    return square({line[1] * arm[2] - line[2] * arm[1], line[2] * arm[0] - line[0] * arm[2], line[0] * arm[1] - line[1] * arm[0]});
+  };
+  const Vec3 third =
+      *std::max_element(points.begin(), points.end(), [&](const Vec3& x, const Vec3& y) { return off_line(x) < off_line(y); });
+  return {first, second, third};
+}
+
+Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes,
+                        const DistributeOptions& options) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
   Distribution out;
   Plan plan;
   petsc::run_agreed(comm, [&] {
-    if (rank == 0) plan = make_plan(mesh, held_nodes, ranks, out);
+    if (rank == 0) plan = make_plan(mesh, held_nodes, ranks, options, out);
   });
-  if (rank == 0) {
-    std::vector<std::vector<std::int32_t>> elements(ranks);
-    for (std::size_t e = 0; e < plan.part.size(); ++e) elements[plan.part[e]].push_back(static_cast<std::int32_t>(e));
-    std::vector<std::int32_t> scratch(mesh.nodes.size(), -1);
-    for (int to = 1; to < ranks; ++to) {
-      const Piece piece = pack(mesh, plan, elements[to], to, scratch);
-      send(comm, piece.numbers, to, MPI_INT32_T);
-      send(comm, piece.positions, to, MPI_DOUBLE);
-    }
-    out.local = unpack(pack(mesh, plan, elements[0], 0, scratch));
-    out.row_of_node = std::move(plan.row);
-  } else {
-    Piece piece;
-    receive(comm, piece.numbers, MPI_INT32_T);
-    receive(comm, piece.positions, MPI_DOUBLE);
-    out.local = unpack(piece);
-  }
+  petsc::run_agreed(comm, [&] { out.local = rank == 0 ? send_pieces(comm, mesh, plan, ranks) : receive_piece(comm); });
+  out.row_of_node = std::move(plan.row);
   share_facts(comm, out);
   return out;
 }

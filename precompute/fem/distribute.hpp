@@ -17,9 +17,10 @@ using mesh::Vec3;
 struct LocalMesh {
   int order = 1;                           // 1 or 2
   std::vector<std::int32_t> tets;          // (e, 4) or (e, 10), local node numbers
-  std::vector<std::int32_t> tet_in_mesh;   // (e) number in the mesh of rank 0
+  std::vector<std::int32_t> tet_in_mesh;   // (e) number in the whole mesh
+  std::vector<std::int32_t> region;        // (e) TetMesh::regions
   std::vector<Vec3> nodes_m;               // (n): owned free nodes by ascending row, owned held nodes, halo
-  std::vector<std::int32_t> node_in_mesh;  // (n) number in the mesh of rank 0
+  std::vector<std::int32_t> node_in_mesh;  // (n) number in the whole mesh
   std::vector<std::int32_t> row;           // (n) global number among the free nodes of all ranks; -1: held
   std::vector<std::int32_t> component;     // (n) connected component
   std::int32_t free_nodes = 0;             // the leading nodes that are owned and free; their rows are first_row, first_row + 1, ...
@@ -49,18 +50,29 @@ struct Distribution {
   PartitionReport report;
   std::int64_t nodes = 0;  // of the whole mesh, those that a tetrahedron uses
   std::int64_t tets = 0;
-  std::int64_t free_nodes = 0;            // of all ranks
-  std::int32_t components = 0;            // connected through common nodes
-  std::vector<std::vector<Vec3>> held_m;  // per component the positions of its held nodes, the same on every rank; empty when none is held
-  std::vector<std::int32_t> row_of_node;  // rank 0 only: (N) row of each node of the mesh, -1: held or unused
-  std::vector<std::int32_t> elimination_position;  // rank 0 only: (free nodes), by row: METIS' nested dissection order
+  std::int64_t free_nodes = 0;  // of all ranks
+  std::int32_t components = 0;  // connected through common nodes
+  /// Per component up to three of its held nodes [m] that stop the same rigid motions as all of them, the same on every rank; empty when no
+  /// node is held at all.
+  std::vector<std::vector<Vec3>> held_m;
+  std::vector<std::int32_t> row_of_node;           // rank 0 only: (N) row of each node of the mesh, -1: held or unused
+  std::vector<std::int32_t> elimination_position;  // rank 0 only: (free nodes), by row: METIS' nested dissection order, if wanted
+};
+
+struct DistributeOptions {
+  bool elimination_order = false;  // order the whole graph on rank 0, for factorisations that cannot order a distributed matrix themselves
 };
 
 /// Cuts the mesh with METIS, numbers the free nodes so that each rank's are contiguous, and sends each rank its piece. The mesh and the
-/// held nodes are read on rank 0 only.
+/// held nodes are read on rank 0 only; afterwards nobody needs the mesh any more.
 /// Collective. Throws on every rank: InputError when there are fewer tetrahedra than ranks, a held node is not in the mesh, or every node
 /// is held; SystemError when memory runs out.
-Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes);
+Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes,
+                        const DistributeOptions& options = {});
+
+/// Of points [m], up to three that stop the same rigid motions as all of them: the first, the one farthest from it, and the one farthest
+/// from the line through both. Pure.
+std::vector<Vec3> pick_holding_points(const std::vector<Vec3>& points);
 
 /// The report as a few lines of text for people.
 std::string describe(const PartitionReport& report);

@@ -129,7 +129,7 @@ fem::Distribution distribute_mesh(Run& run, MeshFacts& facts) {
   run.stations.end();
 
   run.stations.begin("partition", "METIS k-way on the dual graph");
-  fem::Distribution pieces = name_mesh(run, [&] { return fem::distribute(run.comm, mesh, held); });
+  fem::Distribution pieces = name_mesh(run, [&] { return fem::distribute(run.comm, mesh, held, {.elimination_order = true}); });
   for (std::int32_t& row : facts.row) row = pieces.row_of_node[row];
   pieces.row_of_node = {};
   std::string report = fem::describe(pieces.report);

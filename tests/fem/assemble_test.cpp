@@ -36,7 +36,7 @@ int get_ranks() {
 mesh::TetMesh on_rank_0(const mesh::TetMesh& whole) { return get_rank() == 0 ? whole : mesh::TetMesh{}; }
 
 Distribution distribute_box(const mesh::TetMesh& whole, const std::vector<std::int32_t>& held = {}) {
-  return distribute(kWorld, on_rank_0(whole), get_rank() == 0 ? held : std::vector<std::int32_t>{});
+  return distribute(kWorld, on_rank_0(whole), get_rank() == 0 ? held : std::vector<std::int32_t>{}, {.elimination_order = true});
 }
 
 using Field = std::function<Vec3(const Vec3&)>;
