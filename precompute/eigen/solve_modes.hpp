@@ -39,9 +39,17 @@ struct Problem {
 };
 
 enum class Factorisation {
-  kAutomatic,  // CHOLMOD on one rank, MUMPS on several
+  kAutomatic,  // L D L^T of our own, and MUMPS where that turns out unstable
+  kLdlt,
   kMumps,
-  kCholmod,  // one rank only
+  kCholmod,  // one rank only; shifts below the spectrum
+};
+
+/// The eigensolver of a slice; both are SLEPc EPS types and heed its options (prefix "carillon_").
+enum class Method {
+  kAutomatic,  // block Lanczos
+  kBlockLanczos,
+  kKrylovSchur,
 };
 
 enum class Phase { kRigid, kAnalyse, kCount, kFactor, kIterate, kCheck };
@@ -59,6 +67,9 @@ struct Options {
   std::optional<std::int64_t> max_modes;  // the lowest so many of the band
   double tolerance = 1e-8;                // bound on every mode's relative residual; see Modes::residual
   Factorisation factorisation = Factorisation::kAutomatic;
+  Method method = Method::kAutomatic;
+  /// What the ranks of one host may use together [byte]; 0: what the machine, its cgroup and the process limits leave.
+  std::int64_t memory_limit_bytes = 0;
   std::function<void(const Progress&)> progress;  // may be empty
 };
 
@@ -82,6 +93,29 @@ struct FactorStatistics {
   std::int64_t solves = 0;  // right-hand sides
 };
 
+/// Eigenvalues below a frequency, by the signs of the pivots of K - lambda M = L D L^T (or of all eigenvalues at once, see Proof::method).
+struct Count {
+  double freq_hz = 0;
+  std::int64_t below = 0;
+  double margin = 0;  // |lambda - nearest mode found| / lambda: how far from an eigenvalue the count was taken
+};
+
+/// Modes that cannot be told apart: their lambda agree to the tolerance. Their shapes are a canonical basis of what they span.
+struct Cluster {
+  std::int64_t first = 0;  // index into Modes::lambda
+  std::int64_t count = 0;
+};
+
+/// Why no mode of the band is missing: between any two neighbouring counts as many modes were found as the counts differ by.
+struct Proof {
+  std::vector<Count> counts;                      // ascending in frequency: both ends of the band, every cut and every shift
+  std::vector<std::int64_t> rigid_per_component;  // (components) rigid modes of each, in the count below the band
+  std::int64_t found = 0;                         // modes between the first count and the last
+  std::string method;                             // how the counts were taken, in words
+  double factor_backward_error = 0;               // largest relative residual of a solve with the factors; 0 if not measured
+  std::vector<Cluster> clusters;                  // ascending; single modes are not listed
+};
+
 struct Modes {
   std::vector<double> lambda;  // (modes) eigenvalues omega^2 [(rad/s)^2], ascending
   /// (modes) ||K phi - lambda M phi||_2 / (lambda ||M phi||_2), calculated from K and M after the solve. A mode above the tolerance is
@@ -99,6 +133,7 @@ struct Modes {
   std::int64_t count_below_low = 0;  // eigenvalues below the band: rigid modes, mechanisms and modes below low_hz
   std::int64_t band_count = 0;       // modes the band holds, by inertia; more than lambda.size() only if max_modes cut it
   std::int64_t mechanism_count = 0;  // of count_below_low: neither rigid nor audible to 1e-4 low_hz (parts that hang on a point or an edge)
+  Proof proof;
   FactorStatistics factor;
   Seconds seconds;
 };
