@@ -43,10 +43,11 @@ LAW = {
     "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "json", "cli", "eigen", "cgal", "openvdb"]),
     "precompute/petsc": (["runtime/config"], ["fmt", "mpi", "petsc"]),
     "precompute/fem": (["runtime/config", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc"], ["fmt", "mpi", "petsc", "eigen"]),
+    "precompute/estimate": (["runtime/config", "jobs/spec", "precompute/mesh", "precompute/petsc", "precompute/fem"], ["fmt", "mpi", "petsc", "eigen"]),
     "precompute/eigen": (["runtime/config", "partition", "precompute/petsc"], ["fmt", "mpi", "petsc", "mumps", "cholmod", "eigen"]),
-    "precompute/io": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/eigen"],
+    "precompute/io": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/estimate", "precompute/eigen"],
                       ["fmt", "json", "mpi", "petsc", "hdf5"]),
-    "precompute": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/eigen", "precompute/io"],
+    "precompute": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/estimate", "precompute/eigen", "precompute/io"],
                    ["fmt", "cli", "mpi"]),
 }
 # Finer than folders: the only files that may include these.

@@ -1,0 +1,75 @@
+// How wrong each frequency can be: an error bar in cents per mode, in two parts. docs/error-bars.md says what they mean and how good they
+// are.
+#pragma once
+
+#include <mpi.h>
+#include <petscmat.h>
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "jobs/spec/job_spec.hpp"
+#include "precompute/fem/distribute.hpp"
+
+namespace carillon::estimate {
+
+/// What an estimate must know of a material.
+struct Solid {
+  std::array<double, 36> elasticity_pa{};  // C, (6, 6) row-major, Voigt's order xx yy zz yz xz xy, engineering shear strains, mesh axes
+  double density_kg_m3 = 0.0;
+};
+
+/// The computed modes, as eigen::Modes holds them.
+struct Solution {
+  std::span<const double> lambda;    // (m) [rad^2/s^2], ascending; no rigid modes
+  std::span<const double> residual;  // (m) || K phi - lambda M phi ||_2 / (lambda || M phi ||_2)
+  Mat shapes = nullptr;              // (3n, m) dense, phi^T M phi = 1; null when m is 0
+  double low_hz = 0.0;               // ends of the band in which the modes are complete (proven by a count): they close the gaps of the
+  double high_hz = 0.0;              // first and the last mode. high_hz: where the list was cut (max_modes), its last frequency
+};
+
+/// Error bars, one entry a mode, the same on every rank. A bar b says that the true frequency of the k-th mode lies between
+/// f_k 2^(-b/1200) and f_k 2^(b/1200).
+struct ErrorBars {
+  /// Between the computed frequency and that of K phi = lambda M phi, k-th against k-th: a bound from the residual (Kato and Temple), and
+  /// what rounding in K leaves open.
+  std::vector<double> algebraic_cents;
+  /// Between the frequency of K phi = lambda M phi and that of the elastic body: an estimate, safety factor included; holds for the k-th of
+  /// the sorted frequencies, whatever modes change places.
+  std::vector<double> discretisation_cents;
+
+  /// The parts of the estimate as shares of lambda, without safety factors: for predict_cents() and for people.
+  struct Parts {
+    double interpolation = 0.0;   // energy of the stress that the elements cannot follow, lambda_h - lambda > 0
+    double lumping = 0.0;         // of a lumped mass: lambda (consistent) - lambda (lumped)
+    double geometry = 0.0;        // lambda (smooth surface) - lambda (surface of the mesh), signed
+    double geometry_noise = 0.0;  // how uncertain `geometry` is, >= 0
+  };
+  std::vector<Parts> parts;
+};
+
+/// Calculates the error bars of all modes from K, M and the modes, in one pass over the elements.
+/// solids: by material; material_of_tet: (e) index into solids, may be empty when there is one. stiffness, mass: those of fem::System.
+/// Results do not depend on the number of ranks beyond rounding. Collective. Throws InputError when the arguments do not fit one another,
+/// SystemError when memory runs out; on all ranks alike.
+ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffness, Mat mass, std::span<const Solid> solids,
+                          std::span<const std::int32_t> material_of_tet, spec::Mass mass_kind, const Solution& solution);
+
+/// The elasticity of an isotropic solid.
+Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
+
+/// The kinds of mesh whose errors fall at different rates.
+enum class Kind {
+  kT4,         // interpolation h^2, lumping h^2, geometry h^2
+  kT10,        // straight sides: interpolation h^4, lumping h^2, geometry h^2
+  kT10Curved,  // mid nodes on the surface: interpolation h^4, lumping h^2, geometry h^4
+};
+
+/// Predicts the discretisation bar [cents] of a mode on a mesh whose edges are `edge_ratio` times as long as those the parts come from,
+/// with the rates of `kind` (smooth modes; a held face with its singular rim converges slower, which the safety factor covers for ratios
+/// down to about 1/4). Pure.
+double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio = 1.0);
+
+}  // namespace carillon::estimate
