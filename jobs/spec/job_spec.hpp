@@ -3,47 +3,61 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "jobs/spec/material.hpp"
 #include "runtime/config/document.hpp"
 
 namespace carillon::spec {
 
 enum class Element { T4, T10 };
 enum class Mass { consistent, lumped };
-/// Which sparse factorisation serves shift-invert. automatic: CHOLMOD on one rank, MUMPS on several.
-enum class Factorisation { automatic, mumps, cholmod };
-
-/// Isotropic material with Rayleigh damping. Young's modulus and Poisson's ratio are derived where the job gives Lamé's constants.
-struct Material {
-  double young_modulus_pa = 0.0;
-  double poisson_ratio = 0.0;
-  double density_kg_m3 = 0.0;
-  double alpha1_s = 0.0;
-  double alpha2_per_s = 0.0;
-
-  double lame_lambda_pa() const { return young_modulus_pa * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio)); }
-  double lame_mu_pa() const { return young_modulus_pa / (2 * (1 + poisson_ratio)); }
-};
+/// Which eigensolver. automatic: dense LAPACK for small problems, else the fastest that suits the band.
+enum class Method { automatic, block_lanczos, krylov_schur, dense };
+/// Which sparse factorisation serves shift-invert. automatic: what suits the number of ranks and the band.
+enum class Factorisation { automatic, ldlt, mumps, cholmod };
 
 /// Nodes whose displacement is zero: a named node set of the mesh, or all nodes inside a closed axis-parallel box.
 struct Fixed {
-  std::optional<std::string> node_set;
-  std::optional<std::array<std::array<double, 3>, 2>> box_m;  // {min, max}
+  std::optional<std::string> node_set = {};
+  std::optional<std::array<std::array<double, 3>, 2>> box_m = {};  // {min, max}
+  std::string place = {};                                          // "file:line" of the job, for messages
+};
+
+/// A body that the program meshes itself, in place of a mesh file: a parametric shape or a closed surface, as carillon-mesh takes them.
+struct Body {
+  std::string shape = {};                         // of carillon-mesh --shape; empty: a surface
+  std::map<std::string, double> dimensions = {};  // of the shape, by carillon-mesh's names ("outer-radius"): metres, angles in degrees
+  std::filesystem::path surface = {};             // absolute; empty: a shape
+  std::optional<double> wall_m = {};              // surface: hollow, without it solid
+  std::optional<double> height_m = {};            // surface: scaled to this extent along `up`
+  std::optional<double> scale = {};               // surface: metres per unit of the file
+  char up = 'y';                                  // surface: 'x', 'y' or 'z'
+  std::string method = "auto";                    // surface: "auto", "delaunay" or "stuffing"
+  std::optional<long long> nodes = {};            // of the mesh, mid-side nodes among them; at most one of nodes and edge_m
+  std::optional<double> edge_m = {};
+  std::string place = {};  // "file:line" of the job, for messages
 };
 
 struct JobSpec {
-  std::filesystem::path file;  // where it was read from
-  std::filesystem::path mesh;  // absolute
-  std::filesystem::path bank;  // absolute
-  Material material;
+  std::filesystem::path file;                 // where it was read from
+  std::filesystem::path mesh;                 // absolute; empty when the job names a body
+  std::optional<Body> body;                   // in place of mesh
+  std::filesystem::path bank;                 // absolute
+  Material material;                          // of the whole body, or of the regions that `materials` does not name
+  bool has_material = true;                   // false: `materials` has to name every region, and `material` is the first of them
+  std::map<std::string, Material> materials;  // by region of the mesh: its tag as text, or its name
   Element element = Element::T10;
   Mass mass = Mass::consistent;
   std::array<double, 2> band_hz{20.0, 20000.0};
-  std::optional<int> max_modes;  // the lowest that many of the band
-  std::optional<Fixed> fixed;
-  double tolerance = 1e-8;  // solver.tolerance: relative residual of every mode; a bank takes none above 1e-4
+  std::optional<int> max_modes;          // the lowest that many of the band
+  std::vector<Fixed> fixed;              // their union is held; empty: a free body
+  double tolerance = 1e-8;               // solver.tolerance: relative residual of every mode; a bank takes none above 1e-4
+  std::optional<double> accuracy_cents;  // in place of element, the mesh's size and tolerance: those are then the program's to choose
+  Method method = Method::automatic;     // solver.method
   Factorisation factorisation = Factorisation::automatic;  // solver.factorisation
 };
 
@@ -57,5 +71,11 @@ std::filesystem::path find_resolved_path(const std::filesystem::path& bank);
 /// The job as JSON text with every value used. Paths are written relative to `folder` where they can be. `run_json` (an object, may be
 /// empty) is stored under the key "run", which read_job() accepts and ignores, so that the result runs again as a job.
 std::string resolved_json(const JobSpec& job, const std::filesystem::path& folder, const std::string& run_json);
+
+/// The words of the schema, as a job writes them.
+std::string to_text(Element element);
+std::string to_text(Mass mass);
+std::string to_text(Method method);
+std::string to_text(Factorisation factorisation);
 
 }  // namespace carillon::spec

@@ -76,14 +76,21 @@ void check_outputs(const Run& run) {
   });
 }
 
+/// The union of what the job holds, ascending.
 std::vector<std::int32_t> find_held_nodes(const mesh::TetMesh& mesh, const spec::JobSpec& job) {
-  if (!job.fixed) return {};
-  try {
-    if (job.fixed->node_set) return mesh::find_fixed_nodes(mesh, *job.fixed->node_set);
-    return mesh::find_fixed_nodes(mesh, (*job.fixed->box_m)[0], (*job.fixed->box_m)[1]);
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: key 'fixed': {}", job.file.string(), error.what()));
+  std::vector<std::int32_t> held;
+  for (const spec::Fixed& fixed : job.fixed) {
+    try {
+      const auto nodes = fixed.node_set ? mesh::find_fixed_nodes(mesh, *fixed.node_set)
+                                        : mesh::find_fixed_nodes(mesh, (*fixed.box_m)[0], (*fixed.box_m)[1]);
+      held.insert(held.end(), nodes.begin(), nodes.end());
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: \"fixed\": {}", fixed.place, error.what()));
+    }
   }
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
+  return held;
 }
 
 /// Runs a collective step whose errors cannot know the mesh, and names it in them. All ranks throw alike, so no agreement is needed.
@@ -282,7 +289,7 @@ bank::Bank make_bank(const Run& run, MeshFacts& facts, const fem::Distribution& 
   bank.eigenvalue_rad2_s2 = modes.lambda;
   bank.residual = modes.residual;
   const spec::Material& material = run.job.material;
-  for (const double lambda : modes.lambda) bank.decay_per_s.push_back((material.alpha1_s * lambda + material.alpha2_per_s) / 2);
+  for (const double lambda : modes.lambda) bank.decay_per_s.push_back(material.calc_decay_per_s(lambda));
   bank.rigid = {body.mass_kg, body.centre_m, body.inertia_kg_m2, body.volume_m3};
   bank.material = {material.young_modulus_pa, material.poisson_ratio, material.density_kg_m3, material.alpha1_s, material.alpha2_per_s};
   bank.counts = {pieces.nodes, pieces.tets, pieces.components, modes.rigid_count};

@@ -263,6 +263,58 @@ void Object::copy_numbers(std::string_view key, double* values, std::size_t coun
   for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list[static_cast<Json::ArrayIndex>(i)], key, {});
 }
 
+std::vector<double> Object::number_list(std::string_view key, std::size_t most) {
+  const Json::Value& list = json(require_value(key));
+  if (!list.isArray() || list.empty() || list.size() > most)
+    fail(key, fmt::format("must be a list of 1 to {} numbers, and is {}", most, kind_of(list)));
+  std::vector<double> values(list.size());
+  copy_numbers(key, values.data(), values.size());
+  return values;
+}
+
+std::vector<std::vector<double>> Object::number_rows(std::string_view key, std::size_t columns, std::size_t most) {
+  const Json::Value& list = json(require_value(key));
+  if (!list.isArray() || list.empty() || list.size() > most)
+    fail(key, fmt::format("must be a list of 1 to {} lists of {} numbers, and is {}", most, columns, kind_of(list)));
+  std::vector<std::vector<double>> rows;
+  for (Json::ArrayIndex i = 0; i < list.size(); ++i) {
+    if (!list[i].isArray() || list[i].size() != columns)
+      fail(key, fmt::format("entry {} must be a list of {} numbers, and is {}", i, columns, kind_of(list[i])));
+    std::vector<double>& row = rows.emplace_back();
+    for (const Json::Value& value : list[i]) row.push_back(to_number(*this, value, key, {}));
+  }
+  return rows;
+}
+
+std::vector<Entry> Object::entries(std::string_view key, std::size_t most) {
+  if (!has(key)) return {};
+  const Json::Value& value = json(value_)[std::string(key)];
+  std::vector<Entry> list;
+  const auto add = [&](const Json::Value& entry, const std::string& name) {
+    const std::string place = fmt::format("{}:{}", data_->file.string(), data_->line_at(entry.getOffsetStart()));
+    if (entry.isString() && !entry.asString().empty() && entry.asString().find('\0') == std::string::npos)
+      list.push_back({entry.asString(), {}, place});
+    else if (entry.isObject())
+      list.push_back({"", Object(data_, &entry, name), place});
+    else
+      fail(key, fmt::format("must be a text or an object, or a list of them, and holds {}", kind_of(entry)));
+  };
+  if (!value.isArray()) {
+    add(value, full_name(name_, key));
+    return list;
+  }
+  if (value.size() > most) fail(key, fmt::format("must have at most {} entries, and has {}", most, value.size()));
+  for (Json::ArrayIndex i = 0; i < value.size(); ++i) add(value[i], fmt::format("{}[{}]", full_name(name_, key), i));
+  return list;
+}
+
+std::string Object::find_place(std::string_view key) const {
+  const Json::Value& object = json(value_);
+  const auto offset =
+      !key.empty() && object.isMember(std::string(key)) ? find_key_offset(*data_, object[std::string(key)], key) : object.getOffsetStart();
+  return fmt::format("{}:{}", data_->file.string(), data_->line_at(offset));
+}
+
 Object Object::object(std::string_view key) {
   const Json::Value& value = json(require_value(key));
   if (!value.isObject()) fail(key, fmt::format("must be an object in braces, and is {}", kind_of(value)));

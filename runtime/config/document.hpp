@@ -32,6 +32,8 @@ inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity()};
 
 struct DocumentData;  // the parsed text and the line table, shared by all views of one document
 
+struct Entry;
+
 /// A JSON object being read. Asking for a key marks it as known.
 class Object {
  public:
@@ -71,6 +73,13 @@ class Object {
   /// A list of objects; a missing key gives an empty list.
   std::vector<Object> objects(std::string_view key);
 
+  /// A list of finite numbers of any length from 1 to `most`.
+  std::vector<double> number_list(std::string_view key, std::size_t most);
+  /// A list of lists of `columns` finite numbers each, row by row; from 1 to `most` rows.
+  std::vector<std::vector<double>> number_rows(std::string_view key, std::size_t columns, std::size_t most);
+  /// One text or object, or a list of at most `most` texts and objects; a missing key gives an empty list.
+  std::vector<Entry> entries(std::string_view key, std::size_t most);
+
   /// A file named by `key`, made absolute: relative paths start at the document's folder. The file need not exist.
   std::filesystem::path path(std::string_view key);
   std::optional<std::filesystem::path> path_if(std::string_view key);
@@ -87,6 +96,9 @@ class Object {
   /// Throws InputError "file:line: message" at the line of `key` (of the object itself when the key is absent).
   [[noreturn]] void fail(std::string_view key, const std::string& message) const;
 
+  /// "file:line" of `key` (of the object itself when the key is absent or empty), for messages of later.
+  std::string find_place(std::string_view key) const;
+
   Object(std::shared_ptr<DocumentData> data, const void* value, std::string name);
 
  private:
@@ -97,6 +109,13 @@ class Object {
   const void* value_ = nullptr;  // a Json::Value of *data_
   std::string name_;             // dotted path, for messages
   std::shared_ptr<std::vector<std::string>> asked_;
+};
+
+/// One entry of a list that holds texts and objects.
+struct Entry {
+  std::string text;              // empty for an object
+  std::optional<Object> object;  // none for a text
+  std::string place;             // "file:line"
 };
 
 /// A parsed document.
