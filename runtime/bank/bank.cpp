@@ -11,6 +11,27 @@ namespace carillon::bank {
 
 double Bank::freq_hz(std::size_t mode) const { return std::sqrt(eigenvalue_rad2_s2[mode]) / (2.0 * std::numbers::pi); }
 
+double calc_decay(const Damping& damping, const Material& material, double eigenvalue_rad2_s2) {
+  const double omega = std::sqrt(eigenvalue_rad2_s2);
+  if (damping.law == "internal_friction") return damping.coefficient[0] * omega / 2.0;
+  if (damping.law == "caughey") {
+    double c = 0.0;
+    for (std::size_t j = 0; j < damping.power.size(); ++j) c += damping.coefficient[j] * std::pow(eigenvalue_rad2_s2, damping.power[j]);
+    return c / 2.0;
+  }
+  if (damping.law == "loss_table") {
+    const auto& freq = damping.freq_hz;
+    const auto& eta = damping.loss_factor;
+    const double f = omega / (2.0 * std::numbers::pi);
+    const auto above = static_cast<std::size_t>(std::upper_bound(freq.begin(), freq.end(), f) - freq.begin());
+    if (above == 0) return eta.front() * omega / 2.0;
+    if (above == freq.size()) return eta.back() * omega / 2.0;
+    const double part = std::log(f / freq[above - 1]) / std::log(freq[above] / freq[above - 1]);
+    return std::lerp(eta[above - 1], eta[above], part) * omega / 2.0;
+  }
+  return (material.alpha1_s * eigenvalue_rad2_s2 + material.alpha2_per_s) / 2.0;
+}
+
 void quantise_shapes(Bank& bank, std::span<const double> shapes) {
   const std::size_t modes = bank.mode_count();
   const std::size_t row = 3 * modes;

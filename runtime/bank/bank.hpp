@@ -45,16 +45,21 @@ struct Material {
 
 /// How the decays came about, by name and numbers. d in 1/s, lambda = omega^2, f = omega / 2 pi:
 ///   "rayleigh"           d = (alpha1 lambda + alpha2) / 2, with the alphas of Material; no numbers here
-///   "internal_friction"  d = coefficient[0] omega / 2: the loss tangent (vdDP96)
-///   "caughey"            d = sum of coefficient[k] lambda^k / 2, k = 0, 1, ...; coefficient[k] in s^(2k-1)
-///   "table"              d = loss(f) omega / 2, loss linear in log f between freq_hz[] and constant beyond them
-///   "mixed"              several materials, weighed by their energies in each mode: decays are only checked for their sign
+///   "internal_friction"  d = coefficient[0] omega / 2, where the coefficient is tan(phi) (vdDP96)
+///   "caughey"            d = sum of coefficient[j] lambda^power[j] / 2 (Caughey 1960), coefficients in s^(2 power - 1)
+///   "loss_table"         d = eta(f) omega / 2, loss_factor[] interpolated linearly in log f and constant beyond the ends of freq_hz[]
+///   "mixed"              several materials, weighed by their energies in each mode: no numbers here, decays are only checked for their
+///   sign
 struct Damping {
   std::string law = "rayleigh";
   std::vector<double> coefficient;
-  std::vector<double> freq_hz;  // (n), ascending
-  std::vector<double> loss;     // (n), loss factor
+  std::vector<double> power;
+  std::vector<double> freq_hz;  // ascending
+  std::vector<double> loss_factor;
 };
+
+/// The decay [1/s] of a mode by the bank's law, for any law but "mixed". The numbers have passed calc_checks().
+double calc_decay(const Damping& damping, const Material& material, double eigenvalue_rad2_s2);
 
 /// Why no mode of the band is missing. The inertia of K - sigma M counts the eigenvalues below sigma exactly (Sylvester's law); at both
 /// ends of the band and at cuts inside it the counts have to agree with the modes that were found. C cuts, P connected components.

@@ -13,6 +13,7 @@
 #include <numeric>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/faults.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -20,23 +21,6 @@ namespace {
 constexpr double kResidualLimit = 1e-4;
 constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by the same formula
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
-
-/// The first three faults in full, the others counted.
-class Faults {
- public:
-  template <class... Values>
-  void add(fmt::format_string<Values...> text, Values&&... values) {
-    if (++count_ <= 3) told_.push_back(fmt::format(text, std::forward<Values>(values)...));
-  }
-  std::vector<std::string> take() {
-    if (count_ > 3) told_.back() += fmt::format(" (and {} more)", count_ - 3);
-    return std::move(told_);
-  }
-
- private:
-  std::vector<std::string> told_;
-  std::size_t count_ = 0;
-};
 
 Check check_arrays(const Bank& bank) {
   Faults faults;
@@ -49,6 +33,10 @@ Check check_arrays(const Bank& bank) {
   expect("residual", bank.residual.size(), modes);
   expect("radiation_gain", bank.radiation_gain.size(), modes);
   expect("shape_scale", bank.shape_scale.size(), modes);
+  for (const auto& [name, cents] : {std::pair("algebraic_error_cents", &bank.algebraic_error_cents),
+                                    std::pair("discretisation_error_cents", &bank.discretisation_error_cents)}) {
+    if (!cents->empty()) expect(name, cents->size(), modes);
+  }
   expect("shape", bank.shape.size(), vertices * modes * 3);
   if (vertices < 4 || bank.triangles.size() < 4) {
     faults.add("the surface has {} vertices and {} triangles; a solid has at least four of each", vertices, bank.triangles.size());
@@ -84,6 +72,19 @@ Check check_numbers(const Bank& bank) {
   look("density_kg_m3", &material.density_kg_m3, 1);
   look("alpha1_s", &material.alpha1_s, 1);
   look("alpha2_per_s", &material.alpha2_per_s, 1);
+  const auto look_all = [&](const char* name, const std::vector<double>& values) { look(name, values.data(), values.size()); };
+  look_all("algebraic_error_cents", bank.algebraic_error_cents);
+  look_all("discretisation_error_cents", bank.discretisation_error_cents);
+  look_all("damping/coefficient", bank.damping.coefficient);
+  look_all("damping/power", bank.damping.power);
+  look_all("damping/freq_hz", bank.damping.freq_hz);
+  look_all("damping/loss_factor", bank.damping.loss_factor);
+  if (bank.proof) {
+    look_all("proof/cut_hz", bank.proof->cut_hz);
+    look_all("proof/margin", bank.proof->margin);
+    look("proof/orthonormality", &bank.proof->orthonormality, 1);
+    look("proof/backward_error", &bank.proof->backward_error, 1);
+  }
   return {"numbers", fmt::format("{} looked at", count), faults.take()};
 }
 
@@ -113,17 +114,39 @@ Check check_band(const Bank& bank) {
           faults.take()};
 }
 
+/// What is wrong with the constants of the law.
+void check_law(const Bank& bank, Faults& faults) {
+  const Damping& law = bank.damping;
+  const auto expect = [&](bool is_so, const char* what) {
+    if (!is_so) faults.add("the damping law {} has {}", law.law, what);
+  };
+  const bool is_caughey = law.law == "caughey", is_friction = law.law == "internal_friction", is_table = law.law == "loss_table";
+  if (!is_caughey && !is_friction && !is_table && law.law != "rayleigh" && law.law != "mixed")
+    return faults.add("the damping law \"{}\" is none that is known", law.law);
+  expect(!is_caughey || !law.coefficient.empty(), "no terms");
+  expect(law.coefficient.size() == (is_friction ? 1 : is_caughey ? law.power.size() : 0), "not as many coefficients as it takes");
+  expect(is_caughey || law.power.empty(), "powers, which it does not use");
+  expect(law.freq_hz.size() == law.loss_factor.size() && is_table == !law.freq_hz.empty(), "no table, or one that it does not use");
+  expect(std::is_sorted(law.freq_hz.begin(), law.freq_hz.end(), std::less_equal<>()), "a table that does not ascend");
+  expect(law.freq_hz.empty() || law.freq_hz[0] > 0.0, "a table that does not begin above 0 Hz");
+}
+
 Check check_decay(const Bank& bank) {
   Faults faults;
+  check_law(bank, faults);
+  const bool has_law = bank.damping.law != "mixed" && faults.empty();
   double worst = 0.0;
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
-    const double law = (bank.material.alpha1_s * bank.eigenvalue_rad2_s2[i] + bank.material.alpha2_per_s) / 2.0;
     const double d = bank.decay_per_s[i];
     if (!(d >= 0.0)) faults.add("decay[{}] is {:.6g} 1/s, negative", i, d);
+    if (!has_law) continue;
+    const double law = calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[i]);
     if (!(std::abs(d - law) <= kLawTolerance * law)) faults.add("decay[{}] is {:.9g} 1/s, and the damping law gives {:.9g}", i, d, law);
     if (law > 0.0) worst = std::max(worst, std::abs(d / law - 1.0));
   }
-  return {"damping", fmt::format("agrees with (alpha1 lambda + alpha2) / 2 to {:.1e}", worst), faults.take()};
+  return {"damping",
+          has_law ? fmt::format("law {}, to {:.1e}", bank.damping.law, worst) : std::string("several materials, decays not negative"),
+          faults.take()};
 }
 
 Check check_residuals(const Bank& bank) {
@@ -305,6 +328,8 @@ std::vector<Check> calc_checks(const Bank& bank) {
                            check_surface, check_rigid_body, check_material, check_solve}) {
     checks.push_back(check(bank));
   }
+  checks.push_back(check_error_bars(bank));
+  for (Check& check : check_proof(bank)) checks.push_back(std::move(check));
   return checks;
 }
 

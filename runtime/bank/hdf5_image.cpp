@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <set>
 
 namespace carillon::bank {
 namespace {
@@ -246,7 +247,13 @@ Hdf5Image make_hdf5_image(const Bank& bank, const std::vector<Field>& fields) {
   const hid_t file = H5Fcreate("bank", H5F_ACC_TRUNC, creation, access);
   if (file < 0) throw SystemError("HDF5 cannot make a file in memory");
   try {
-    for (const char* group : {"mesh", "modes", "rigid", "material", "solve"}) make_group(file, group);
+    std::set<std::string> groups;
+    for (const Field& field : fields) {
+      const auto slash = field.name.find('/');
+      if (slash != std::string::npos && groups.insert(field.name.substr(0, slash)).second) {
+        make_group(file, field.name.substr(0, slash).c_str());
+      }
+    }
     for (const Field& field : fields) image.extents.emplace(field.name, write_field(file, field));
     write_vtk_views(file, bank);
     const Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose, "the root");

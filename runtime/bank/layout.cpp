@@ -11,7 +11,49 @@ static_assert(std::endian::native == std::endian::little,
 static_assert(sizeof(Vec3) == 24 && sizeof(std::array<std::int32_t, 3>) == 12, "Rows of three must lie without gaps.");
 
 namespace {
+
 std::string text_type(const std::string& text) { return "|S" + std::to_string(text.size()); }
+
+template <class Vector>
+std::vector<std::uint64_t> find_shape(const Vector& values) {
+  return {values.size()};
+}
+
+/// What came with version 1.1.
+void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
+  const auto add_errors = [&](const char* name, const char* meaning, const std::vector<double>& cents) {
+    if (!cents.empty()) fields.push_back({name, "<f8", find_shape(cents), "cent", meaning, cents.data()});
+  };
+  add_errors("modes/algebraic_error_cents", "bound: the exact mode of the mesh is no further", bank.algebraic_error_cents);
+  add_errors("modes/discretisation_error_cents", "estimate: the mode of the body is no further", bank.discretisation_error_cents);
+  if (!form.damping_law.empty()) {
+    const Damping& damping = bank.damping;
+    fields.push_back({"damping/law", text_type(form.damping_law), {}, "1", "how the decays came about", form.damping_law.data()});
+    fields.push_back({"damping/coefficient", "<f8", find_shape(damping.coefficient), "s^(2 power - 1); 1 for internal friction",
+                      "constants of the law", damping.coefficient.data()});
+    fields.push_back({"damping/power", "<f8", find_shape(damping.power), "1", "of lambda, a Caughey series", damping.power.data()});
+    fields.push_back({"damping/freq_hz", "<f8", find_shape(damping.freq_hz), "Hz", "of the table", damping.freq_hz.data()});
+    fields.push_back({"damping/loss_factor", "<f8", find_shape(damping.loss_factor), "1", "of the table", damping.loss_factor.data()});
+  }
+  if (!form.regions.empty())
+    fields.push_back({"material/regions", text_type(form.regions), {}, "1", "JSON text: materials by region", form.regions.data()});
+  if (!bank.proof) return;
+  const Proof& proof = *bank.proof;
+  const auto& rigid = proof.rigid_per_component;
+  fields.insert(
+      fields.end(),
+      {{"proof/cut_hz", "<f8", find_shape(proof.cut_hz), "Hz", "where eigenvalues were counted", proof.cut_hz.data()},
+       {"proof/below", "<i8", find_shape(proof.below), "1", "eigenvalues below the cut, by inertia", proof.below.data()},
+       {"proof/margin", "<f8", find_shape(proof.margin), "1", "relative distance in lambda to the nearest mode", proof.margin.data()},
+       {"proof/rigid_per_component", "<i8", find_shape(rigid), "1", "rigid motions of each component", rigid.data()},
+       {"proof/found", "<i8", {}, "1", "modes found between the first and the last cut", &proof.found},
+       {"proof/orthonormality", "<f8", {}, "1", "max |phi_i^T M phi_j - delta_ij|", &proof.orthonormality},
+       {"proof/backward_error", "<f8", {}, "1", "of the worst factorisation", &proof.backward_error},
+       {"proof/cluster_first", "<i8", find_shape(proof.cluster_first), "1", "first of a group of equal modes", proof.cluster_first.data()},
+       {"proof/cluster_count", "<i8", find_shape(proof.cluster_count), "1", "modes of the group", proof.cluster_count.data()},
+       {"proof/method", text_type(form.proof_method), {}, "1", "how it was counted", form.proof_method.data()}});
+}
+
 }  // namespace
 
 std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
@@ -21,7 +63,7 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   const RigidBody& rigid = bank.rigid;
   const Material& material = bank.material;
   const Counts& counts = bank.counts;
-  return {
+  std::vector<Field> fields{
       {"mesh/vertices", "<f8", {vertices, 3}, "m", "surface vertices", bank.vertices_m.data()},
       {"mesh/triangles", "<i4", {triangles, 3}, "1", "vertices of a triangle, counter-clockwise from outside", bank.triangles.data()},
       {"modes/eigenvalue", "<f8", {modes}, "rad^2/s^2", "lambda = omega^2, ascending", bank.eigenvalue_rad2_s2.data()},
@@ -50,6 +92,8 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
       {"solve/mass", text_type(form.mass), {}, "1", "consistent or lumped", form.mass.data()},
       {"provenance", text_type(form.provenance), {}, "1", "JSON text", form.provenance.data()},
   };
+  add_later_fields(bank, form, fields);
+  return fields;
 }
 
 std::uint64_t find_item_bytes(const std::string& dtype) {

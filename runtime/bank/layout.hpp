@@ -23,14 +23,18 @@ struct Field {
 struct FileForm {
   std::vector<double> freq_hz;  // (m), sqrt(lambda) / 2 pi: for readers who want no arithmetic
   std::uint8_t complete = 1;    // Bank::complete
-  // Texts of Bank, at least one byte long, perhaps padded with NUL.
+  // Texts of Bank, at least one byte long, perhaps padded with NUL; empty where the file has none.
   std::string element;
   std::string mass;
   std::string provenance;
+  std::string damping_law;   // since 1.1
+  std::string regions;       // since 1.1, perhaps absent
+  std::string proof_method;  // since 1.1, absent without a proof
 };
 
-/// The arrays of `bank` and `form` in the order of docs/bank-format.md. The sizes are those of the members at the time of the call, and
-/// `data` points into them (`bank` and `form` must outlive the table).
+/// The arrays of `bank` and `form` in the order of docs/bank-format.md; those that are not there (no proof, no error bars, a file of
+/// version 1.0) are left out. The sizes are those of the members at the time of the call, and `data` points into them (`bank` and `form`
+/// must outlive the table).
 std::vector<Field> list_fields(const Bank& bank, const FileForm& form);
 
 /// Bytes of one value of `dtype`; 0 when it is none that banks use.

@@ -21,6 +21,7 @@ void check(const std::string& file) {
   fmt::print("ok      {:<12} {}, known to this program\n", "version", fmt::join(bank::read_version(file), "."));
   std::size_t faults = 0;
   std::vector<bank::Check> checks = bank::calc_checks(bank);
+  checks.push_back(bank::calc_regions_check(bank));
   checks.push_back(bank::calc_provenance_check(bank));
   for (const bank::Check& check : checks) {
     fmt::print("{}", bank::format_check(check));
@@ -28,7 +29,7 @@ void check(const std::string& file) {
   }
   std::fflush(stdout);
   if (faults > 0) throw InputError(fmt::format("{}: {} fault{}; compute the bank again", file, faults, faults == 1 ? "" : "s"));
-  fmt::print("{}: whole and sane\n", file);
+  fmt::print("{}\n{}\n{}: whole and sane\n", bank::format_completeness(bank), bank::format_accuracy(bank), file);
 }
 
 int run(int argc, char** argv) {

@@ -109,6 +109,44 @@ struct Loaded {
   FileForm form;
 };
 
+/// True when the file has any array of the group.
+bool has_group(const Seal& seal, const std::string& group) {
+  const auto first = seal.extents.lower_bound(group + "/");
+  return first != seal.extents.end() && first->first.starts_with(group + "/");
+}
+
+/// The same for what came with version 1.1; what is not there stays as Bank's initialisers have it.
+template <class MakeText>
+void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, const MakeText& make_text) {
+  const auto make_list = [&](const char* field, const char* dtype, auto& values) {
+    const std::uint64_t rows = get_rows(seal, field, name);
+    check_extent({field, dtype, {rows}, "", "", nullptr}, get_extent(seal, field, name), name);
+    values.resize(rows);
+  };
+  Bank& bank = loaded.bank;
+  for (auto [field, cents] : {std::pair("modes/algebraic_error_cents", &bank.algebraic_error_cents),
+                              std::pair("modes/discretisation_error_cents", &bank.discretisation_error_cents)}) {
+    if (seal.extents.contains(field)) make_list(field, "<f8", *cents);
+  }
+  if (has_group(seal, "damping")) {
+    make_text("damping/law", loaded.form.damping_law);
+    make_list("damping/coefficient", "<f8", bank.damping.coefficient);
+    make_list("damping/power", "<f8", bank.damping.power);
+    make_list("damping/freq_hz", "<f8", bank.damping.freq_hz);
+    make_list("damping/loss_factor", "<f8", bank.damping.loss_factor);
+  }
+  if (seal.extents.contains("material/regions")) make_text("material/regions", loaded.form.regions);
+  if (!has_group(seal, "proof")) return;
+  Proof& proof = bank.proof.emplace();
+  make_list("proof/cut_hz", "<f8", proof.cut_hz);
+  make_list("proof/below", "<i8", proof.below);
+  make_list("proof/margin", "<f8", proof.margin);
+  make_list("proof/rigid_per_component", "<i8", proof.rigid_per_component);
+  make_list("proof/cluster_first", "<i8", proof.cluster_first);
+  make_list("proof/cluster_count", "<i8", proof.cluster_count);
+  make_text("proof/method", loaded.form.proof_method);
+}
+
 /// Gives the arrays the sizes that the seal tells. The seal bounds their sum by the length of the file.
 void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   Bank& bank = loaded.bank;
@@ -144,6 +182,7 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   make_text("solve/element", form.element);
   make_text("solve/mass", form.mass);
   make_text("provenance", form.provenance);
+  allocate_later(seal, name, loaded, make_text);
 }
 
 std::string trim(std::string_view text) {
@@ -194,6 +233,9 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   bank.element = trim(form.element);
   bank.mass = trim(form.mass);
   bank.provenance = trim(form.provenance);
+  if (!form.damping_law.empty()) bank.damping.law = trim(form.damping_law);
+  bank.regions = trim(form.regions);
+  if (bank.proof) bank.proof->method = trim(form.proof_method);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);
     const bool agrees = std::abs(form.freq_hz[i] - freq_hz) <= 1e-9 * std::abs(freq_hz);

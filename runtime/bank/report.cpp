@@ -11,8 +11,8 @@
 namespace carillon::bank {
 namespace {
 
-/// The provenance as JSON; nothing when it is none (it is free text as far as a reader of banks is concerned).
-std::optional<Json::Value> parse_provenance(const std::string& text) {
+/// A text of the bank as JSON; nothing when it is none (it is free text as far as a reader of banks is concerned).
+std::optional<Json::Value> parse_json(const std::string& text) {
   Json::CharReaderBuilder builder;
   builder["stackLimit"] = 64;
   std::istringstream stream(text);
@@ -88,19 +88,44 @@ void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) 
   }
 }
 
+/// "0.012", or "-" where the bank does not tell.
+std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
+  return mode < cents.size() ? fmt::format("{:.2g}", cents[mode]) : "-";
+}
+
 std::string format_modes(const Bank& bank, std::size_t limit) {
-  std::string text = fmt::format("\n{:>5} {:>11} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "freq [Hz]", "decay [1/s]", "T60 [s]",
-                                 "d/omega", "regime", "residual", "gain");
+  std::string text = fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "freq [Hz]", "+-mesh",
+                                 "+-body", "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain");
   const std::size_t shown = std::min(limit, bank.mode_count());
   for (std::size_t i = 0; i < shown; ++i) {
     const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
-    text += fmt::format("{:>5} {:>11.2f} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1, bank.freq_hz(i), decay,
+    text += fmt::format("{:>5} {:>11.2f} {:>9} {:>9} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1, bank.freq_hz(i),
+                        format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i), decay,
                         calc_t60_s(decay), decay / omega, find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i]);
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
-  text += "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
+  text +=
+      "+-mesh: cents to the exact mode of the mesh, a bound; +-body: cents to the mode of the body, an estimate\n"
+      "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
   return text;
+}
+
+/// "rayleigh: alpha1 1e-07 s, alpha2 5 1/s"
+std::string format_damping(const Bank& bank) {
+  const Damping& law = bank.damping;
+  std::string text = calc_printable(law.law);
+  if (law.law == "rayleigh")
+    return text + fmt::format(", alpha1 {:.4g} s, alpha2 {:.4g} 1/s", bank.material.alpha1_s, bank.material.alpha2_per_s);
+  if (law.law == "internal_friction") return text + fmt::format(", tan(phi) {:.4g}", law.coefficient[0]);
+  if (law.law == "caughey") {
+    for (std::size_t j = 0; j < std::min<std::size_t>(law.power.size(), 6); ++j)
+      text += fmt::format("{}{:.4g} lambda^{:g}", j == 0 ? ", c = " : " + ", law.coefficient[j], law.power[j]);
+    return text + (law.power.size() > 6 ? " + ..." : "");
+  }
+  if (law.law == "loss_table")
+    return text + fmt::format(", {} rows from {:g} Hz to {:g} Hz", law.freq_hz.size(), law.freq_hz.front(), law.freq_hz.back());
+  return text + ", weighed by each material's part of the energies";
 }
 
 template <class Range>
@@ -121,12 +146,77 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
   mode["damping_ratio"] = decay / omega;
   mode["regime"] = find_regime(decay, omega);
   mode["residual"] = bank.residual[i];
+  const auto get_cents = [&](const std::vector<double>& cents) { return i < cents.size() ? Json::Value(cents[i]) : Json::Value(); };
+  mode["algebraic_error_cents"] = get_cents(bank.algebraic_error_cents);
+  mode["discretisation_error_cents"] = get_cents(bank.discretisation_error_cents);
   mode["radiation_gain"] = bank.radiation_gain[i];
   mode["shape_scale"] = bank.shape_scale[i];
   return mode;
 }
 
+Json::Value make_damping(const Bank& bank) {
+  const Damping& law = bank.damping;
+  Json::Value damping;
+  damping["law"] = law.law;
+  if (law.law == "rayleigh") {
+    damping["rayleigh"]["alpha1_s"] = bank.material.alpha1_s;
+    damping["rayleigh"]["alpha2_per_s"] = bank.material.alpha2_per_s;
+  }
+  if (!law.coefficient.empty()) damping["coefficient"] = make_list(law.coefficient);
+  if (!law.power.empty()) damping["power"] = make_list(law.power);
+  if (!law.freq_hz.empty()) {
+    damping["freq_hz"] = make_list(law.freq_hz);
+    damping["loss_factor"] = make_list(law.loss_factor);
+  }
+  return damping;
+}
+
+Json::Value make_counts(const std::vector<std::int64_t>& counts) {
+  Json::Value list(Json::arrayValue);
+  for (const std::int64_t count : counts) list.append(Json::Int64(count));
+  return list;
+}
+
+Json::Value make_proof(const Proof& proof) {
+  Json::Value value;
+  value["cut_hz"] = make_list(proof.cut_hz);
+  value["below"] = make_counts(proof.below);
+  value["margin"] = make_list(proof.margin);
+  value["rigid_per_component"] = make_counts(proof.rigid_per_component);
+  value["found"] = Json::Int64(proof.found);
+  value["orthonormality"] = proof.orthonormality;
+  value["backward_error"] = proof.backward_error;
+  value["cluster_first"] = make_counts(proof.cluster_first);
+  value["cluster_count"] = make_counts(proof.cluster_count);
+  value["method"] = proof.method;
+  return value;
+}
+
 }  // namespace
+
+std::string format_completeness(const Bank& bank) {
+  const auto modes = bank.mode_count();
+  const auto [low, high] = bank.band_hz;
+  if (!bank.proof) return fmt::format("none: nothing shows that the band holds no more than these {} modes", modes);
+  const Proof& proof = *bank.proof;
+  const std::int64_t counted = proof.below.back() - proof.below.front();
+  std::string text = bank.complete ? fmt::format("{} modes in {:g} .. {:g} Hz and no more", modes, low, high)
+                                   : fmt::format("the lowest {} of {} modes in {:g} .. {:g} Hz", modes, counted, low, high);
+  std::int64_t rigid = 0;
+  for (const std::int64_t count : proof.rigid_per_component) rigid += count;
+  text += fmt::format(": {} below {:.6g} Hz and {} below {:.6g} Hz by inertia, {} rigid", proof.below.front(), proof.cut_hz.front(),
+                      proof.below.back(), proof.cut_hz.back(), rigid);
+  return text;
+}
+
+std::string format_accuracy(const Bank& bank) {
+  const auto find_worst = [](const std::vector<double>& cents) { return *std::max_element(cents.begin(), cents.end()); };
+  const auto tell = [&](const std::vector<double>& cents, const char* known, const char* unknown) {
+    return cents.empty() ? std::string(unknown) : fmt::format("{} {:.2g} cent", known, find_worst(cents));
+  };
+  return tell(bank.algebraic_error_cents, "frequencies are those of the mesh to", "no bounds against the mesh") +
+         tell(bank.discretisation_error_cents, " (a bound) and those of the body to about", ", no estimates against the body");
+}
 
 std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit) {
   const auto [major, minor] = read_version(file);
@@ -143,14 +233,16 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,
                       bank.mass, bank.counts.nodes, bank.counts.tets, bank.counts.components, bank.counts.components == 1 ? "" : "s",
                       bank.counts.rigid_modes);
-  text += fmt::format("material  E {:.5g} Pa, nu {:.4g}, rho {:.5g} kg/m^3; alpha1 {:.4g} s, alpha2 {:.4g} 1/s\n", m.young_modulus_pa,
-                      m.poisson_ratio, m.density_kg_m3, m.alpha1_s, m.alpha2_per_s);
+  text += fmt::format("proof     {}\naccuracy  {}\n", format_completeness(bank), format_accuracy(bank));
+  text += fmt::format("material  E {:.5g} Pa, nu {:.4g}, rho {:.5g} kg/m^3{}\n", m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3,
+                      bank.regions.empty() ? "" : " (of the whole; several materials: --json)");
+  text += fmt::format("damping   {}\n", format_damping(bank));
   text += fmt::format("rigid     {:.6g} kg, {:.6g} m^3, centre ({:.5g}, {:.5g}, {:.5g}) m\n", rigid.mass_kg, rigid.volume_m3,
                       rigid.centre_m[0], rigid.centre_m[1], rigid.centre_m[2]);
   text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
                       inertia[8], inertia[1], inertia[2], inertia[5]);
   if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, mode_limit);
-  const std::optional<Json::Value> provenance = parse_provenance(bank.provenance);
+  const std::optional<Json::Value> provenance = parse_json(bank.provenance);
   // The record of the run; the job around it is left to --json.
   if (provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject()) {
     text += "\nprovenance (the whole job: --json)\n";
@@ -186,15 +278,17 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   material["young_modulus_pa"] = bank.material.young_modulus_pa;
   material["poisson_ratio"] = bank.material.poisson_ratio;
   material["density_kg_m3"] = bank.material.density_kg_m3;
-  material["damping"]["rayleigh"]["alpha1_s"] = bank.material.alpha1_s;
-  material["damping"]["rayleigh"]["alpha2_per_s"] = bank.material.alpha2_per_s;
+  material["damping"] = make_damping(bank);
+  if (const auto regions = parse_json(bank.regions); !bank.regions.empty())
+    material["regions"] = regions ? *regions : Json::Value(bank.regions);
+  root["proof"] = bank.proof ? make_proof(*bank.proof) : Json::Value();
   root["frequencies_hz"] = Json::Value(Json::arrayValue);
   root["modes"] = Json::Value(Json::arrayValue);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     root["frequencies_hz"].append(bank.freq_hz(i));
     root["modes"].append(make_mode(bank, i));
   }
-  const auto provenance = parse_provenance(bank.provenance);
+  const auto provenance = parse_json(bank.provenance);
   root["provenance"] = provenance ? *provenance : Json::Value(bank.provenance);
 
   Json::StreamWriterBuilder builder;
@@ -203,11 +297,23 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   return Json::writeString(builder, root) + "\n";
 }
 
+Check calc_regions_check(const Bank& bank) {
+  Check check{"materials", "one", {}};
+  if (bank.regions.empty()) return check;
+  const std::optional<Json::Value> regions = parse_json(bank.regions);
+  if (!regions || !regions->isArray()) {
+    check.faults.push_back("material/regions is no JSON list");
+  } else {
+    check.figure = fmt::format("{} by region of the mesh", regions->size());
+  }
+  return check;
+}
+
 Check calc_provenance_check(const Bank& bank) {
   Check check{"provenance", fmt::format("{} bytes of JSON", bank.provenance.size()), {}};
   if (bank.provenance.empty()) {
     check.figure = "none given";
-  } else if (!parse_provenance(bank.provenance)) {
+  } else if (!parse_json(bank.provenance)) {
     check.faults.push_back("provenance is not JSON text");
   }
   return check;

@@ -51,6 +51,9 @@ void write_bank(const Bank& bank, const fs::path& file) {
   form.element = pad_text(bank.element);
   form.mass = pad_text(bank.mass);
   form.provenance = pad_text(bank.provenance);
+  form.damping_law = pad_text(bank.damping.law);
+  form.regions = bank.regions;
+  if (bank.proof) form.proof_method = pad_text(bank.proof->method);
 
   const Hdf5Image image = make_hdf5_image(bank, list_fields(bank, form));
   const std::span<std::byte> bytes = image.bytes;

@@ -85,7 +85,7 @@ def check_doc(folder):
     # A stranger's own bank: every array copied by h5py into a new file of his.
     other = f"{folder}/stranger.hdf"
     with h5py.File(path) as bank, h5py.File(other, "w", userblock_size=4096) as copy:
-        copy.attrs["version"] = "1.0"
+        copy.attrs["version"] = "1.1"
         for name, item in datasets_of(bank):
             copy[name] = item[()]
     run_snippet("seal_bank.py", other)
@@ -198,6 +198,18 @@ BAD = [
     ("rigid modes of nobody", put("solve/rigid_modes", 2**62), "rigid modes of 1 components"),
     ("provenance of numbers", replace("provenance", lambda p: np.arange(3.0)), "provenance is not text"),
     ("long element", replace("solve/element", lambda e: np.bytes_(b"T" * 17)), "neither T4 nor T10"),
+    ("proof of one array", lambda bank: bank.__delitem__("proof/below"), "the array proof/below is missing"),
+    ("proof without a cut", lambda bank: bank.__delitem__("proof/cut_hz"), "the array proof/cut_hz is missing"),
+    ("a mode is missing", put("proof/below", at(2, 12)), "modes lie between 7000 and 20000 Hz by the counts, and the bank holds"),
+    ("counts of a matrix", replace("proof/below", lambda b: b.reshape(3, 1)), "proof/below is <i8 (3, 1), and <i8 (3) is wanted"),
+    ("counts without end", put("proof/below", at(2, 2**63 - 1)), "modes lie between 7000 and 20000 Hz"),
+    ("negative counts", put("proof/below", at(0, -(2**63))), "counts cannot fall"),
+    ("found another number", put("proof/found", 2**62), "modes were found"),
+    ("error bars of other modes", replace("modes/algebraic_error_cents", lambda e: e[:-1]), "algebraic_error_cents holds 4 values"),
+    ("negative error bar", put("modes/discretisation_error_cents", at(0, -1.0)), "discretisation_error_cents[0] is -1, negative"),
+    ("law of numbers", replace("damping/law", lambda p: np.arange(3.0)), "damping/law is not text"),
+    ("unknown law", replace("damping/law", lambda p: np.bytes_(b"magic")), "none that is known"),
+    ("law without numbers", lambda bank: bank.__delitem__("damping/power"), "the array damping/power is missing"),
     ("chunked shape", lambda bank: recreate_chunked(bank, "modes/shape"), "gives an array that cannot be in this file"),
 ]
 
@@ -242,6 +254,7 @@ def check_program(folder):
         for k, mode in enumerate(info["modes"]):
             # To the last bit: 17 digits.
             assert mode["eigenvalue_rad2_s2"] == bank["modes/eigenvalue"][k] and mode["decay_per_s"] == bank["modes/decay"][k]
+            assert mode["algebraic_error_cents"] == bank["modes/algebraic_error_cents"][k]
             assert mode["residual"] == bank["modes/residual"][k] and mode["radiation_gain"] == bank["modes/radiation_gain"][k]
             assert np.isclose(mode["frequency_hz"], bank["modes/frequency_hz"][k], rtol=1e-14)
             assert np.isclose(mode["t60_s"], np.log(1000) / bank["modes/decay"][k], rtol=1e-12) and mode["regime"] == "under"
@@ -250,10 +263,14 @@ def check_program(folder):
     assert info["provenance"]["run"]["stations"][1]["seconds"] == 12.25 and info["bytes"] == os.path.getsize(path)
 
     page = bank_program("info", "--modes", "3", path).stdout
-    assert max(map(len, page.splitlines())) <= 140 and "574.44" in page and "27 more" in page and "solve: peak_bytes_largest_rank 900.00 MB, seconds 12.25" in page, page
+    assert max(map(len, page.splitlines())) <= 140 and "574.44" in page and "27 more" in page and "+-body" in page and "solve: peak_bytes_largest_rank 900.00 MB, seconds 12.25" in page, page
     check = bank_program("check", path)
     assert check.returncode == 0 and check.stderr == ""
-    for words in ("seal", "version", "arrays", "worst 3.00e-09", "closed, outward", "ascending from 574.44", "20 to 20000 Hz", "whole and sane"):
+    done = bank_program("check", f"{os.environ['CARILLON_SOURCE_DIR']}/tests/bank/pinned/version_1_0.hdf")
+    assert done.returncode == 0 and "nothing shows that the band holds no more than these 2 modes" in done.stdout, done
+    for words in ("30 modes in 20 .. 20000 Hz and no more: 6 below 20 Hz and 36 below 20000 Hz by inertia, 6 rigid", "36 - 6 = 30 modes, all of them found",
+                  "6 of the one component, and nothing else below", "phi_i^T M phi_j = delta_ij to 2.0e-13", "discretisation at most 30 cent",
+                  "seal", "version", "arrays", "worst 3.00e-09", "closed, outward", "ascending from 574.44", "20 to 20000 Hz", "whole and sane"):
         assert words in check.stdout, words
 
     # Over-damped and undamped modes, and provenance that is no JSON or hostile to a terminal.

@@ -73,6 +73,17 @@ TEST(Faults, ASaneBankHasNone) {
   EXPECT_EQ(find_faults(example::make_bank(5, 40)), std::vector<std::string>{});
 }
 
+TEST(Faults, ABankWithoutProofOrCutByMaxModesHasNone) {
+  EXPECT_EQ(find_faults(example::make_first_bank(2, 5)), std::vector<std::string>{});
+  Bank bank = example::make_bank(2, 5);
+  bank.complete = false;
+  bank.proof->below[2] = 300;
+  bank.proof->found = 8;
+  EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
+  bank.proof->below[1] += 1;  // below the last mode nothing may be missing
+  EXPECT_FALSE(find_faults(bank).empty());
+}
+
 TEST(Faults, AHollowBodyWithItsInnerSkinHasNone) {
   Bank bank = example::make_bank(2, 3);
   const std::vector<Vec3> outer = bank.vertices_m;
@@ -188,6 +199,97 @@ const Spoiled kSpoiled[] = {
        for (int k : {0, 4, 8}) b.rigid.inertia_kg_m2[k] += 1.0;
      },
      "too large for a surface"},
+    {"short_error", [](Bank& b) { b.algebraic_error_cents.pop_back(); }, "algebraic_error_cents holds 5 values"},
+    {"nan_error", [](Bank& b) { b.discretisation_error_cents[1] = kNan; }, "discretisation_error_cents[1] is nan"},
+    {"negative_error", [](Bank& b) { b.discretisation_error_cents[1] = -2; }, "discretisation_error_cents[1] is -2, negative"},
+    {"unknown_law", [](Bank& b) { b.damping.law = "wishful"; }, "\"wishful\" is none that is known"},
+    {"friction_without_angle", [](Bank& b) { b.damping.law = "internal_friction"; }, "not as many coefficients as it takes"},
+    {"other_friction",
+     [](Bank& b) {
+       b.damping.law = "internal_friction";
+       b.damping.coefficient = {0.01};
+     },
+     "the damping law gives"},
+    {"table_upside_down",
+     [](Bank& b) {
+       b.damping.law = "loss_table";
+       b.damping.freq_hz = {200, 100};
+       b.damping.loss_factor = {0.1, 0.1};
+     },
+     "a table that does not ascend"},
+    {"table_of_nothing", [](Bank& b) { b.damping.law = "loss_table"; }, "no table"},
+    {"negative_mixture",
+     [](Bank& b) {
+       b.damping.law = "mixed";
+       b.decay_per_s[3] = -1;
+     },
+     "decay[3] is -1 1/s, negative"},
+    {"a_mode_is_missing", [](Bank& b) { b.proof->below[2] += 1; }, "modes lie between 7000 and 20000 Hz by the counts, and the bank holds"},
+    {"a_mode_too_many", [](Bank& b) { b.proof->below[2] -= 1; }, "and the bank holds 3"},
+    {"a_mode_in_the_wrong_slice", [](Bank& b) { b.proof->below[1] += 1; },
+     "4 modes lie between 20 and 7000 Hz by the counts, and the bank holds 3"},
+    {"found_too_few", [](Bank& b) { b.proof->found = 5; }, "5 modes were found, 6 are here, and the counts give 12 - 6 = 6"},
+    {"counts_fall", [](Bank& b) { b.proof->below[1] = 5; }, "counts cannot fall"},
+    {"cuts_fall", [](Bank& b) { std::swap(b.proof->cut_hz[0], b.proof->cut_hz[1]); }, "is not above the one before"},
+    {"one_cut",
+     [](Bank& b) {
+       b.proof->cut_hz = {20};
+       b.proof->below = {6};
+       b.proof->margin = {1};
+     },
+     "two or more of each are wanted"},
+    {"counts_missing", [](Bank& b) { b.proof->below.pop_back(); }, "3 cuts, 2 counts and 3 margins"},
+    {"first_cut_inside", [](Bank& b) { b.proof->cut_hz[0] = 30; }, "the first cut at 30 Hz is inside the band"},
+    {"last_cut_inside", [](Bank& b) { b.proof->cut_hz[2] = 19000; }, "the last cut at 19000 Hz is inside the band"},
+    {"cut_through_a_mode",
+     [](Bank& b) {
+       b.algebraic_error_cents[2] = 1.0;
+       b.proof->cut_hz[1] = b.freq_hz(2) * 1.0001;  // 0.17 cent
+       b.proof->margin[1] = 1.0 - std::pow(b.freq_hz(2) / b.proof->cut_hz[1], 2);
+     },
+     "lies inside the error bar of mode 2"},
+    {"cut_through_a_residual",
+     [](Bank& b) {
+       b.algebraic_error_cents.clear();
+       b.residual[2] = 5e-5;
+       b.proof->cut_hz[1] = b.freq_hz(2) * (1.0 + 1e-5);
+       b.proof->margin[1] = 1.0 - std::pow(b.freq_hz(2) / b.proof->cut_hz[1], 2);
+     },
+     "lies inside the error bar of mode 2"},
+    {"wrong_margin", [](Bank& b) { b.proof->margin[1] *= 1.1; }, "margin[1] is"},
+    {"no_margin", [](Bank& b) { b.proof->margin[0] = 0.0; }, "margin[0] is 0"},
+    {"nan_margin", [](Bank& b) { b.proof->margin[2] = kNan; }, "proof/margin[2] is nan"},
+    {"rigid_of_another_body",
+     [](Bank& b) {
+       b.proof->rigid_per_component = {6, 6};
+     },
+     "told of 2 components, and there are 1"},
+    {"rigid_do_not_add_up", [](Bank& b) { b.proof->rigid_per_component = {5}; }, "5 rigid motions together, and 6 were deflated"},
+    {"rigid_not_counted",
+     [](Bank& b) {
+       for (auto& below : b.proof->below) below -= 1;
+     },
+     "5 eigenvalues below the band are fewer than 6 rigid motions"},
+    {"not_orthogonal", [](Bank& b) { b.proof->orthonormality = 1e-3; }, "some modes may be one mode twice"},
+    {"bad_factor", [](Bank& b) { b.proof->backward_error = 1e-5; }, "its counts are not sure"},
+    {"group_out_of_range",
+     [](Bank& b) {
+       b.proof->cluster_first = {5};
+       b.proof->cluster_count = {2};
+     },
+     "2 equal modes from mode 5 cannot be"},
+    {"group_overflows",
+     [](Bank& b) {
+       b.proof->cluster_first = {1};
+       b.proof->cluster_count = {std::numeric_limits<std::int64_t>::max()};
+     },
+     "equal modes from mode 1 cannot be"},
+    {"group_of_unequal_modes",
+     [](Bank& b) {
+       b.proof->cluster_first = {1};
+       b.proof->cluster_count = {2};
+     },
+     "spreads over"},
     {"no_stiffness", [](Bank& b) { b.material.young_modulus_pa = 0; }, "young_modulus_pa is 0"},
     {"incompressible", [](Bank& b) { b.material.poisson_ratio = 0.5; }, "poisson_ratio is 0.5"},
     {"negative_alpha", [](Bank& b) { b.material.alpha2_per_s = -5; }, "alpha2_per_s is -5"},

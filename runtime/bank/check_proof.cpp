@@ -1,0 +1,234 @@
+// Whether a bank's proof of completeness adds up, and its error bars.
+// Method: the number of eigenvalues below sigma is the number of negative pivots of K - sigma M = L D L^T. What the bank holds between two
+//   cuts must be the difference of their counts; a cut must not touch the error bar of a mode, or its count could go either way.
+// Source: Sylvester's law of inertia; Parlett 1998, The symmetric eigenvalue problem, section 3.3.
+// Deviations: the counts themselves cannot be taken again without K and M; they are believed as far as the factorisation's backward error
+//   is far below the distance to the nearest mode.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/bank/faults.hpp"
+
+namespace carillon::bank {
+namespace {
+
+constexpr double kOrthonormalityLimit = 1e-6;
+constexpr double kBackwardLimit = 1e-8;
+constexpr double kEdge = 1e-9;          // relative to a frequency: rounding of band_hz and cut_hz
+constexpr double kZeroFraction = 1e-5;  // of the band's upper end: frequencies below are zero to working precision
+constexpr double kMarginTolerance = 1e-6;
+constexpr double kClusterSpread = 1e-4;  // of lambda
+
+double calc_lambda(double freq_hz) {
+  const double omega = 2.0 * std::numbers::pi * freq_hz;
+  return omega * omega;
+}
+
+/// Number of the bank's modes below the cut.
+std::int64_t count_modes_below(const Bank& bank, double cut_hz) {
+  const auto& lambda = bank.eigenvalue_rad2_s2;
+  return std::lower_bound(lambda.begin(), lambda.end(), calc_lambda(cut_hz)) - lambda.begin();
+}
+
+/// How far the eigenvalue may be off, relative to itself: by its error bar, or by its residual where there is none.
+double calc_uncertainty(const Bank& bank, std::size_t mode) {
+  if (bank.algebraic_error_cents.empty()) return bank.residual[mode];
+  return std::exp2(bank.algebraic_error_cents[mode] / 600.0) - 1.0;
+}
+
+/// "6 + 6" of few, "6 each" of many alike.
+std::string describe_rigid(const std::vector<std::int64_t>& rigid) {
+  if (rigid.empty()) return "none";
+  if (std::equal(rigid.begin() + 1, rigid.end(), rigid.begin()))
+    return rigid.size() == 1 ? fmt::format("{} of the one component", rigid[0])
+                             : fmt::format("{} of each of {} components", rigid[0], rigid.size());
+  const auto shown = std::min<std::size_t>(rigid.size(), 12);
+  return fmt::format("{}{} of {} components", fmt::join(rigid.begin(), rigid.begin() + static_cast<std::ptrdiff_t>(shown), " + "),
+                     shown < rigid.size() ? " + ..." : "", rigid.size());
+}
+
+/// Sizes and order of the counts. The other checks need them.
+Check check_cuts(const Bank& bank, const Proof& proof) {
+  Faults faults;
+  const std::size_t cuts = proof.cut_hz.size();
+  if (cuts < 2 || proof.below.size() != cuts || proof.margin.size() != cuts) {
+    faults.add("the proof has {} cuts, {} counts and {} margins: two or more of each are wanted, as many of one as of the others", cuts,
+               proof.below.size(), proof.margin.size());
+    return {"counts", "", faults.take()};
+  }
+  for (std::size_t i = 0; i < cuts; ++i) {
+    if (!(proof.cut_hz[i] > (i == 0 ? 0.0 : proof.cut_hz[i - 1])))
+      faults.add("cut {} at {:.6g} Hz is not above the one before", i, proof.cut_hz[i]);
+    if (proof.below[i] < (i == 0 ? 0 : proof.below[i - 1])) {
+      faults.add("{} eigenvalues below {:.6g} Hz are fewer than below the cut before: counts cannot fall", proof.below[i], proof.cut_hz[i]);
+    }
+  }
+  const double low = std::max(bank.band_hz[0], kZeroFraction * bank.band_hz[1]);
+  if (!(proof.cut_hz.front() <= low * (1.0 + kEdge))) faults.add("the first cut at {:.6g} Hz is inside the band", proof.cut_hz.front());
+  if (!(proof.cut_hz.back() >= bank.band_hz[1] * (1.0 - kEdge)))
+    faults.add("the last cut at {:.6g} Hz is inside the band", proof.cut_hz.back());
+  return {"counts",
+          fmt::format("{} eigenvalues below {:.6g} Hz, {} below {:.6g} Hz, {} cut{} between", proof.below.front(), proof.cut_hz.front(),
+                      proof.below.back(), proof.cut_hz.back(), cuts - 2, cuts == 3 ? "" : "s"),
+          faults.take()};
+}
+
+/// Modes of the bank against the counts, in every interval between two cuts.
+Check check_completeness(const Bank& bank, const Proof& proof) {
+  Faults faults;
+  const auto modes = static_cast<std::int64_t>(bank.mode_count());
+  const std::int64_t counted = proof.below.back() - proof.below.front();
+  for (std::size_t i = 0; i + 1 < proof.cut_hz.size(); ++i) {
+    const std::int64_t wanted = proof.below[i + 1] - proof.below[i];
+    const std::int64_t held = count_modes_below(bank, proof.cut_hz[i + 1]) - count_modes_below(bank, proof.cut_hz[i]);
+    // max_modes keeps the lowest ones: only where the list ends may there be more than the bank holds.
+    const bool is_cut_here = !bank.complete && count_modes_below(bank, proof.cut_hz[i + 1]) == modes;
+    if (held == wanted || (is_cut_here && held < wanted)) continue;
+    faults.add("{} modes lie between {:.6g} and {:.6g} Hz by the counts, and the bank holds {}", wanted, proof.cut_hz[i],
+               proof.cut_hz[i + 1], held);
+  }
+  const bool adds_up = bank.complete ? proof.found == counted && modes == counted : proof.found >= modes && proof.found <= counted;
+  if (!adds_up) {
+    faults.add("{} modes were found, {} are here, and the counts give {} - {} = {}", proof.found, modes, proof.below.back(),
+               proof.below.front(), counted);
+  }
+  return {"complete",
+          bank.complete ? fmt::format("{} - {} = {} modes, all of them found; every interval between cuts agrees", proof.below.back(),
+                                      proof.below.front(), counted)
+                        : fmt::format("the lowest {} of {} - {} = {} modes; every interval between cuts agrees", modes, proof.below.back(),
+                                      proof.below.front(), counted),
+          faults.take()};
+}
+
+/// Cuts must be clear of the modes' error bars, by the margins that are told.
+Check check_margins(const Bank& bank, const Proof& proof) {
+  Faults faults;
+  double least = 1.0, least_hz = proof.cut_hz.front();
+  for (std::size_t i = 0; i < proof.cut_hz.size(); ++i) {
+    const double sigma = calc_lambda(proof.cut_hz[i]);
+    double nearest = 1.0;
+    const auto above = static_cast<std::size_t>(count_modes_below(bank, proof.cut_hz[i]));
+    for (const std::size_t mode : {above - 1, above}) {  // above - 1 of 0 is no mode
+      if (mode >= bank.mode_count()) continue;
+      const double lambda = bank.eigenvalue_rad2_s2[mode];
+      nearest = std::min(nearest, std::abs(lambda - sigma) / sigma);
+      if (!(std::abs(lambda - sigma) > calc_uncertainty(bank, mode) * lambda))
+        faults.add("the cut at {:.9g} Hz lies inside the error bar of mode {} at {:.9g} Hz: its count is not sure", proof.cut_hz[i], mode,
+                   bank.freq_hz(mode));
+    }
+    const double told = proof.margin[i];
+    // A list that max_modes cut may have lost the mode that was nearest.
+    const bool agrees =
+        bank.complete ? std::abs(told - nearest) <= kMarginTolerance * nearest + 1e-12 : told <= nearest * (1.0 + kMarginTolerance) + 1e-12;
+    if (!(told > 0.0 && agrees))
+      faults.add("margin[{}] is {:.6g}, and the nearest mode is {:.6g} of lambda from the cut", i, told, nearest);
+    if (told < least) {
+      least = told;
+      least_hz = proof.cut_hz[i];
+    }
+  }
+  return {"cuts", fmt::format("clear of every mode: the nearest is {:.2g} of lambda away, at {:.6g} Hz", least, least_hz), faults.take()};
+}
+
+Check check_rigid(const Bank& bank, const Proof& proof) {
+  Faults faults;
+  const auto& rigid = proof.rigid_per_component;
+  if (rigid.size() != static_cast<std::size_t>(std::max<std::int64_t>(bank.counts.components, 0)))
+    faults.add("rigid motions are told of {} components, and there are {}", rigid.size(), bank.counts.components);
+  std::int64_t sum = 0;
+  for (std::size_t i = 0; i < rigid.size(); ++i) {
+    if (rigid[i] < 0 || rigid[i] > 6) faults.add("component {} has {} rigid motions", i, rigid[i]);
+    sum += std::clamp<std::int64_t>(rigid[i], 0, 6);
+  }
+  if (sum != bank.counts.rigid_modes)
+    faults.add("the components have {} rigid motions together, and {} were deflated", sum, bank.counts.rigid_modes);
+  if (proof.below.front() < sum) faults.add("{} eigenvalues below the band are fewer than {} rigid motions", proof.below.front(), sum);
+  const std::int64_t others = proof.below.front() - sum;
+  return {
+      "rigid modes",
+      fmt::format("{}{}", describe_rigid(rigid),
+                  others > 0 ? fmt::format(", and {} more below the band (slow modes, or parts that hang on a point or an edge)", others)
+                             : ", and nothing else below the band"),
+      faults.take()};
+}
+
+Check check_arithmetic(const Proof& proof) {
+  Faults faults;
+  if (!(proof.orthonormality >= 0.0 && proof.orthonormality <= kOrthonormalityLimit))
+    faults.add("phi_i^T M phi_j is off by {:.3g}, beyond {:.0e}: some modes may be one mode twice", proof.orthonormality,
+               kOrthonormalityLimit);
+  if (!(proof.backward_error >= 0.0 && proof.backward_error <= kBackwardLimit))
+    faults.add("the factorisation's backward error is {:.3g}, beyond {:.0e}: its counts are not sure", proof.backward_error,
+               kBackwardLimit);
+  return {"arithmetic",
+          fmt::format("phi_i^T M phi_j = delta_ij to {:.1e}; backward error of the factorisations {:.1e}", proof.orthonormality,
+                      proof.backward_error),
+          faults.take()};
+}
+
+Check check_clusters(const Bank& bank, const Proof& proof) {
+  Faults faults;
+  const auto modes = static_cast<std::int64_t>(bank.mode_count());
+  if (proof.cluster_first.size() != proof.cluster_count.size()) {
+    faults.add("groups of equal modes: {} begin and {} have a size", proof.cluster_first.size(), proof.cluster_count.size());
+    return {"equal modes", "", faults.take()};
+  }
+  std::int64_t next = 0, largest = 0;
+  for (std::size_t i = 0; i < proof.cluster_first.size(); ++i) {
+    const std::int64_t first = proof.cluster_first[i], count = proof.cluster_count[i];
+    if (first < next || count < 2 || count > modes || first > modes - count) {
+      faults.add("group {} of {} equal modes from mode {} cannot be", i, count, first);
+      break;
+    }
+    next = first + count;
+    largest = std::max(largest, count);
+    const double low = bank.eigenvalue_rad2_s2[static_cast<std::size_t>(first)],
+                 high = bank.eigenvalue_rad2_s2[static_cast<std::size_t>(next - 1)];
+    if (!(high - low <= kClusterSpread * high)) faults.add("group {} of equal modes spreads over {:.2g} of lambda", i, (high - low) / high);
+  }
+  const std::size_t groups = proof.cluster_first.size();
+  return {"equal modes",
+          groups == 0 ? std::string("none: every shape stands for itself")
+                      : fmt::format("{} group{} of up to {}: shapes of one subspace, in its canonical basis", groups,
+                                    groups == 1 ? "" : "s", largest),
+          faults.take()};
+}
+
+}  // namespace
+
+Check check_error_bars(const Bank& bank) {
+  Faults faults;
+  std::string figure;
+  for (const auto& [name, cents] :
+       {std::pair("algebraic", &bank.algebraic_error_cents), std::pair("discretisation", &bank.discretisation_error_cents)}) {
+    for (std::size_t i = 0; i < cents->size(); ++i)
+      if (!((*cents)[i] >= 0.0)) faults.add("{}_error_cents[{}] is {:.6g}, negative", name, i, (*cents)[i]);
+    if (!figure.empty()) figure += "; ";
+    if (cents->empty()) {
+      figure += fmt::format("{} not given", name);
+      continue;
+    }
+    std::vector<double> sorted = *cents;
+    std::sort(sorted.begin(), sorted.end(), [](double a, double b) { return a < b || (std::isnan(b) && !std::isnan(a)); });
+    figure += fmt::format("{} at most {:.2g} cent, median {:.2g}", name, sorted.back(), sorted[sorted.size() / 2]);
+  }
+  return {"error bars", figure, faults.take()};
+}
+
+std::vector<Check> check_proof(const Bank& bank) {
+  if (!bank.proof) return {{"proof", "none: nothing but residuals speaks for this bank (version 1.0, or made by hand)", {}}};
+  const Proof& proof = *bank.proof;
+  std::vector<Check> checks{check_cuts(bank, proof)};
+  if (!checks[0].faults.empty()) return checks;
+  checks.push_back(check_completeness(bank, proof));
+  checks.push_back(check_margins(bank, proof));
+  checks.push_back(check_rigid(bank, proof));
+  checks.push_back(check_arithmetic(proof));
+  checks.push_back(check_clusters(bank, proof));
+  return checks;
+}
+
+}  // namespace carillon::bank

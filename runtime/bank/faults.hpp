@@ -1,0 +1,38 @@
+// What checks share: a list of faults that stays short. Internal to carillon::bank.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+
+/// The first three faults in full, the others counted.
+class Faults {
+ public:
+  template <class... Values>
+  void add(fmt::format_string<Values...> text, Values&&... values) {
+    if (++count_ <= 3) told_.push_back(fmt::format(text, std::forward<Values>(values)...));
+  }
+  bool empty() const { return count_ == 0; }
+  std::vector<std::string> take() {
+    if (count_ > 3) told_.back() += fmt::format(" (and {} more)", count_ - 3);
+    return std::move(told_);
+  }
+
+ private:
+  std::vector<std::string> told_;
+  std::size_t count_ = 0;
+};
+
+/// Error bars: not negative, and as wide as the residuals ask for at least.
+Check check_error_bars(const Bank& bank);
+
+/// The proof that the band is complete, one check for each of its parts; a bank without one gets a single line that says so, and no fault.
+std::vector<Check> check_proof(const Bank& bank);
+
+}  // namespace carillon::bank
