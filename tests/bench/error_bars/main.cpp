@@ -1,0 +1,72 @@
+// Error bars against known frequencies: a table on the screen and, on request, every mode as CSV.
+//
+//   error_bars [--modes FILE.csv] [--body NAME]... [--element "T4"|"T4 lumped"|"T10"|"T10 curved"|"T10 lumped"]...
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "precompute/petsc/session.hpp"
+#include "tests/estimate/bodies.hpp"
+
+namespace {
+
+using namespace carillon;
+using namespace carillon::tests;
+
+bool wants(const std::set<std::string>& chosen, const std::string& name) { return chosen.empty() || chosen.contains(name); }
+
+void write_modes(std::FILE* file, const Body& body, int fineness, MeshKind kind, const Outcome& outcome) {
+  for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
+    const auto& parts = outcome.bars.parts[m];
+    fmt::print(file, "{},{},{},{},{},{},{:.9g},{:.9g},{:.3g},{:.3g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}\n", body.name,
+               body.training ? "training" : "test", describe(kind), fineness, outcome.unknowns, m, outcome.freq_hz[m], outcome.true_hz[m],
+               outcome.truth_cents[m], outcome.bars.algebraic_cents[m], outcome.bars.discretisation_cents[m], outcome.error_cents(m),
+               parts.interpolation, parts.energy, parts.lumping, parts.geometry, parts.geometry_noise);
+  }
+  std::fflush(file);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::set<std::string> bodies, elements;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> modes(nullptr, &std::fclose);
+  for (int i = 1; i + 1 < argc; i += 2) {
+    const std::string option = argv[i], value = argv[i + 1];
+    if (option == "--modes") modes.reset(std::fopen(value.c_str(), "w"));
+    if (option == "--body") bodies.insert(value);
+    if (option == "--element") elements.insert(value);
+  }
+  petsc::Session session(argc, argv);
+  if (modes)
+    fmt::print(modes.get(),
+               "body,set,element,fineness,unknowns,mode,freq_hz,true_hz,truth_cents,algebraic_cents,discretisation_cents,error_cents,"
+               "interpolation,energy,lumping,geometry,geometry_magnitude\n");
+  if (session.rank() == 0)
+    fmt::print("| body | set | element | unknowns | modes | largest error, cents | bars hold | median bar / error | solve, CPU s | bars, CPU s |\n"
+               "|---|---|---|---|---|---|---|---|---|---|\n");
+  for (const Body& body : get_bodies()) {
+    if (!wants(bodies, body.name)) continue;
+    for (const MeshKind kind : {MeshKind::T4, MeshKind::T4Lumped, MeshKind::T10, MeshKind::T10Curved, MeshKind::T10Lumped}) {
+      if (!wants(elements, describe(kind)) || (kind == MeshKind::T10Curved && !body.round)) continue;
+      const bool quadratic = kind != MeshKind::T4 && kind != MeshKind::T4Lumped;
+      for (std::size_t f = 0; f < body.fineness.size(); ++f) {
+        if (quadratic && f == 2) continue;  // the finest meshes are for T4
+        const Outcome outcome = solve(PETSC_COMM_WORLD, body, body.fineness[f], kind);
+        if (modes && session.rank() == 0) write_modes(modes.get(), body, body.fineness[f], kind, outcome);
+        if (session.rank() != 0) continue;
+        double largest = 0;
+        for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) largest = std::max(largest, std::abs(outcome.error_cents(m)));
+        fmt::print("| {} | {} | {} | {} | {} | {:.3g} | {:.0f} % | {:.2g} | {:.2f} | {:.3f} |\n", body.name, body.training ? "training" : "test",
+                   describe(kind), outcome.unknowns, outcome.true_hz.size(), largest, 100 * outcome.coverage(), outcome.median_width(),
+                   outcome.solve_cpu_s, outcome.estimate_cpu_s);
+        std::fflush(stdout);
+      }
+    }
+  }
+  return 0;
+}

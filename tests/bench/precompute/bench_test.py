@@ -1,0 +1,121 @@
+#!/usr/bin/python3
+"""The bench's own functions: medians, tables, phases, pictures, the system that the rivals get. Oracles: closed forms and hand-made records."""
+import pathlib
+import sys
+import tempfile
+import unittest
+import xml.dom.minidom
+
+import numpy
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+import measuring
+import system
+
+STEEL = (1.2e11, 8e10, 7850.0)  # Lame's lambda, mu [Pa], density [kg/m^3]
+
+
+def make_cube():
+    """The unit cube cut into six tetrahedra around its diagonal (Kuhn)."""
+    nodes = numpy.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
+    tets = [[0, 4, 6, 7], [0, 4, 5, 7], [0, 2, 6, 7], [0, 2, 3, 7], [0, 1, 5, 7], [0, 1, 3, 7]]
+    return nodes, numpy.array(tets)
+
+
+class Measuring(unittest.TestCase):
+    def test_a_busy_child_is_charged_its_cpu_time_and_a_sleeping_one_is_not(self):
+        busy = measuring.run_measured([sys.executable, "-c", "import time\nwhile time.process_time() < 0.4: pass"], ".")
+        asleep = measuring.run_measured([sys.executable, "-c", "import time; time.sleep(0.5)"], ".")
+        self.assertGreaterEqual(busy.cpu_s, 0.39)
+        self.assertLess(asleep.cpu_s, 0.3)
+        self.assertGreater(asleep.wall_s, 0.49)
+
+    def test_the_children_of_a_child_count_too(self):
+        cost = measuring.run_measured(["sh", "-c", f"{sys.executable} -c 'import time\nwhile time.process_time() < 0.4: pass'; true"], ".")
+        self.assertGreaterEqual(cost.cpu_s, 0.39)
+
+    def test_a_failing_program_tells_its_last_words(self):
+        with self.assertRaisesRegex(RuntimeError, "exit code 3\nno such mesh"):
+            measuring.run_measured(["sh", "-c", "echo no such mesh >&2; exit 3"], ".")
+
+    def test_median_and_spread(self):
+        self.assertEqual(measuring.find_median([5.0, 1.0, 2.0]), 2.0)
+        self.assertAlmostEqual(measuring.find_spread([9.0, 10.0, 12.0]), 0.15)
+        self.assertEqual(measuring.find_spread([3.0]), 0.0)
+
+    def test_phases_of_a_record_add_up_to_the_total(self):
+        record = {"phases": [{"name": "read", "cpu_seconds": 0.5}, {"name": "solve", "cpu_seconds": 2.0}, {"name": "prayer", "cpu_seconds": 0.25}]}
+        phases = measuring.to_phases(record, 4.0)
+        self.assertEqual((phases["read"], phases["solve"], phases["factor"], phases["other"]), (0.5, 2.0, 0.0, 1.5))
+        self.assertAlmostEqual(sum(phases.values()), 4.0)
+
+    def test_frequencies_that_differ_in_number_never_agree(self):
+        self.assertEqual(measuring.compare_frequencies([100.0], [100.0, 200.0]), float("inf"))
+        self.assertAlmostEqual(measuring.compare_frequencies([100.0, 200.2], [100.0, 200.0]), 0.001, 6)
+
+    def test_the_table_gives_ratios_to_ours(self):
+        entry = {"wall_s": [1.0], "peak_bytes": 10**9, "modes": 7, "residual": 1e-9, "frequency_error": 0.0}
+        results = {"carillon1": entry | {"label": "ours", "cpu_s": [2.0, 2.0, 3.0]}, "slow": entry | {"label": "theirs", "cpu_s": [13.0]}}
+        rows = measuring.make_rows(results, "carillon1")
+        self.assertEqual([row[0] for row in rows[1:]], ["ours", "theirs"])
+        self.assertEqual(rows[2][3], "6.50")
+        self.assertIn("| theirs | 13.0 |", measuring.format_table(rows, True))
+
+    def test_the_picture_is_well_formed_and_to_scale(self):
+        picture = measuring.draw_phases([("a & b", {"read": 1.0, "solve": 3.0}), ("half", {"solve": 2.0})], "t", "n")
+        bars = [r for r in xml.dom.minidom.parseString(picture).getElementsByTagName("rect") if r.getElementsByTagName("title")]
+        lengths = [float(bar.getAttribute("width")) for bar in bars]
+        self.assertEqual([round(length / lengths[0], 3) for length in lengths], [1.0, 3.0, 2.0])
+
+    def test_a_page_without_the_place_is_refused(self):
+        self.assertEqual(measuring.replace_between("x\n<!-- t -->\nold\n<!-- /t -->\n", "t", "new"), "x\n<!-- t -->\nnew\n<!-- /t -->\n")
+        with self.assertRaises(ValueError):
+            measuring.replace_between("x", "t", "new")
+
+
+class System(unittest.TestCase):
+    def setUp(self):
+        self.nodes, self.tets = make_cube()
+
+    def test_a_stretched_cube_holds_the_energy_of_the_closed_form(self):
+        lame_lambda, lame_mu, density = STEEL
+        stiffness, _ = system.assemble(self.nodes, self.tets, *STEEL, "lumped")
+        stretch = self.nodes.copy()
+        stretch[:, 1:] = 0  # u = (x, 0, 0)
+        shear = numpy.zeros_like(self.nodes)
+        shear[:, 0] = self.nodes[:, 1]  # u = (y, 0, 0)
+        for field, twice_energy in ((stretch, lame_lambda + 2 * lame_mu), (shear, lame_mu)):
+            self.assertAlmostEqual(field.ravel() @ stiffness @ field.ravel() / twice_energy, 1.0, 12)
+
+    def test_six_motions_cost_no_energy_and_more_do(self):
+        stiffness, _ = system.assemble(self.nodes, self.tets, *STEEL, "lumped")
+        values = numpy.linalg.eigvalsh(stiffness.toarray())
+        self.assertLess(abs(values[:6]).max(), 1e-12 * values[-1])
+        self.assertGreater(values[6], 1e-3 * values[-1])
+
+    def test_both_masses_weigh_the_cube_and_the_consistent_one_gets_linear_fields_right(self):
+        for kind in ("lumped", "consistent"):
+            _, mass = system.assemble(self.nodes, self.tets, *STEEL, kind)
+            self.assertAlmostEqual(mass.sum() / 3 / STEEL[2], 1.0, 12)
+        field = numpy.zeros_like(self.nodes)
+        field[:, 0] = self.nodes[:, 0]
+        self.assertAlmostEqual(field.ravel() @ mass @ field.ravel() / STEEL[2], 1 / 3, 12)
+
+    def test_files_come_back_as_they_went_and_errors_are_seen(self):
+        with tempfile.TemporaryDirectory() as folder:
+            stiffness, mass = system.scale(*system.assemble(self.nodes, self.tets, *STEEL, "consistent"), 2e4)
+            system.write_matrix(f"{folder}/K", stiffness)
+            self.assertEqual(abs(system.read_matrix(f"{folder}/K") - stiffness).max(), 0)
+            import scipy.linalg
+            values, vectors = scipy.linalg.eigh(stiffness.toarray(), mass.toarray())
+            system.write_answer(f"{folder}/x", values[::-1], vectors[:, ::-1])
+            read_values, read_vectors = system.read_answer(f"{folder}/x")
+            self.assertTrue((read_values == values).all() and (read_vectors == vectors).all())
+            residual, orthonormality = system.measure_answer(stiffness, mass, values, vectors)
+            self.assertLess(max(residual.max(), orthonormality), 1e-10)
+            residual, _ = system.measure_answer(stiffness, mass, values * 1.001, vectors)
+            self.assertAlmostEqual(residual.max() / 0.001, 1 / 1.001, 3)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,151 @@
+"""Running programs and judging what comes out: CPU seconds, medians, tables, ratios, the picture of the time by phase."""
+import dataclasses
+import json
+import os
+import statistics
+import subprocess
+import tempfile
+import time
+
+PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "write", "other")
+COLOURS = ("#9aa5b1", "#c9b458", "#8fb98b", "#c8553d", "#2f6690", "#7b5ea7", "#588157", "#d9d9d9")
+
+
+@dataclasses.dataclass
+class Cost:
+    """What one run of one program took. CPU is user + system time of the process and of every child that it waited for."""
+    cpu_s: float
+    wall_s: float
+
+
+def run_measured(command, cwd, environment=None, timeout_s=3600):
+    """Runs the command; its output goes nowhere unless it fails. Raises RuntimeError with its last lines when it does."""
+    with tempfile.TemporaryFile("w+") as log:
+        start = time.monotonic()
+        child = subprocess.Popen([str(word) for word in command], cwd=cwd, stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+                                 env={**os.environ, **(environment or {})}, start_new_session=True)
+        status = 0
+        while True:
+            pid, status, usage = os.wait4(child.pid, os.WNOHANG)
+            if pid:
+                break
+            if time.monotonic() - start > timeout_s:
+                os.killpg(child.pid, 9)
+            time.sleep(0.005)
+        wall = time.monotonic() - start
+        child.returncode = os.waitstatus_to_exitcode(status)
+        if child.returncode != 0:
+            log.seek(0)
+            tail = "".join(log.readlines()[-8:])
+            raise RuntimeError(f"{os.path.basename(str(command[0]))}: exit code {child.returncode}\n{tail}")
+    return Cost(usage.ru_utime + usage.ru_stime, wall)
+
+
+def find_median(values):
+    return statistics.median(values)
+
+
+def find_spread(values):
+    """Half the distance of the extremes over the median."""
+    return (max(values) - min(values)) / 2 / find_median(values) if len(values) > 1 else 0.0
+
+
+def to_phases(record, total_s):
+    """The `run` record of a resolved job as CPU seconds by PHASES, {phase: s}; what no phase claims is "other", up to total_s.
+
+    Newer records have run.phases: [{name, cpu_seconds}]; older ones stations and the solver's own seconds, in wall time."""
+    seconds = dict.fromkeys(PHASES, 0.0)
+    if record.get("phases"):
+        for phase in record["phases"]:
+            name = phase["name"] if phase["name"] in seconds else "other"
+            seconds[name] += phase.get("cpu_seconds", phase.get("seconds", 0.0))
+    else:
+        stations = {station["name"]: station["seconds"] for station in record["stations"]}
+        solver = record["solver"]["seconds"]
+        seconds["read"] = stations.get("mesh", 0.0)
+        seconds["partition"] = stations.get("partition", 0.0) + solver.get("analyse", 0.0)
+        seconds["assemble"] = stations.get("assembly", 0.0)
+        seconds["factor"] = solver.get("factor", 0.0)
+        seconds["solve"] = solver.get("solve", 0.0)
+        seconds["orthogonalise"] = solver.get("orthogonalise", solver.get("iterate", 0.0) - solver.get("solve", 0.0))
+        seconds["write"] = stations.get("bank", 0.0)
+    claimed = sum(value for name, value in seconds.items() if name != "other")
+    seconds["other"] = max(seconds["other"], total_s - claimed, 0.0)
+    return seconds
+
+
+def compare_frequencies(reference_hz, other_hz):
+    """Largest relative difference; infinite when the counts differ."""
+    if len(reference_hz) != len(other_hz):
+        return float("inf")
+    return max((abs(a / b - 1) for a, b in zip(reference_hz, other_hz)), default=0.0)
+
+
+def format_table(rows, is_markdown=False):
+    """rows[0] is the head; the first column to the left, the others to the right."""
+    widths = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
+    cells = [[str(c).ljust(w) if i == 0 else str(c).rjust(w) for i, (c, w) in enumerate(zip(row, widths))] for row in rows]
+    if not is_markdown:
+        return "\n".join(["  ".join(cells[0]), "  ".join("-" * w for w in widths), *("  ".join(row) for row in cells[1:])])
+    rule = "|" + "|".join("---" if i == 0 else "--:" for i in range(len(widths))) + "|"
+    return "\n".join(["| " + " | ".join(str(c) for c in rows[0]) + " |", rule, *("| " + " | ".join(str(c) for c in row) + " |" for row in rows[1:])])
+
+
+def make_rows(results, ours):
+    """results: {name: {"cpu_s": [...], "wall_s": [...], "peak_bytes": int, "modes": int, "residual": x, "frequency_error": x, "label": text}} ->
+    rows of the table, quickest first, with each program's CPU time over that of `ours`."""
+    base = find_median(results[ours]["cpu_s"])
+    rows = [("program", "CPU s", "spread", "times ours", "wall s", "peak GB", "modes", "worst residual", "frequencies agree to")]
+    for name, result in sorted(results.items(), key=lambda item: (not item[0].startswith("carillon"), find_median(item[1]["cpu_s"]))):
+        cpu = find_median(result["cpu_s"])
+        rows.append((result["label"], f"{cpu:.1f}" if cpu >= 1 else f"{cpu:.2f}", f"{100 * find_spread(result['cpu_s']):.0f} %", f"{cpu / base:.2f}",
+                     f"{find_median(result['wall_s']):.1f}", f"{result['peak_bytes'] / 1e9:.2f}", result["modes"], f"{result['residual']:.1e}",
+                     f"{result['frequency_error']:.0e}"))
+    return rows
+
+
+def draw_phases(bars, title, note=""):
+    """bars: [(label, {phase: seconds})] -> SVG text: one bar per program, cut by phase, CPU seconds to the right."""
+    left, width, height, top = 250, 560, 26, 84
+    longest = max(sum(parts.values()) for _, parts in bars)
+    full_height = top + len(bars) * (height + 12) + 46
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{left + width + 90}" height="{full_height}" '
+           f'viewBox="0 0 {left + width + 90} {full_height}" font-family="sans-serif" font-size="13">',
+           '<rect width="100%" height="100%" fill="white"/>', f'<text x="16" y="26" font-size="16" font-weight="bold">{escape(title)}</text>']
+    used = [phase for phase in PHASES if any(parts.get(phase, 0) > 0 for _, parts in bars)]
+    x = 16
+    for phase in used:
+        out.append(f'<rect x="{x}" y="44" width="13" height="13" fill="{COLOURS[PHASES.index(phase)]}"/><text x="{x + 18}" y="55">{phase}</text>')
+        x += 34 + 7.2 * len(phase)
+    for index, (label, parts) in enumerate(bars):
+        y = top + index * (height + 12)
+        out.append(f'<text x="{left - 10}" y="{y + 18}" text-anchor="end">{escape(label)}</text>')
+        x = float(left)
+        for phase in PHASES:
+            length = parts.get(phase, 0.0) / longest * width
+            if length > 0:
+                out.append(f'<rect x="{x:.2f}" y="{y}" width="{length:.2f}" height="{height}" fill="{COLOURS[PHASES.index(phase)]}">'
+                           f'<title>{phase}: {parts[phase]:.2f} s</title></rect>')
+            x += length
+        out.append(f'<text x="{x + 8:.1f}" y="{y + 18}">{sum(parts.values()):.1f} s</text>')
+    out.append(f'<text x="16" y="{full_height - 14}" fill="#555">{escape(note)}</text></svg>')
+    return "\n".join(out) + "\n"
+
+
+def escape(text):
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def replace_between(text, name, content):
+    """Puts content between the lines <!-- name --> and <!-- /name --> of a page. ValueError when they are not there."""
+    start, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
+    before, found, rest = text.partition(start)
+    _, closed, after = rest.partition(end)
+    if not found or not closed:
+        raise ValueError(f"the page has no place for {name}")
+    return before + start + content.rstrip("\n") + "\n" + end + after
+
+
+def read_json(path):
+    with open(path) as stream:
+        return json.load(stream)
