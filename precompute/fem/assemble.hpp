@@ -5,6 +5,7 @@
 
 #include "jobs/spec/job_spec.hpp"
 #include "precompute/fem/distribute.hpp"
+#include "precompute/fem/materials.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::fem {
@@ -13,7 +14,7 @@ namespace carillon::fem {
 /// LocalMesh::row is r; each rank holds the rows of the free nodes that it owns.
 struct System {
   petsc::MatHandle stiffness;  // K [N/m], (3n, 3n), AIJ, both triangles, symmetric positive semidefinite
-  petsc::MatHandle mass;       // M [kg], (3n, 3n), AIJ, in K's pattern (diagonal when lumped), symmetric positive definite
+  petsc::MatHandle mass;       // M [kg], (3n, 3n), AIJ, in K's pattern (diagonal when lumped): m_ij I, the zeros of I not stored
 };
 
 /// Mass, centre, inertia and volume of the body, held nodes included; axes of the mesh.
@@ -24,12 +25,18 @@ struct RigidBody {
   double volume_m3 = 0.0;
 };
 
-/// Assembles K and M with exact preallocation. docs/equations.md, elasticity; OSG02 section 3.2.
+/// Assembles K and M. docs/equations.md, elasticity; OSG02 section 3.2. The arrays of the matrices are made here and handed to PETSc, so
+/// their pattern cannot be changed. Nodes that no tetrahedron of `local` uses have empty rows.
 /// Collective. Throws on every rank: InputError naming an element whose Jacobian is not positive everywhere (inside out, or a mid-side node
 /// out of place); SystemError when memory runs out.
-System assemble(MPI_Comm comm, const LocalMesh& local, const spec::Material& material, spec::Mass mass);
+System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass);
 
 /// Integrates the rigid-body data over the tetrahedra. Collective.
-RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, double density_kg_m3);
+RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials& materials);
+inline RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, double density_kg_m3) {
+  spec::Material material;
+  material.density_kg_m3 = density_kg_m3;
+  return calc_rigid_body(comm, local, Materials(material));
+}
 
 }  // namespace carillon::fem

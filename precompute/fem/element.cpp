@@ -1,152 +1,69 @@
-// Method: Galerkin finite elements of isotropic linear elasticity on tetrahedra. Stiffness block of nodes i and j from their gradients b:
-//   k_ij = integral ( lambda b_i b_j^T + mu b_j b_i^T + mu (b_i . b_j) I ) dV,    m_ij = integral rho N_i N_j dV I.
-// Source: OSG02 eqs. 12, 14, 15 (T4); Zienkiewicz and Taylor, The Finite Element Method, vol. 1 (T10); Hinton, Rock and Zienkiewicz 1976,
-//   Earthquake Eng. Struct. Dyn. 4, 245 (HRZ lumping); Walkington 2000, "Quadrature on simplices of arbitrary dimension" (degree 5).
+// Method: everything an element's stiffness needs of its shape are the integrals of products of gradients, P_ij = integral b_i b_j^T dV.
+// They
+//   are constant for T4; a straight T10 is a fixed combination of its T4; a curved one takes a rule of 14 points. The material then
+//   contracts them. The mass of a curved T10 is exact: its Jacobian is a cubic, known by 20 values, and integral N_i N_j (cubic k) is a
+//   table. Nearly incompressible T10: bubbles b = 256 L0 L1 L2 L3 in three directions, the dilatation projected on linear functions (which
+//   those bubbles balance), bubbles condensed.
+// Source: OSG02 section 3.2; Zienkiewicz and Taylor, "The Finite Element Method", vol. 1 (T10); Hinton, Rock and Zienkiewicz 1976,
+// Earthquake
+//   Eng. Struct. Dyn. 4, 245 (HRZ lumping); Crouzeix and Raviart 1973, RAIRO 7, 33 (quadratic velocity with bubble, linear pressure);
+//   Simo and Hughes 1998, "Computational Inelasticity", section 4.5 (projected dilatation).
 // Deviations: OSG02 eq. 12 is printed with -vol/2; stiffness is minus the Jacobian of the force, which gives +vol. OSG02's row-sum lumping
 //   (eq. 15) is negative at the corners of a T10, so T10 is lumped by HRZ: the diagonal of the consistent mass scaled to the true mass.
+//   Crouzeix and Raviart's element has bubbles on its faces too in three dimensions; without them it is as good on the bodies measured in
+//   docs/elements.md. The bubbles carry no mass, so that the mass matrix couples no two directions.
 #include "precompute/fem/element.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace carillon::fem {
 namespace {
 
-using Barycentric = std::array<double, 4>;
+constexpr int kPairs = kMaxNodes * (kMaxNodes + 1) / 2;
 
-struct Point {
-  Barycentric at{};
-  double weight = 0.0;  // the weights of a rule sum to 1, the volume of the element being a factor apart
+/// (n, n) blocks of 3 x 3, i <= j used: P_ij^rc = integral of d N_i / d x_r times d N_j / d x_c.
+struct Products {
+  int nodes = 0;
+  std::array<double, 9 * kMaxNodes * kMaxNodes> value{};
+  double* at(int i, int j) { return value.data() + 9 * (i * nodes + j); }
+  const double* at(int i, int j) const { return value.data() + 9 * (i * nodes + j); }
 };
 
-/// Degree 2, four points: exact for the stiffness of straight-sided T10.
-const std::vector<Point>& rule_of_degree_2() {
-  static const std::vector<Point> rule = [] {
-    const double a = (5.0 + 3.0 * std::sqrt(5.0)) / 20.0;
-    const double b = (5.0 - std::sqrt(5.0)) / 20.0;
-    std::vector<Point> points;
-    for (int i = 0; i < 4; ++i) {
-      Point point{{b, b, b, b}, 0.25};
-      point.at[i] = a;
-      points.push_back(point);
-    }
-    return points;
-  }();
-  return rule;
-}
-
-/// Degree 5, fourteen points (Walkington 2000): stiffness of curved T10.
-const std::vector<Point>& rule_of_degree_5() {
-  static const std::vector<Point> rule = [] {
-    std::vector<Point> points;
-    const auto add_vertex_orbit = [&](double b, double weight) {
-      for (int i = 0; i < 4; ++i) {
-        Point point{{b, b, b, b}, weight};
-        point.at[i] = 1.0 - 3.0 * b;
-        points.push_back(point);
-      }
-    };
-    add_vertex_orbit(0.31088591926330060980, 0.11268792571801585080);
-    add_vertex_orbit(0.09273525031089122640, 0.07349304311636194954);
-    const double c = 0.04550370412564964949;
-    for (const auto& edge : mesh::kEdges) {
-      Point point{{c, c, c, c}, 0.04254602077708146644};
-      point.at[edge[0]] = point.at[edge[1]] = 0.5 - c;
-      points.push_back(point);
-    }
-    return points;
-  }();
-  return rule;
-}
-
-/// Degree 7, 125 points: Gauss-Legendre in the cube collapsed to the tetrahedron (Stroud's conical product). Mass of curved T10.
-const std::vector<Point>& rule_of_degree_7() {
-  static const std::vector<Point> rule = [] {
-    const double inner = std::sqrt(5.0 - 2.0 * std::sqrt(10.0 / 7.0)) / 3.0, outer = std::sqrt(5.0 + 2.0 * std::sqrt(10.0 / 7.0)) / 3.0;
-    const double w_inner = (322.0 + 13.0 * std::sqrt(70.0)) / 1800.0, w_outer = (322.0 - 13.0 * std::sqrt(70.0)) / 1800.0;
-    const std::array<std::array<double, 2>, 5> gauss{{{(1 - outer) / 2, w_outer},
-                                                      {(1 - inner) / 2, w_inner},
-                                                      {0.5, 64.0 / 225.0},
-                                                      {(1 + inner) / 2, w_inner},
-                                                      {(1 + outer) / 2, w_outer}}};
-    std::vector<Point> points;
-    for (const auto& [u, wu] : gauss)
-      for (const auto& [v, wv] : gauss)
-        for (const auto& [w, ww] : gauss) {
-          const double l1 = u, l2 = (1 - u) * v, l3 = (1 - u) * (1 - v) * w;
-          points.push_back({{1 - l1 - l2 - l3, l1, l2, l3}, 6.0 * wu * wv * ww * (1 - u) * (1 - u) * (1 - v)});
-        }
-    return points;
-  }();
-  return rule;
-}
-
-/// Shape functions of the T10 and their derivatives with respect to (L1, L2, L3), L0 = 1 - L1 - L2 - L3.
-struct Shape {
-  std::array<double, kMaxNodes> value{};
-  std::array<Vec3, kMaxNodes> derivative{};
-};
-
-Shape calc_shape(const Barycentric& l) {
-  constexpr std::array<Vec3, 4> kGradient{{{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  Shape shape;
-  for (int i = 0; i < 4; ++i) {
-    shape.value[i] = l[i] * (2 * l[i] - 1);
-    for (int d = 0; d < 3; ++d) shape.derivative[i][d] = (4 * l[i] - 1) * kGradient[i][d];
+/// The 3 x 3 block of stiffness that belongs to the block `p` of products. Isotropic: lambda P + mu (P^T + tr P I); else C contracted.
+inline void contract(const double* p, const Solid& solid, double lambda, double* k) {
+  if (solid.isotropic) {
+    const double mu = solid.lame_mu_pa, trace = mu * (p[0] + p[4] + p[8]);
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) k[3 * r + c] = lambda * p[3 * r + c] + mu * p[3 * c + r] + (r == c ? trace : 0.0);
+    return;
   }
-  for (int e = 0; e < 6; ++e) {
-    const auto [a, b] = mesh::kEdges[e];
-    shape.value[4 + e] = 4 * l[a] * l[b];
-    for (int d = 0; d < 3; ++d) shape.derivative[4 + e][d] = 4 * (l[a] * kGradient[b][d] + l[b] * kGradient[a][d]);
+  for (int rc = 0; rc < 9; ++rc) {
+    const double* tensor = &solid.tensor_pa[9 * rc];
+    double sum = 0.0;
+    for (int bd = 0; bd < 9; ++bd) sum += tensor[bd] * p[bd];
+    k[rc] = sum;
   }
-  return shape;
 }
 
-std::vector<Shape> calc_shapes(const std::vector<Point>& rule) {
-  std::vector<Shape> shapes;
-  for (const Point& point : rule) shapes.push_back(calc_shape(point.at));
-  return shapes;
-}
-
-struct Jacobian {
-  double determinant = 0.0;
-  std::array<Vec3, 3> inverse{};  // inverse[d][k] = d xi_d / d x_k
-};
-
-Jacobian calc_jacobian(std::span<const Vec3> x, const Shape& shape) {
-  std::array<Vec3, 3> j{};  // j[d][k] = d x_k / d xi_d
-  for (int i = 0; i < kMaxNodes; ++i)
-    for (int d = 0; d < 3; ++d)
-      for (int k = 0; k < 3; ++k) j[d][k] += shape.derivative[i][d] * x[i][k];
-  const auto cross = [](const Vec3& a, const Vec3& b) {
-    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  };
-  Jacobian jacobian;
-  const std::array<Vec3, 3> rows{cross(j[1], j[2]), cross(j[2], j[0]), cross(j[0], j[1])};
-  jacobian.determinant = j[0][0] * rows[0][0] + j[0][1] * rows[0][1] + j[0][2] * rows[0][2];
-  for (int d = 0; d < 3; ++d)
-    for (int k = 0; k < 3; ++k) jacobian.inverse[d][k] = rows[d][k] / jacobian.determinant;
-  return jacobian;
-}
-
-/// Adds volume * k_ij for all pairs of nodes of gradients b, upper triangle of blocks only.
-void add_stiffness(std::span<const Vec3> b, double lambda, double mu, double volume, ElementMatrices& out) {
-  const int n = out.nodes;
-  for (int i = 0; i < n; ++i)
-    for (int j = i; j < n; ++j) {
-      const double dot = b[i][0] * b[j][0] + b[i][1] * b[j][1] + b[i][2] * b[j][2];
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c)
-          out.stiffness[(3 * i + r) * 3 * n + 3 * j + c] +=
-              volume * (lambda * b[i][r] * b[j][c] + mu * b[j][r] * b[i][c] + (r == c ? mu * dot : 0.0));
-    }
-}
-
-void mirror_stiffness(ElementMatrices& out) {
+void put_block(const double* k, int i, int j, ElementMatrices& out) {
   const int width = 3 * out.nodes;
-  for (int row = 0; row < width; ++row)
-    for (int column = row + 1; column < width; ++column) out.stiffness[column * width + row] = out.stiffness[row * width + column];
+  double* upper = &out.stiffness[3 * i * width + 3 * j];
+  double* lower = &out.stiffness[3 * j * width + 3 * i];
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) {
+      upper[r * width + c] = k[3 * r + c];
+      lower[c * width + r] = k[3 * r + c];
+    }
+}
+
+void put_stiffness(const Products& products, const Solid& solid, double lambda, ElementMatrices& out) {
+  std::array<double, 9> k;
+  for (int i = 0; i < out.nodes; ++i)
+    for (int j = i; j < out.nodes; ++j) {
+      contract(products.at(i, j), solid, lambda, k.data());
+      put_block(k.data(), i, j, out);
+    }
 }
 
 /// Gradients of the barycentric coordinates and the volume of a straight tetrahedron.
@@ -166,18 +83,68 @@ double calc_linear(std::span<const Vec3> x, std::array<Vec3, 4>& b) {
   return determinant / 6.0;
 }
 
-/// True when every mid-side node lies in the middle of its edge, to 1e-9 of the edge's length.
+/// True when every mid-side node lies in the middle of its edge, to 1e-6 of the edge's length, which is mesh::is_curved's measure.
 bool is_straight(std::span<const Vec3> x) {
   for (int e = 0; e < 6; ++e) {
     const Vec3 &a = x[mesh::kEdges[e][0]], &b = x[mesh::kEdges[e][1]];
     double off = 0.0, length = 0.0;
     for (int k = 0; k < 3; ++k) {
-      off += std::pow(x[4 + e][k] - (a[k] + b[k]) / 2, 2);
-      length += std::pow(b[k] - a[k], 2);
+      const double bow = x[4 + e][k] - (a[k] + b[k]) / 2, edge = b[k] - a[k];
+      off += bow * bow;
+      length += edge * edge;
     }
-    if (off > 1e-18 * length) return false;
+    if (off > 1e-12 * length) return false;
   }
   return true;
+}
+
+/// Integral of L_a L_b over the element, by its volume.
+constexpr double find_moment(int a, int b) { return a == b ? 0.1 : 0.05; }
+
+/// The products of a straight tetrahedron with four nodes, all blocks.
+Products calc_linear_products(const std::array<Vec3, 4>& b, double volume) {
+  Products products;
+  products.nodes = 4;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) products.at(i, j)[3 * r + c] = volume * b[i][r] * b[j][c];
+  return products;
+}
+
+/// N_i of a T10 has d N_i / d L_a for one corner a (corner nodes: 4 L_a - 1) or two (mid nodes: 4 times the other end's L).
+/// G_ij^ab = integral (d N_i / d L_a) (d N_j / d L_b) dV / V, so that K_ij = sum over a, b of G_ij^ab K_ab of the linear tetrahedron.
+struct Recipe {
+  struct Term {
+    int a, b;
+    double factor;
+  };
+  std::array<std::array<Term, 4>, kPairs> terms{};
+  std::array<int, kPairs> count{};
+};
+
+const Recipe& get_recipe() {
+  static const Recipe recipe = [] {
+    struct Slope {
+      int along, of;  // d N / d L_along = 4 L_of + offset
+      double offset;
+    };
+    const auto find_slopes = [](int i) {
+      if (i < 4) return std::vector<Slope>{{i, i, -1.0}};
+      const auto [a, b] = mesh::kEdges[i - 4];
+      return std::vector<Slope>{{a, b, 0.0}, {b, a, 0.0}};
+    };
+    Recipe made;
+    int pair = 0;
+    for (int i = 0; i < kMaxNodes; ++i)
+      for (int j = i; j < kMaxNodes; ++j, ++pair)
+        for (const Slope& p : find_slopes(i))
+          for (const Slope& q : find_slopes(j))
+            made.terms[pair][made.count[pair]++] = {p.along, q.along,
+                                                    16 * find_moment(p.of, q.of) + p.offset + q.offset + p.offset * q.offset};
+    return made;
+  }();
+  return recipe;
 }
 
 /// m_ij / (rho V) of the straight T10, in 420ths, from integral L0^a L1^b L2^c L3^d dV = 6 V a! b! c! d! / (a + b + c + d + 3)!.
@@ -192,16 +159,44 @@ double straight_mass_420(int i, int j) {
   return touch ? 16 : 8;
 }
 
-void lump_hrz(ElementMatrices& out, double mass_kg) {
-  const int n = out.nodes;
-  double trace = 0.0;
-  for (int i = 0; i < n; ++i) trace += out.mass[i * n + i];
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) out.mass[i * n + j] = i == j ? out.mass[i * n + i] * mass_kg / trace : 0.0;
+void put_straight_mass(double mass_kg, ElementMatrices& out) {
+  static const std::array<double, kMaxNodes* kMaxNodes> kParts = [] {
+    std::array<double, kMaxNodes * kMaxNodes> parts{};
+    for (int i = 0; i < kMaxNodes; ++i)
+      for (int j = 0; j < kMaxNodes; ++j) parts[i * kMaxNodes + j] = straight_mass_420(i, j) / 420.0;
+    return parts;
+  }();
+  for (std::size_t i = 0; i < kParts.size(); ++i) out.mass[i] = mass_kg * kParts[i];
 }
 
-bool calc_curved(std::span<const Vec3> x, const spec::Material& material, ElementMatrices& out, double& mass_kg) {
-  static const std::vector<Shape> kStiffness = calc_shapes(rule_of_degree_5()), kMass = calc_shapes(rule_of_degree_7());
+void put_straight_t10(const std::array<Vec3, 4>& b, double volume, const Solid& solid, ElementMatrices& out) {
+  const Products products = calc_linear_products(b, volume);
+  std::array<std::array<double, 9>, 16> linear;
+  for (int a = 0; a < 4; ++a)
+    for (int c = 0; c < 4; ++c) contract(products.at(a, c), solid, solid.lame_lambda_pa, linear[4 * a + c].data());
+  const Recipe& recipe = get_recipe();
+  int pair = 0;
+  for (int i = 0; i < kMaxNodes; ++i)
+    for (int j = i; j < kMaxNodes; ++j, ++pair) {
+      std::array<double, 9> k{};
+      for (int t = 0; t < recipe.count[pair]; ++t) {
+        const auto& [a, c, factor] = recipe.terms[pair][t];
+        for (int v = 0; v < 9; ++v) k[v] += factor * linear[4 * a + c][v];
+      }
+      put_block(k.data(), i, j, out);
+    }
+}
+
+/// d V and the gradients of the ten shape functions at the fourteen points.
+struct Gradients {
+  std::array<double, 14> dv{};
+  std::array<std::array<double, 3 * kMaxNodes>, 14> b{};  // d N_i / d x_r at 3 i + r
+  std::array<Jacobian, 14> jacobian{};
+};
+
+/// False when the Jacobian is not positive at a node or a point.
+bool calc_gradients(std::span<const Vec3> x, Gradients& out) {
+  static const std::vector<Shape> kShapes = calc_shapes(get_rule_of_degree_5());
   static const std::vector<Shape> kNodes = [] {
     std::vector<Shape> shapes;
     for (int i = 0; i < kMaxNodes; ++i) {
@@ -216,96 +211,238 @@ bool calc_curved(std::span<const Vec3> x, const spec::Material& material, Elemen
     return shapes;
   }();
   for (const Shape& shape : kNodes)
-    if (!(calc_jacobian(x, shape).determinant > 0.0)) return false;
-  for (std::size_t q = 0; q < kStiffness.size(); ++q) {
-    const Jacobian jacobian = calc_jacobian(x, kStiffness[q]);
+    if (!(calc_determinant(x, shape) > 0.0)) return false;
+  for (std::size_t q = 0; q < 14; ++q) {
+    const Jacobian jacobian = calc_jacobian(x, kShapes[q]);
     if (!(jacobian.determinant > 0.0)) return false;
-    std::array<Vec3, kMaxNodes> b{};
+    out.jacobian[q] = jacobian;
+    out.dv[q] = get_rule_of_degree_5()[q].weight * jacobian.determinant / 6.0;
+    out.b[q].fill(0.0);
     for (int i = 0; i < kMaxNodes; ++i)
       for (int d = 0; d < 3; ++d)
-        for (int k = 0; k < 3; ++k) b[i][k] += kStiffness[q].derivative[i][d] * jacobian.inverse[d][k];
-    add_stiffness(b, material.lame_lambda_pa(), material.lame_mu_pa(), rule_of_degree_5()[q].weight * jacobian.determinant / 6.0, out);
-  }
-  mass_kg = 0.0;
-  for (std::size_t q = 0; q < kMass.size(); ++q) {
-    const double determinant = calc_jacobian(x, kMass[q]).determinant;
-    if (!(determinant > 0.0)) return false;
-    const double rho_dv = material.density_kg_m3 * rule_of_degree_7()[q].weight * determinant / 6.0;
-    mass_kg += rho_dv;
-    const auto& value = kMass[q].value;
-    for (int i = 0; i < kMaxNodes; ++i)
-      for (int j = 0; j < kMaxNodes; ++j) out.mass[i * kMaxNodes + j] += rho_dv * value[i] * value[j];
+        for (int r = 0; r < 3; ++r) out.b[q][3 * i + r] += kShapes[q].derivative[i][d] * jacobian.inverse[d][r];
   }
   return true;
 }
 
-void calc_straight_t10(std::span<const Vec3> b_corner, double volume, const spec::Material& material, ElementMatrices& out) {
-  static const std::vector<Shape> kShapes = calc_shapes(rule_of_degree_2());
-  for (std::size_t q = 0; q < kShapes.size(); ++q) {
-    std::array<Vec3, kMaxNodes> b{};
-    for (int i = 0; i < kMaxNodes; ++i)
-      for (int d = 0; d < 3; ++d)
-        for (int k = 0; k < 3; ++k) b[i][k] += kShapes[q].derivative[i][d] * b_corner[d + 1][k];
-    add_stiffness(b, material.lame_lambda_pa(), material.lame_mu_pa(), rule_of_degree_2()[q].weight * volume, out);
+Products calc_curved_products(const Gradients& gradients) {
+  constexpr int kWidth = 3 * kMaxNodes;
+  std::array<std::array<double, kWidth>, kWidth> sum{};  // rows (i, r), columns (j, c), upper triangle of blocks
+  for (int q = 0; q < 14; ++q) {
+    const auto& b = gradients.b[q];
+    for (int row = 0; row < kWidth; ++row) {
+      const double weighed = gradients.dv[q] * b[row];
+      for (int column = row - row % 3; column < kWidth; ++column) sum[row][column] += weighed * b[column];
+    }
   }
+  Products products;
+  products.nodes = kMaxNodes;
   for (int i = 0; i < kMaxNodes; ++i)
-    for (int j = 0; j < kMaxNodes; ++j) out.mass[i * kMaxNodes + j] = material.density_kg_m3 * volume * straight_mass_420(i, j) / 420.0;
+    for (int j = i; j < kMaxNodes; ++j)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) products.at(i, j)[3 * r + c] = sum[3 * i + r][3 * j + c];
+  return products;
+}
+
+/// M_ij / rho of a curved T10 and its volume, exactly.
+double calc_curved_mass(std::span<const Vec3> x, std::array<double, kMaxNodes * kMaxNodes>& mass) {
+  static const std::array<Shape, 20> kThirds = [] {
+    std::array<Shape, 20> shapes;
+    for (int k = 0; k < 20; ++k) shapes[k] = calc_shape(get_thirds()[k]);
+    return shapes;
+  }();
+  // integral N_i N_j (cubic k) dV / V of the reference tetrahedron, divided by its six
+  static const std::vector<double> kTable = [] {
+    std::vector<double> table(20 * kMaxNodes * kMaxNodes, 0.0);
+    for (const Point& point : get_rule_of_degree_7()) {
+      const auto value = calc_shape(point.at).value;
+      const auto cubic = calc_cubics(point.at);
+      for (int k = 0; k < 20; ++k)
+        for (int i = 0; i < kMaxNodes; ++i)
+          for (int j = 0; j < kMaxNodes; ++j)
+            table[(k * kMaxNodes + i) * kMaxNodes + j] += point.weight / 6 * cubic[k] * value[i] * value[j];
+    }
+    return table;
+  }();
+  mass.fill(0.0);
+  for (int k = 0; k < 20; ++k) {
+    const double determinant = calc_determinant(x, kThirds[k]);
+    const double* table = &kTable[k * kMaxNodes * kMaxNodes];
+    for (int ij = 0; ij < kMaxNodes * kMaxNodes; ++ij) mass[ij] += determinant * table[ij];
+  }
+  double volume = 0.0;
+  for (const double m : mass) volume += m;
+  return volume;
+}
+
+/// Solves the positive definite n x n system in place for `columns` right-hand sides, row-major; Cholesky.
+template <int n>
+void solve_definite(std::array<double, n * n> a, double* b, int columns) {
+  for (int j = 0; j < n; ++j) {
+    for (int k = 0; k < j; ++k)
+      for (int i = j; i < n; ++i) a[i * n + j] -= a[i * n + k] * a[j * n + k];
+    const double root = std::sqrt(a[j * n + j]);
+    for (int i = j; i < n; ++i) a[i * n + j] /= root;
+  }
+  for (int c = 0; c < columns; ++c) {
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < i; ++k) b[i * columns + c] -= a[i * n + k] * b[k * columns + c];
+      b[i * columns + c] /= a[i * n + i];
+    }
+    for (int i = n - 1; i >= 0; --i) {
+      for (int k = i + 1; k < n; ++k) b[i * columns + c] -= a[k * n + i] * b[k * columns + c];
+      b[i * columns + c] /= a[i * n + i];
+    }
+  }
+}
+
+/// The mixed form: integral 2 mu eps : eps + lambda (Pi div u)^2, Pi the projection on linear functions, u = nodes + bubbles; the bubbles
+/// condensed. 33 displacements: node by node, then the bubble.
+void put_mixed(const Gradients& gradients, const Solid& solid, ElementMatrices& out) {
+  constexpr int kNodal = 3 * kMaxNodes, kAll = kNodal + 3;
+  static const std::array<Vec3, 14> kBubble = [] {  // derivatives of 256 L0 L1 L2 L3 along L1, L2, L3
+    std::array<Vec3, 14> derivative{};
+    for (std::size_t q = 0; q < 14; ++q) {
+      const Barycentric& l = get_rule_of_degree_5()[q].at;
+      const auto without = [&](int a) {
+        double product = 256.0;
+        for (int i = 0; i < 4; ++i) product *= i == a ? 1.0 : l[i];
+        return product;
+      };
+      for (int d = 0; d < 3; ++d) derivative[q][d] = without(d + 1) - without(0);
+    }
+    return derivative;
+  }();
+  std::array<double, kAll * kAll> k{};
+  std::array<double, 4 * kAll> moments{}, projected{};  // integral L_a div(u), and its image under the inverse of `gram`
+  std::array<double, 16> gram{};                        // integral L_a L_b
+  for (std::size_t q = 0; q < 14; ++q) {
+    std::array<double, kAll> b{};
+    std::copy(gradients.b[q].begin(), gradients.b[q].end(), b.begin());
+    for (int d = 0; d < 3; ++d)
+      for (int r = 0; r < 3; ++r) b[kNodal + r] += kBubble[q][d] * gradients.jacobian[q].inverse[d][r];
+    const double dv = gradients.dv[q];
+    const Barycentric& l = get_rule_of_degree_5()[q].at;
+    for (int a = 0; a < 4; ++a) {
+      for (int c = 0; c < 4; ++c) gram[4 * a + c] += dv * l[a] * l[c];
+      for (int i = 0; i < kAll; ++i) moments[a * kAll + i] += dv * l[a] * b[i];
+    }
+    for (int i = 0; i < kAll / 3; ++i)
+      for (int j = i; j < kAll / 3; ++j) {
+        const double* p = &b[3 * i];
+        const double* s = &b[3 * j];
+        const double mu = dv * solid.lame_mu_pa, dot = mu * (p[0] * s[0] + p[1] * s[1] + p[2] * s[2]);
+        for (int r = 0; r < 3; ++r)
+          for (int c = 0; c < 3; ++c) k[(3 * i + r) * kAll + 3 * j + c] += mu * s[r] * p[c] + (r == c ? dot : 0.0);
+      }
+  }
+  projected = moments;
+  solve_definite<4>(gram, projected.data(), kAll);
+  for (int i = 0; i < kAll; ++i)
+    for (int j = i - i % 3; j < kAll; ++j) {
+      double sum = 0.0;
+      for (int a = 0; a < 4; ++a) sum += moments[a * kAll + i] * projected[a * kAll + j];
+      k[i * kAll + j] += solid.lame_lambda_pa * sum;
+    }
+  std::array<double, 9> bubble;
+  std::array<double, 3 * kNodal> coupling, condensed;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) bubble[3 * r + c] = k[(kNodal + r) * kAll + kNodal + c];
+    for (int i = 0; i < kNodal; ++i) coupling[r * kNodal + i] = k[i * kAll + kNodal + r];
+  }
+  condensed = coupling;
+  solve_definite<3>(bubble, condensed.data(), kNodal);
+  for (int i = 0; i < kMaxNodes; ++i)
+    for (int j = i; j < kMaxNodes; ++j) {
+      std::array<double, 9> block;
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) {
+          double sum = k[(3 * i + r) * kAll + 3 * j + c];
+          for (int s = 0; s < 3; ++s) sum -= coupling[s * kNodal + 3 * i + r] * condensed[s * kNodal + 3 * j + c];
+          block[3 * r + c] = sum;
+        }
+      put_block(block.data(), i, j, out);
+    }
+}
+
+void lump_hrz(ElementMatrices& out, double mass_kg) {
+  const int n = out.nodes;
+  double trace = 0.0;
+  for (int i = 0; i < n; ++i) trace += out.mass[i * n + i];
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) out.mass[i * n + j] = i == j ? out.mass[i * n + i] * mass_kg / trace : 0.0;
 }
 
 }  // namespace
 
-bool calc_element(std::span<const Vec3> x, const spec::Material& material, spec::Mass mass, ElementMatrices& out) {
-  const int n = static_cast<int>(x.size());
-  out.nodes = n;
-  std::fill_n(out.stiffness.begin(), 9 * n * n, 0.0);
-  std::fill_n(out.mass.begin(), n * n, 0.0);
+Solid::Solid(const spec::Material& material)
+    : isotropic(!material.orthotropic),
+      mixed(isotropic && material.poisson_ratio >= kMixedFrom),
+      lame_lambda_pa(material.lame_lambda_pa()),
+      lame_mu_pa(material.lame_mu_pa()),
+      density_kg_m3(material.density_kg_m3) {
+  if (isotropic) return;
+  constexpr int kVoigt[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
+  const spec::Elasticity c = material.calc_elasticity_pa();
+  for (int r = 0; r < 3; ++r)
+    for (int s = 0; s < 3; ++s)
+      for (int b = 0; b < 3; ++b)
+        for (int d = 0; d < 3; ++d) tensor_pa[27 * r + 9 * s + 3 * b + d] = c[6 * kVoigt[r][b] + kVoigt[s][d]];
+}
+
+bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, ElementMatrices& out) {
+  const int n = out.nodes = static_cast<int>(x.size());
   std::array<Vec3, 4> b;
   const double volume = calc_linear(x.first(4), b);
-  double mass_kg = material.density_kg_m3 * volume;
-  if (n == kMaxNodes && !is_straight(x)) {
-    if (!calc_curved(x, material, out, mass_kg)) return false;
+  double mass_kg = solid.density_kg_m3 * volume;
+  const bool curved = n == kMaxNodes && !is_straight(x);
+  if (!curved && !(volume > 0.0)) return false;
+  if (n == 4) {
+    put_stiffness(calc_linear_products(b, volume), solid, solid.lame_lambda_pa, out);
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) out.mass[i * 4 + j] = mass_kg / 20.0 * (i == j ? 2 : 1);
+  } else if (!curved && !solid.mixed) {
+    put_straight_t10(b, volume, solid, out);
+    put_straight_mass(mass_kg, out);
   } else {
-    if (!(volume > 0.0)) return false;
-    if (n == kMaxNodes) {
-      calc_straight_t10(b, volume, material, out);
+    Gradients gradients;
+    if (!calc_gradients(x, gradients)) return false;
+    if (solid.mixed) {
+      put_mixed(gradients, solid, out);
     } else {
-      add_stiffness(b, material.lame_lambda_pa(), material.lame_mu_pa(), volume, out);
-      for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) out.mass[i * 4 + j] = mass_kg / 20.0 * (i == j ? 2 : 1);
+      put_stiffness(calc_curved_products(gradients), solid, solid.lame_lambda_pa, out);
     }
+    mass_kg = solid.density_kg_m3 * calc_curved_mass(x, out.mass);
+    for (double& m : out.mass) m *= solid.density_kg_m3;
   }
-  mirror_stiffness(out);
   if (mass == spec::Mass::lumped) lump_hrz(out, mass_kg);  // for the T4, whose diagonal is constant, this is the row sum
   return true;
 }
 
 ElementMoments calc_moments(std::span<const Vec3> x, double density_kg_m3) {
+  // Positions are fields of the shape functions, x = sum N_i x_i, so the mass matrix integrates them and their products.
+  ElementMatrices m;
+  const int n = static_cast<int>(x.size());
   ElementMoments moments;
-  const auto add = [&](const Vec3& at, double dv) {
-    moments.volume_m3 += dv;
-    moments.mass_kg += density_kg_m3 * dv;
-    for (int r = 0; r < 3; ++r) {
-      moments.first_kg_m[r] += density_kg_m3 * dv * at[r];
-      for (int c = 0; c < 3; ++c) moments.second_kg_m2[3 * r + c] += density_kg_m3 * dv * at[r] * at[c];
-    }
-  };
-  if (x.size() == kMaxNodes && !is_straight(x)) {
-    static const std::vector<Shape> kShapes = calc_shapes(rule_of_degree_7());
-    for (std::size_t q = 0; q < kShapes.size(); ++q) {
-      Vec3 at{};
-      for (int i = 0; i < kMaxNodes; ++i)
-        for (int k = 0; k < 3; ++k) at[k] += kShapes[q].value[i] * x[i][k];
-      add(at, rule_of_degree_7()[q].weight * calc_jacobian(x, kShapes[q]).determinant / 6.0);
-    }
-    return moments;
-  }
   std::array<Vec3, 4> b;
-  const double volume = calc_linear(x.first(4), b);
-  for (const Point& point : rule_of_degree_2()) {
-    Vec3 at{};
+  moments.volume_m3 = calc_linear(x.first(4), b);
+  if (n == 4 || is_straight(x)) {
     for (int i = 0; i < 4; ++i)
-      for (int k = 0; k < 3; ++k) at[k] += point.at[i] * x[i][k];
-    add(at, point.weight * volume);
+      for (int j = 0; j < 4; ++j) m.mass[i * 4 + j] = moments.volume_m3 * find_moment(i, j);
+    x = x.first(4);
+  } else {
+    moments.volume_m3 = calc_curved_mass(x, m.mass);
+  }
+  moments.mass_kg = density_kg_m3 * moments.volume_m3;
+  const std::size_t count = x.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    Vec3 sum{};  // integral rho N_i x
+    for (std::size_t j = 0; j < count; ++j)
+      for (int k = 0; k < 3; ++k) sum[k] += density_kg_m3 * m.mass[i * count + j] * x[j][k];
+    for (int r = 0; r < 3; ++r) {
+      moments.first_kg_m[r] += sum[r];
+      for (int c = 0; c < 3; ++c) moments.second_kg_m2[3 * r + c] += x[i][r] * sum[c];
+    }
   }
   return moments;
 }

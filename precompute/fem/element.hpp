@@ -3,16 +3,12 @@
 
 #include <array>
 #include <span>
-#include <string>
 
 #include "jobs/spec/job_spec.hpp"
+#include "precompute/fem/quadrature.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 
 namespace carillon::fem {
-
-using mesh::Vec3;
-
-inline constexpr int kMaxNodes = 10;
 
 /// Matrices of one element with n nodes (4 or 10). Degrees of freedom node by node: x, y, z of node 0, then of node 1, ...
 struct ElementMatrices {
@@ -29,11 +25,30 @@ struct ElementMoments {
   std::array<double, 9> second_kg_m2{};  // (3, 3) integral rho x x^T
 };
 
+/// From this Poisson's ratio on, T10 are the mixed form that does not lock; docs/elements.md has the figures behind it.
+inline constexpr double kMixedFrom = 0.4;
+
+/// A material as the elements use it, made once for many elements.
+struct Solid {
+  Solid(const spec::Material& material);  // NOLINT(google-explicit-constructor): a material is a solid
+
+  bool isotropic = true;
+  bool mixed = false;  // T10: isotropic and nu >= kMixedFrom
+  double lame_lambda_pa = 0.0;
+  double lame_mu_pa = 0.0;
+  double density_kg_m3 = 0.0;
+  std::array<double, 81> tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd; of anisotropic solids only
+};
+
 /// Calculates K and M of the element with node positions x, (4) or (10) in the order of mesh::TetMesh. Mid-side nodes are used where they
-/// are (isoparametric); a straight-sided T10 is integrated exactly, a curved one by rules of degree 5 (K) and 7 (M).
+/// are (isoparametric) unless all lie within 1e-6 of an edge's length from its middle. Straight-sided T10 are integrated exactly; the mass
+/// of curved ones too, their stiffness by a rule of degree 5.
 /// T4: OSG02 eqs. 12 (corrected: + vol), 14, 15; T10: the same strain energy, HRZ lumping (Hinton, Rock and Zienkiewicz 1976).
-/// Returns false, with `out` unusable, when the Jacobian is not positive at every integration point and node. Not collective.
-[[nodiscard]] bool calc_element(std::span<const Vec3> x, const spec::Material& material, spec::Mass mass, ElementMatrices& out);
+/// Nearly incompressible T10 (Solid::mixed): the dilatation is projected on the linear functions of the element and three bubble
+/// displacements without mass are condensed.
+/// Returns false, with `out` unusable, when the Jacobian is not positive at every node and integration point of the stiffness; each of them
+/// is one that mesh::is_folded tests. Not collective.
+[[nodiscard]] bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, ElementMatrices& out);
 
 /// Calculates the moments of the element; exact for straight and curved T10. Not collective.
 ElementMoments calc_moments(std::span<const Vec3> x, double density_kg_m3);
