@@ -17,7 +17,7 @@ struct Analysis {
     std::int64_t peak_bytes = 0;  // factor, update matrices at their worst moment, and workspace of a solve
   };
   std::vector<Rank> ranks;
-  std::int64_t entries = 0;          // sums over the ranks
+  std::int64_t entries = 0;  // sums over the ranks
   double flops = 0;
   std::int64_t peak_bytes = 0;
   std::int64_t largest_peak_bytes = 0;  // of one rank

@@ -1,0 +1,154 @@
+// Method:     Plan, numbers and workspace behind one door; a factorisation is trusted by what it does to a vector whose image is known.
+// Source:     Rigal and Gaches 1967 (normwise backward error); Higham 2002, section 7.1.
+// Deviations: the infinity norm of K - sigma M is bounded by ||K|| + |sigma| ||M||.
+#include "precompute/ldlt/factor.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <new>
+
+#include "precompute/ldlt/local_rows.hpp"
+#include "precompute/ldlt/numeric.hpp"
+#include "precompute/petsc/handle.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::ldlt {
+namespace {
+
+using petsc::check;
+
+constexpr double kWorstBackwardError = 1e-10;
+constexpr double kVanishedPivot = 64 * std::numeric_limits<double>::epsilon();  // relative to ||A||_inf
+
+/// A number in [-1, 1) that depends on the row alone (splitmix64).
+double find_noise(std::uint64_t row) {
+  std::uint64_t z = (row + 1) * 0x9e3779b97f4a7c15ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  z ^= z >> 31;
+  return static_cast<double>(z >> 11) * 0x1p-52 - 1.0;
+}
+
+}  // namespace
+
+struct Factor::State {
+  Mat stiffness = nullptr;
+  Mat mass = nullptr;
+  Plan plan;
+  Numbers numbers;
+  Workspace workspace;
+  double sigma = 0;
+  double norm = 0;
+  double backward_error = 0;
+  bool is_allocated = false;
+
+  void allocate();
+  double calc_norm() const;
+  /// y = (K - sigma M) x on this rank's rows. Collective.
+  void apply(Vec x, Vec y, Vec scratch) const;
+  double measure_backward_error();
+};
+
+void Factor::State::allocate() {
+  if (is_allocated) return;
+  try {
+    petsc::run_agreed(plan.comm, [&] {
+      numbers = make_numbers(plan);
+      workspace = make_workspace(plan);
+    });
+  } catch (const SystemError&) {
+    throw SystemError(
+        fmt::format("Out of memory: L D L^T of K - sigma M needs {:.2f} GB, {:.2f} GB on the fullest of {} ranks. Take a coarser mesh, or "
+                    "more machines.",
+                    1e-9 * static_cast<double>(plan.analysis.peak_bytes), 1e-9 * static_cast<double>(plan.analysis.largest_peak_bytes),
+                    plan.analysis.ranks.size()));
+  }
+  is_allocated = true;
+}
+
+double Factor::State::calc_norm() const {
+  double k = 0;
+  double m = 0;
+  check(MatNorm(stiffness, NORM_INFINITY, &k));
+  check(MatNorm(mass, NORM_INFINITY, &m));
+  return k + std::abs(sigma) * m;
+}
+
+void Factor::State::apply(Vec x, Vec y, Vec scratch) const {
+  check(MatMult(stiffness, x, y));
+  check(MatMult(mass, x, scratch));
+  check(VecAXPY(y, -sigma, scratch));
+}
+
+double Factor::State::measure_backward_error() {
+  petsc::VecHandle x;
+  petsc::VecHandle b;
+  petsc::VecHandle scratch;
+  check(MatCreateVecs(stiffness, x.out(), b.out()));
+  check(VecDuplicate(x, scratch.out()));
+  PetscInt first = 0;
+  PetscInt last = 0;
+  check(VecGetOwnershipRange(x, &first, &last));
+  PetscScalar* values = nullptr;
+  check(VecGetArray(x, &values));
+  for (PetscInt i = first; i < last; ++i) values[i - first] = find_noise(static_cast<std::uint64_t>(i));
+  check(VecRestoreArray(x, &values));
+  apply(x, b, scratch);
+  check(VecCopy(b, x));
+  check(VecGetArray(x, &values));
+  solve_columns(plan, numbers, workspace, values, std::max<PetscInt>(last - first, 1), 1);
+  check(VecRestoreArray(x, &values));
+  double b_norm = 0;
+  double x_norm = 0;
+  double residual = 0;
+  check(VecNorm(b, NORM_INFINITY, &b_norm));
+  check(VecNorm(x, NORM_INFINITY, &x_norm));
+  petsc::VecHandle image;
+  check(VecDuplicate(b, image.out()));
+  apply(x, image, scratch);
+  check(VecAXPY(image, -1.0, b));
+  check(VecNorm(image, NORM_INFINITY, &residual));
+  const double scale = norm * x_norm + b_norm;
+  const double error = scale > 0 ? residual / scale : 0;
+  return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
+}
+
+Factor::Factor(Mat stiffness, Mat mass) : state_(std::make_unique<State>()) {
+  state_->stiffness = stiffness;
+  state_->mass = mass;
+  state_->plan = make_plan(stiffness, mass);
+}
+
+Factor::~Factor() = default;
+Factor::Factor(Factor&&) noexcept = default;
+Factor& Factor::operator=(Factor&&) noexcept = default;
+
+const Analysis& Factor::get_analysis() const { return state_->plan.analysis; }
+
+bool Factor::factorise(double sigma) {
+  State& s = *state_;
+  s.allocate();
+  s.sigma = sigma;
+  s.norm = s.calc_norm();
+  factorise_fronts(s.plan, s.stiffness, s.mass, sigma, s.numbers);
+  s.backward_error = std::numeric_limits<double>::infinity();
+  if (!s.numbers.is_complete || s.numbers.smallest <= kVanishedPivot * s.norm) return false;
+  s.backward_error = s.measure_backward_error();
+  return s.backward_error <= kWorstBackwardError;
+}
+
+std::int64_t Factor::get_negative_pivots() const { return state_->numbers.negative; }
+double Factor::get_backward_error() const { return state_->backward_error; }
+double Factor::get_growth() const { return state_->numbers.growth; }
+
+void Factor::solve(double* x, int stride, int columns) {
+  for (int first = 0; first < columns; first += kSolveColumns)
+    solve_columns(state_->plan, state_->numbers, state_->workspace, x + static_cast<std::ptrdiff_t>(first) * stride, stride,
+                  std::min(kSolveColumns, columns - first));
+}
+
+}  // namespace carillon::ldlt

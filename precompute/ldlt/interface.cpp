@@ -1,0 +1,213 @@
+// Method:     The separator between the ranks is one-sided: of two neighbours on different ranks the one on the higher rank belongs to it.
+//             So interior nodes of different ranks are never neighbours, and each rank eliminates its own without a message. Interface
+//             nodes that touch the same ranks form a group; eliminating an interior makes a clique of its boundary, so groups are ordered
+//             by minimum weighted degree in the graph where groups near a common rank are neighbours. Supernodes of the interface go to the
+//             least loaded rank of those below them in the tree.
+// Source:     Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear equations. George and Liu 1989, The
+//             evolution of the minimum degree ordering algorithm. Geist and Ng 1989, Task scheduling for parallel sparse Cholesky
+//             factorization (subtree to rank).
+// Deviations: the interface is planned on every rank, in memory that grows with the whole interface (not with the whole graph).
+#include "precompute/ldlt/interface.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <set>
+
+namespace carillon::ldlt {
+namespace {
+
+using partition::Graph;
+
+Ints gather_ints(MPI_Comm comm, const Ints& own, std::vector<int>& counts) {
+  int size = 0;
+  MPI_Comm_size(comm, &size);
+  counts.assign(size, 0);
+  const int mine = static_cast<int>(own.size());
+  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
+  std::vector<int> offsets(size, 0);
+  std::partial_sum(counts.begin(), counts.end() - 1, offsets.begin() + 1);
+  Ints all(static_cast<std::size_t>(offsets.back()) + static_cast<std::size_t>(counts.back()));
+  MPI_Allgatherv(own.data(), mine, MPI_INT32_T, all.data(), counts.data(), offsets.data(), MPI_INT32_T, comm);
+  return all;
+}
+
+/// Interface nodes near the same ranks.
+struct GroupGraph {
+  Ints group_of;                     // by index
+  std::vector<std::int64_t> weight;  // nodes
+  std::vector<std::set<std::int32_t>> links;
+};
+
+GroupGraph make_groups(const Interface& interface) {
+  GroupGraph groups;
+  std::map<Ints, std::int32_t> known;
+  std::map<std::int32_t, Ints> near;  // groups by rank
+  for (std::int32_t i = 0; i < interface.count(); ++i) {
+    const Ints ranks(interface.near_ranks.begin(i), interface.near_ranks.end(i));
+    const auto [at, is_new] = known.try_emplace(ranks, static_cast<std::int32_t>(known.size()));
+    if (is_new) {
+      groups.weight.push_back(0);
+      for (const std::int32_t rank : ranks) near[rank].push_back(at->second);
+    }
+    ++groups.weight[at->second];
+    groups.group_of.push_back(at->second);
+  }
+  groups.links.resize(groups.weight.size());
+  const auto link = [&](std::int32_t a, std::int32_t b) {
+    if (a != b) groups.links[a].insert(b);
+  };
+  for (const auto& [rank, members] : near)
+    for (const std::int32_t a : members)
+      for (const std::int32_t b : members) link(a, b);
+  for (std::int32_t i = 0; i < interface.count(); ++i)
+    for (const std::int32_t* j = interface.links.begin(i); j != interface.links.end(i); ++j) {
+      link(groups.group_of[i], groups.group_of[*j]);
+      link(groups.group_of[*j], groups.group_of[i]);
+    }
+  return groups;
+}
+
+/// Groups in the order of elimination.
+Ints order_groups(GroupGraph& groups) {
+  Ints order;
+  std::vector<bool> is_gone(groups.weight.size(), false);
+  while (order.size() < groups.weight.size()) {
+    std::int32_t best = -1;
+    std::int64_t best_degree = std::numeric_limits<std::int64_t>::max();
+    for (std::size_t g = 0; g < is_gone.size(); ++g) {
+      if (is_gone[g]) continue;
+      std::int64_t degree = groups.weight[g];
+      for (const std::int32_t h : groups.links[g]) degree += groups.weight[h];
+      if (degree >= best_degree) continue;
+      best_degree = degree;
+      best = static_cast<std::int32_t>(g);
+    }
+    is_gone[best] = true;
+    order.push_back(best);
+    for (const std::int32_t a : groups.links[best]) {
+      groups.links[a].erase(best);
+      for (const std::int32_t b : groups.links[best])
+        if (a != b) groups.links[a].insert(b);
+    }
+  }
+  return order;
+}
+
+/// The interface in elimination order behind its hubs.
+Graph make_graph(const Interface& interface) {
+  const std::int32_t hubs = interface.hubs.count();
+  std::vector<Ints> hubs_at(interface.nodes.size());
+  Graph graph;
+  graph.offsets.push_back(0);
+  const auto close = [&] { graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size())); };
+  for (std::int32_t h = 0; h < hubs; ++h) {
+    for (const std::int32_t* row = interface.hubs.begin(h); row != interface.hubs.end(h); ++row) {
+      graph.neighbours.push_back(hubs + *row);
+      hubs_at[*row].push_back(h);
+    }
+    close();
+  }
+  for (std::int32_t p = 0; p < interface.count(); ++p) {
+    graph.neighbours.insert(graph.neighbours.end(), hubs_at[p].begin(), hubs_at[p].end());
+    const std::int32_t i = interface.index[p];
+    for (const std::int32_t* j = interface.links.begin(i); j != interface.links.end(i); ++j)
+      graph.neighbours.push_back(hubs + interface.position[*j]);
+    close();
+  }
+  return graph;
+}
+
+void set_positions(Interface& interface, const Ints& position) {
+  interface.position = position;
+  interface.index.resize(position.size());
+  for (std::size_t i = 0; i < position.size(); ++i) interface.index[position[i]] = static_cast<std::int32_t>(i);
+}
+
+/// Each supernode to the least loaded of the ranks whose work lies below it.
+void choose_owners(Interface& interface, std::vector<double> load) {
+  const std::vector<Supernode>& supernodes = interface.forest.supernodes;
+  std::vector<std::set<std::int32_t>> below(supernodes.size());
+  for (std::int32_t h = 0; h < interface.hubs.count(); ++h)
+    if (interface.forest.hub_parents[h] >= 0) below[interface.forest.hub_parents[h]].insert(interface.hub_rank[h]);
+  interface.owner.resize(supernodes.size());
+  for (std::size_t s = 0; s < supernodes.size(); ++s) {
+    const Supernode& node = supernodes[s];
+    if (below[s].empty()) {
+      const std::int32_t i = interface.index[node.first];
+      const auto after = std::upper_bound(interface.first_of_rank.begin(), interface.first_of_rank.end(), i);
+      below[s].insert(static_cast<std::int32_t>(after - interface.first_of_rank.begin()) - 1);
+    }
+    interface.owner[s] = *std::min_element(below[s].begin(), below[s].end(), [&](int a, int b) { return load[a] < load[b]; });
+    load[interface.owner[s]] += calc_cost_ns(node.width, node.size());
+    if (node.parent >= 0) below[node.parent].insert(below[s].begin(), below[s].end());
+    below[s].clear();
+  }
+}
+
+}  // namespace
+
+Lists gather_lists(MPI_Comm comm, const Lists& own, Ints& first_of_rank) {
+  Ints lengths;
+  for (std::int32_t i = 0; i < own.count(); ++i) lengths.push_back(own.offsets[i + 1] - own.offsets[i]);
+  std::vector<int> counts;
+  const Ints all_lengths = gather_ints(comm, lengths, counts);
+  first_of_rank.assign(1, 0);
+  for (const int count : counts) first_of_rank.push_back(first_of_rank.back() + count);
+  Lists all;
+  for (const std::int32_t length : all_lengths) all.offsets.push_back(all.offsets.back() + length);
+  all.items = gather_ints(comm, own.items, counts);
+  return all;
+}
+
+std::int32_t Interface::find(std::int32_t global_node) const {
+  const auto at = std::lower_bound(nodes.begin(), nodes.end(), global_node);
+  return at != nodes.end() && *at == global_node ? static_cast<std::int32_t>(at - nodes.begin()) : -1;
+}
+
+void order_interface(Interface& interface) {
+  GroupGraph groups = make_groups(interface);
+  const Ints order = order_groups(groups);
+  Ints rank_of_group(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) rank_of_group[order[k]] = static_cast<std::int32_t>(k);
+  interface.index.resize(interface.nodes.size());
+  std::iota(interface.index.begin(), interface.index.end(), 0);
+  std::stable_sort(interface.index.begin(), interface.index.end(),
+                   [&](std::int32_t a, std::int32_t b) { return rank_of_group[groups.group_of[a]] < rank_of_group[groups.group_of[b]]; });
+  interface.position.resize(interface.nodes.size());
+  for (std::int32_t p = 0; p < interface.count(); ++p) interface.position[interface.index[p]] = p;
+}
+
+void plan_interface(Interface& interface, std::vector<double> load) {
+  interface.forest = find_supernodes(make_graph(interface), interface.hubs.count(), interface.count());
+  const Ints& moved = interface.forest.position;
+  for (std::int32_t& row : interface.hubs.items) row = moved[row];
+  for (std::int32_t h = 0; h < interface.hubs.count(); ++h)
+    std::sort(interface.hubs.items.begin() + interface.hubs.offsets[h], interface.hubs.items.begin() + interface.hubs.offsets[h + 1]);
+  Ints position = interface.position;
+  for (std::int32_t& p : position) p = moved[p];
+  set_positions(interface, position);
+  choose_owners(interface, std::move(load));
+}
+
+Ints find_touched_positions(const Interface& interface, int rank) {
+  Ints touched;
+  for (std::int32_t i = interface.first_of_rank[rank]; i < interface.first_of_rank[rank + 1]; ++i) {
+    touched.push_back(interface.position[i]);
+    for (const std::int32_t* j = interface.links.begin(i); j != interface.links.end(i); ++j) touched.push_back(interface.position[*j]);
+  }
+  for (std::int32_t h = 0; h < interface.hubs.count(); ++h)
+    if (interface.hub_rank[h] == rank) touched.insert(touched.end(), interface.hubs.begin(h), interface.hubs.end(h));
+  for (std::size_t s = 0; s < interface.owner.size(); ++s) {
+    if (interface.owner[s] != rank) continue;
+    const Supernode& node = interface.forest.supernodes[s];
+    for (std::int32_t k = 0; k < node.width; ++k) touched.push_back(node.first + k);
+    touched.insert(touched.end(), node.rows.begin(), node.rows.end());
+  }
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  return touched;
+}
+
+}  // namespace carillon::ldlt

@@ -1,0 +1,58 @@
+// The nodes that separate the ranks: gathered, ordered and planned on every rank alike.
+#pragma once
+
+#include <mpi.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/ldlt/symbolic.hpp"
+
+namespace carillon::ldlt {
+
+using Ints = std::vector<std::int32_t>;
+
+/// Lists of integers, one after the other.
+struct Lists {
+  Ints offsets{0};
+  Ints items;
+  std::int32_t count() const { return static_cast<std::int32_t>(offsets.size()) - 1; }
+  const std::int32_t* begin(std::int32_t i) const { return items.data() + offsets[i]; }
+  const std::int32_t* end(std::int32_t i) const { return items.data() + offsets[i + 1]; }
+  void close() { offsets.push_back(static_cast<std::int32_t>(items.size())); }
+};
+
+/// The lists of all ranks in order of rank. first_of_rank: (ranks + 1) where each rank's begin. Collective.
+Lists gather_lists(MPI_Comm comm, const Lists& own, Ints& first_of_rank);
+
+/// Interface nodes are numbered first by their global numbers (`index`), then by the order of elimination (`position`).
+struct Interface {
+  Ints nodes;          // (I) global node of each index, ascending
+  Ints first_of_rank;  // (ranks + 1) first index of each rank
+  Lists links;         // (I) neighbouring interface nodes: indices
+  Lists near_ranks;    // (I) ranks that have interior neighbours of the node, ascending
+  Ints position;       // (I) by index
+  Ints index;          // (I) by position
+
+  Lists hubs;  // rows that each root of an interior forest leaves: positions, ascending
+  Ints hub_rank;
+  Forest forest;  // of positions
+  Ints owner;     // (supernodes) rank
+
+  std::int32_t find(std::int32_t global_node) const;  // index, -1: not an interface node
+  std::int32_t count() const { return static_cast<std::int32_t>(nodes.size()); }
+};
+
+/// A first elimination order: nodes between the same ranks stay together, such groups go by minimum degree. Fills position and index.
+/// Local, and the same on every rank.
+void order_interface(Interface& interface);
+
+/// Eliminates the interface on paper: supernodes (which refines the order) and their ranks. hubs hold first positions; load: what each rank
+/// has to do already [ns]. Local, and the same on every rank.
+void plan_interface(Interface& interface, std::vector<double> load);
+
+/// The positions with which a rank has to do: its own interface nodes with their neighbours, the boundary of its interior, and the fronts
+/// that it owns. Ascending.
+Ints find_touched_positions(const Interface& interface, int rank);
+
+}  // namespace carillon::ldlt

@@ -1,0 +1,44 @@
+// The inner loops, compiled for several instruction sets; the processor picks at start.
+#pragma once
+
+#include <cstdint>
+
+namespace carillon::ldlt {
+
+/// Rows of L that lie together in memory. A block of m rows and n columns is stored as tiles of kTileRows rows (the last one may be lower),
+/// each by columns: both directions of a solve then read it once from front to end.
+inline constexpr int kTileRows = 12;
+/// Largest order of a diagonal block.
+inline constexpr int kMaxBlock = 72;
+
+/// D and the permutation of a diagonal block B (n, n): P B P^T = L D L^T.
+struct BlockPivots {
+  // The inverse of D: 1x1 pivots have off[k] = 0; a 2x2 pivot at k, k + 1 has off[k] != 0 and off[k + 1] = 0.
+  double diagonal[kMaxBlock];
+  double off[kMaxBlock];
+  int negative = 0;     // eigenvalues of D below zero
+  double smallest = 0;  // least magnitude of an eigenvalue of D (of 2x2 pivots: a lower bound)
+};
+
+/// Right-hand sides are rows of 8 * vectors numbers, aligned to 64 bytes; vectors is 1 or 2.
+struct Kernels {
+  /// out (m rows) -= A in (n rows); A (m, n) in tiles.
+  void (*subtract_product)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
+  /// out (m rows) = A in.
+  void (*set_product)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
+  /// out (n rows) -= A^T in (m rows).
+  void (*subtract_transposed)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
+  /// out (n rows) += A^T in.
+  void (*add_transposed)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
+  /// Factorises a symmetric block, both triangles given, columns kMaxBlock apart, by rook pivoting; replaces it by T = L^-1 P with rows
+  /// kMaxBlock apart. False if a pivot vanishes exactly or is not finite.
+  bool (*factorise_block)(double* block, int n, BlockPivots& pivots);
+  /// target[to[i]] += source[i] for i < n.
+  void (*scatter_add)(const double* source, const std::int32_t* to, int n, double* target);
+  const char* name;
+};
+
+/// The fastest that this processor runs.
+const Kernels& get_kernels();
+
+}  // namespace carillon::ldlt

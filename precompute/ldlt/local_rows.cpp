@@ -1,0 +1,54 @@
+#include "precompute/ldlt/local_rows.hpp"
+
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::ldlt {
+
+using petsc::check;
+
+void LocalRows::Part::open(Mat sequential) {
+  PetscInt count = 0;
+  PetscBool done = PETSC_FALSE;
+  check(MatGetRowIJ(sequential, 0, PETSC_FALSE, PETSC_FALSE, &count, &offsets, &columns, &done));
+  if (done != PETSC_TRUE) throw SolveError("PETSc does not give the rows of a matrix. Assemble it as AIJ.");
+  matrix = sequential;
+  check(MatSeqAIJGetArrayRead(sequential, &values));
+}
+
+void LocalRows::Part::close() {
+  if (matrix == nullptr) return;
+  PetscInt count = 0;
+  PetscBool done = PETSC_FALSE;
+  (void)MatSeqAIJRestoreArrayRead(matrix, &values);
+  (void)MatRestoreRowIJ(matrix, 0, PETSC_FALSE, PETSC_FALSE, &count, &offsets, &columns, &done);
+}
+
+LocalRows::LocalRows(Mat matrix) {
+  PetscInt last = 0;
+  check(MatGetOwnershipRange(matrix, &first_, &last));
+  rows_ = last - first_;
+  PetscBool is_parallel = PETSC_FALSE;
+  PetscBool is_sequential = PETSC_FALSE;
+  check(PetscObjectBaseTypeCompare(reinterpret_cast<PetscObject>(matrix), MATMPIAIJ, &is_parallel));
+  check(PetscObjectBaseTypeCompare(reinterpret_cast<PetscObject>(matrix), MATSEQAIJ, &is_sequential));
+  if (is_parallel == PETSC_TRUE) {
+    Mat own = nullptr;
+    Mat ghost = nullptr;
+    check(MatMPIAIJGetSeqAIJ(matrix, &own, &ghost, &ghosts_));
+    check(MatGetSize(ghost, nullptr, &ghost_count_));
+    own_.open(own);
+    ghost_.open(ghost);
+  } else if (is_sequential == PETSC_TRUE) {
+    own_.open(matrix);
+  } else {
+    throw InputError("K and M of a factorisation must be AIJ matrices. Convert them with MatConvert.");
+  }
+}
+
+LocalRows::~LocalRows() {
+  own_.close();
+  ghost_.close();
+}
+
+}  // namespace carillon::ldlt

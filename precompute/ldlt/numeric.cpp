@@ -1,0 +1,417 @@
+// Method:     Multifrontal L D L^T. A front holds its pivot columns (f, w) and an update matrix (r, r) for the rows behind them; entries of
+// A and
+//             the children's update matrices are added in, panels of at most 72 columns are eliminated one after the other, and the update
+//             matrix goes to the parent. In a panel the diagonal block is factorised with pivoting (P A11 P^T = L11 D L11^T), T = L11^-1 P
+//             is kept instead of L11, and W = A21 T^T = L21 D, L21 = W D^-1, A22 -= L21 W^T are matrix products.
+// Source:     Duff and Reid 1983; Liu 1992; Schenk and Gaertner 2006 (pivots are sought inside the diagonal block only). The explicit
+// inverse:
+//             Higham 2002, Accuracy and stability of numerical algorithms, chapter 14 (L11 has entries of order one by rook pivoting).
+// Deviations: no delayed pivots: a bad pivot shows in the backward error, which the caller is told.
+#include "precompute/ldlt/numeric.hpp"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <new>
+
+#include "precompute/ldlt/kernels.hpp"
+#include "precompute/ldlt/local_rows.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+extern "C" void dgemm_(const char* trans_a, const char* trans_b, const int* m, const int* n, const int* k, const double* alpha,
+                       const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c, const int* ldc);
+
+namespace carillon::ldlt {
+namespace {
+
+static_assert(3 * kPanelNodes <= kMaxBlock);
+
+/// C (m, n) <- beta C + alpha A (m, k) op(B).
+void multiply(char trans_b, int m, int n, int k, double alpha, const double* a, int lda, const double* b, int ldb, double beta, double* c,
+              int ldc) {
+  if (m == 0 || n == 0) return;
+  dgemm_("N", &trans_b, &m, &n, &k, &alpha, a, &lda, b, &ldb, &beta, c, &ldc);
+}
+
+/// A (m, n) by columns, ld apart, to tiles. Returns the end.
+double* pack_tiles(const double* a, int ld, int m, int n, double* tiles) {
+  for (int i = 0; i < m; i += kTileRows) {
+    const int height = std::min(kTileRows, m - i);
+    for (int k = 0; k < n; ++k, tiles += height) std::memcpy(tiles, a + static_cast<std::ptrdiff_t>(k) * ld + i, sizeof(double) * height);
+  }
+  return tiles;
+}
+
+class Factoriser {
+ public:
+  Factoriser(const Plan& plan, Mat stiffness, Mat mass, double sigma, Numbers& numbers)
+      : plan_(plan), k_(stiffness), m_(mass), sigma_(sigma), numbers_(numbers), kernels_(get_kernels()) {
+    std::int64_t largest = 0;
+    std::int64_t scratch = 0;
+    for (const Front& front : plan.fronts) {
+      largest = std::max(largest, std::int64_t{9} * front.size() * front.width);
+      scratch = std::max(scratch, std::int64_t{9} * front.size() * kPanelNodes);
+    }
+    columns_ = Buffer(largest);
+    product_ = Buffer(scratch);
+    block_ = Buffer(kMaxBlock * kMaxBlock);
+    for (int parity = 0; parity < 2; ++parity) stack_[parity] = Buffer(plan.stack_entries[parity]);
+    where_.assign(plan.local_nodes, -1);
+    loose_.resize(plan.fronts.size());
+    remote_.resize(plan.fronts.size());
+    for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
+      const Front& front = plan.fronts[s];
+      if (!is_stacked(front)) loose_[s] = Buffer(count_update(front));
+      for (const Edge& edge : front.remote_children) remote_[s].emplace_back(count_packed(3 * static_cast<std::int64_t>(edge.rows.size())));
+    }
+    for (const BlockList& list : plan.sent) sent_.emplace_back(9 * list.columns.size());
+    for (const BlockList& list : plan.received) received_.emplace_back(9 * list.columns.size());
+    own_of_local_.assign(plan.local_nodes, -1);
+    for (std::int32_t v = 0; v < plan.own_nodes; ++v) own_of_local_[plan.node_of_own[v]] = v;
+  }
+
+  void run() {
+    start_blocks();
+    for (std::int32_t s = 0; s < plan_.interior_fronts; ++s) process(s);
+    finish_blocks();
+    for (std::int32_t s = plan_.interior_fronts; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s);
+    MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
+    reduce();
+  }
+
+ private:
+  static std::int64_t count_update(const Front& front) {
+    const auto r = 3 * static_cast<std::int64_t>(front.rows.size());
+    return r * r;
+  }
+  static std::int64_t count_packed(std::int64_t r) { return r * (r + 1) / 2; }
+  bool is_stacked(const Front& front) const { return front.parent >= 0 && front.parent < plan_.interior_fronts; }
+
+  void process(std::int32_t s) {
+    const Front& front = plan_.fronts[s];
+    w_ = 3 * front.width;
+    r_ = 3 * static_cast<int>(front.rows.size());
+    f_ = w_ + r_;
+    update_ = is_stacked(front) ? stack_[front.depth % 2].data() + used_[front.depth % 2] : loose_[s].data();
+    if (is_stacked(front)) used_[front.depth % 2] += count_update(front);
+    clear();
+    for (std::int32_t i = 0; i < front.width; ++i) where_[front.first + i] = i;
+    for (std::size_t i = 0; i < front.rows.size(); ++i) where_[front.rows[i]] = front.width + static_cast<std::int32_t>(i);
+    front.is_interface ? add_blocks(front) : add_entries(front);
+    for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c]);  // the last one lies on top
+    for (std::size_t c = 0; c < front.remote_children.size(); ++c) add_remote_child(front.remote_children[c], remote_[s][c]);
+    eliminate(front, numbers_.panels.data() + numbers_.front_offsets[s]);
+    if (front.to_parent.rank >= 0) send_update(front, s);
+  }
+
+  void clear() {
+    std::memset(columns_.data(), 0, sizeof(double) * static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_));
+    for (std::ptrdiff_t j = 0; j < r_; ++j) std::memset(update_ + j * r_ + j, 0, sizeof(double) * static_cast<std::size_t>(r_ - j));
+  }
+
+  /// Adds factor times this rank's row 3 v + d of a matrix to column `target` of the front; `first`: its first pivot.
+  void add_row(const LocalRows& rows, const Ints& ghosts, PetscInt row, std::int32_t first, double factor, double* target) const {
+    const auto add = [&](std::int32_t node, PetscInt column, double value) {
+      if (node >= first) target[3 * where_[node] + column % 3] += factor * value;
+    };
+    rows.visit(
+        row, [&](PetscInt column, double value) { add(plan_.node_of_own[column / 3], column, value); },
+        [&](PetscInt ghost, double value) { add(ghosts[ghost], rows.ghosts()[ghost], value); });
+  }
+
+  void add_entries(const Front& front) {
+    for (std::int32_t i = 0; i < front.width; ++i)
+      for (int d = 0; d < 3; ++d) {
+        const PetscInt row = 3 * own_of_local_[front.first + i] + d;
+        double* target = columns_.data() + static_cast<std::ptrdiff_t>(3 * i + d) * f_;
+        add_row(k_, plan_.node_of_ghost_k, row, front.first, 1.0, target);
+        add_row(m_, plan_.node_of_ghost_m, row, front.first, -sigma_, target);
+      }
+  }
+
+  /// Collects the 3x3 blocks between interface nodes that this rank's rows hold, and sends them to the owners of their fronts.
+  void start_blocks() {
+    Ints slot(plan_.local_nodes, -1);
+    for (std::size_t l = 0; l < plan_.sent.size(); ++l) {
+      const BlockList& list = plan_.sent[l];
+      std::fill(sent_[l].begin(), sent_[l].end(), 0.0);
+      for (std::size_t begin = 0; begin < list.columns.size();) {
+        std::size_t end = begin;
+        for (; end < list.columns.size() && list.columns[end] == list.columns[begin]; ++end)
+          slot[list.rows[end]] = static_cast<std::int32_t>(end);
+        collect_blocks(own_of_local_[list.columns[begin]], slot, sent_[l]);
+        for (std::size_t i = begin; i < end; ++i) slot[list.rows[i]] = -1;
+        begin = end;
+      }
+    }
+    for (std::size_t l = 0; l < plan_.received.size(); ++l)
+      if (plan_.received[l].rank != plan_.rank)
+        MPI_Irecv(received_[l].data(), static_cast<int>(received_[l].size()), MPI_DOUBLE, plan_.received[l].rank, kBlockTag, plan_.comm,
+                  &block_requests_.emplace_back());
+    for (std::size_t l = 0; l < plan_.sent.size(); ++l)
+      if (plan_.sent[l].rank != plan_.rank)
+        MPI_Isend(sent_[l].data(), static_cast<int>(sent_[l].size()), MPI_DOUBLE, plan_.sent[l].rank, kBlockTag, plan_.comm,
+                  &block_requests_.emplace_back());
+  }
+
+  void collect_blocks(std::int32_t own, const Ints& slot, std::vector<double>& blocks) const {
+    for (int d = 0; d < 3; ++d) {
+      const auto collect = [&](const LocalRows& rows, const Ints& ghosts, double factor) {
+        const auto add = [&](std::int32_t node, PetscInt column, double value) {
+          if (node >= 0 && slot[node] >= 0)
+            blocks[9 * static_cast<std::size_t>(slot[node]) + static_cast<std::size_t>(3 * d + column % 3)] += factor * value;
+        };
+        rows.visit(
+            3 * own + d, [&](PetscInt column, double value) { add(plan_.node_of_own[column / 3], column, value); },
+            [&](PetscInt ghost, double value) { add(ghosts[ghost], rows.ghosts()[ghost], value); });
+      };
+      collect(k_, plan_.node_of_ghost_k, 1.0);
+      collect(m_, plan_.node_of_ghost_m, -sigma_);
+    }
+  }
+
+  void finish_blocks() {
+    MPI_Waitall(static_cast<int>(block_requests_.size()), block_requests_.data(), MPI_STATUSES_IGNORE);
+    for (std::size_t l = 0; l < plan_.received.size(); ++l)
+      if (plan_.received[l].rank == plan_.rank)
+        for (std::size_t k = 0; k < plan_.sent.size(); ++k)
+          if (plan_.sent[k].rank == plan_.rank) received_[l].swap(sent_[k]);
+    block_at_.assign(plan_.received.size(), 0);
+  }
+
+  /// Adds the blocks of an interface front; fronts and blocks are in the same order.
+  void add_blocks(const Front& front) {
+    for (std::size_t l = 0; l < plan_.received.size(); ++l) {
+      const BlockList& list = plan_.received[l];
+      std::size_t& at = block_at_[l];
+      for (; at < list.columns.size() && list.columns[at] < front.first + front.width; ++at)
+        for (int d = 0; d < 3; ++d)
+          for (int e = 0; e < 3; ++e)
+            columns_.data()[static_cast<std::ptrdiff_t>(3 * where_[list.columns[at]] + d) * f_ + 3 * where_[list.rows[at]] + e] +=
+                received_[l][9 * at + static_cast<std::size_t>(3 * d + e)];
+    }
+  }
+
+  /// Rows of a child in the front, and the same less the pivots.
+  void locate(const Ints& rows) {
+    to_columns_.clear();
+    to_update_.clear();
+    for (const std::int32_t node : rows)
+      for (int d = 0; d < 3; ++d) {
+        to_columns_.push_back(3 * where_[node] + d);
+        to_update_.push_back(3 * where_[node] + d - w_);
+      }
+  }
+
+  /// Adds column j of a child's update matrix, from its diagonal on.
+  void add_column(const double* source, int j) {
+    const int column = to_columns_[j];
+    const int count = static_cast<int>(to_columns_.size()) - j;
+    if (column < w_)
+      kernels_.scatter_add(source, to_columns_.data() + j, count, columns_.data() + static_cast<std::ptrdiff_t>(column) * f_);
+    else
+      kernels_.scatter_add(source, to_update_.data() + j, count, update_ + static_cast<std::ptrdiff_t>(column - w_) * r_);
+  }
+
+  void add_child(std::int32_t s) {
+    const Front& child = plan_.fronts[s];
+    locate(child.rows);
+    const std::ptrdiff_t r = static_cast<std::ptrdiff_t>(to_columns_.size());
+    const bool stacked = is_stacked(child);
+    if (stacked) used_[child.depth % 2] -= r * r;
+    const double* source = child_update(child, s);
+    for (std::ptrdiff_t j = 0; j < r; ++j) add_column(source + j * r + j, static_cast<int>(j));
+    if (!stacked) loose_[s] = Buffer();
+  }
+
+  /// Children lie on their stack in order, and are taken from behind: so where they begin follows from what is used below them.
+  const double* child_update(const Front& child, std::int32_t s) const {
+    return is_stacked(child) ? stack_[child.depth % 2].data() + used_[child.depth % 2] : loose_[s].data();
+  }
+
+  void add_remote_child(const Edge& edge, Buffer& packed) {
+    MPI_Recv(packed.data(), static_cast<int>(packed.size()), MPI_DOUBLE, edge.rank, kUpdateTag + edge.tag, plan_.comm, MPI_STATUS_IGNORE);
+    locate(edge.rows);
+    const int r = static_cast<int>(to_columns_.size());
+    const double* source = packed.data();
+    for (int j = 0; j < r; ++j) {
+      add_column(source, j);
+      source += r - j;
+    }
+    packed = Buffer();
+  }
+
+  /// Packs the lower triangle in place, column after column, and sends it.
+  void send_update(const Front& front, std::int32_t s) {
+    double* packed = update_;
+    for (std::ptrdiff_t j = 0; j < r_; ++j) {
+      std::memmove(packed, update_ + j * r_ + j, sizeof(double) * static_cast<std::size_t>(r_ - j));
+      packed += r_ - j;
+    }
+    MPI_Isend(loose_[s].data(), static_cast<int>(count_packed(r_)), MPI_DOUBLE, front.to_parent.rank, kUpdateTag + front.to_parent.tag,
+              plan_.comm, &requests_.emplace_back());
+  }
+
+  void eliminate(const Front& front, double* packed) {
+    for (std::int32_t p = 0; p < count_panels(front.width); ++p) {
+      const int begin = 3 * find_panel_start(front.width, p);
+      const int end = 3 * find_panel_start(front.width, p + 1);
+      packed = eliminate_panel(front, p, begin, end, packed);
+    }
+  }
+
+  double* eliminate_panel(const Front& front, std::int32_t p, int begin, int end, double* packed) {
+    const int n = end - begin;
+    const int m = f_ - end;
+    double* diagonal = columns_.data() + static_cast<std::ptrdiff_t>(begin) * f_ + begin;
+    double* below = diagonal + n;
+    double* product = product_.data();
+    BlockPivots pivots;
+    factorise_diagonal(diagonal, n, pivots);
+    const std::size_t first_row = 3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin);
+    std::copy(pivots.diagonal, pivots.diagonal + n, numbers_.d_diagonal.data() + first_row);
+    std::copy(pivots.off, pivots.off + n, numbers_.d_off.data() + first_row);
+    multiply('N', m, n, n, 1.0, below, f_, block_.data(), kMaxBlock, 0.0, product, std::max(m, 1));
+    divide_by_pivots(product, m, n, pivots, below);
+    for (std::int32_t q = p + 1; q < count_panels(front.width); ++q) {
+      const int from = 3 * find_panel_start(front.width, q);
+      const int width = 3 * find_panel_start(front.width, q + 1) - from;
+      multiply('T', f_ - from, width, n, -1.0, below + (from - end), f_, product + (from - end), m, 1.0,
+               columns_.data() + static_cast<std::ptrdiff_t>(from) * f_ + from, f_);
+    }
+    for (int j = 0; j < r_; j += kUpdateColumns) {
+      const int from = w_ - end + j;
+      multiply('T', r_ - j, std::min(kUpdateColumns, r_ - j), n, -1.0, below + from, f_, product + from, m, 1.0,
+               update_ + static_cast<std::ptrdiff_t>(j) * r_ + j, r_);
+    }
+    for (int i = 0; i < n; ++i)  // T stands by rows.
+      for (int k = 0; k < i; ++k) std::swap(block_.data()[i * kMaxBlock + k], block_.data()[k * kMaxBlock + i]);
+    packed = pack_tiles(block_.data(), kMaxBlock, n, n, packed);
+    return pack_tiles(below, f_, m, n, packed);
+  }
+
+  /// block_ <- T of the diagonal block; zero with zero pivots when one vanishes, so that what follows stays finite.
+  void factorise_diagonal(const double* diagonal, int n, BlockPivots& pivots) {
+    double* block = block_.data();
+    for (int j = 0; j < n; ++j)
+      for (int i = j; i < n; ++i) block[j * kMaxBlock + i] = block[i * kMaxBlock + j] = diagonal[static_cast<std::ptrdiff_t>(j) * f_ + i];
+    if (kernels_.factorise_block(block, n, pivots)) {
+      negative_ += pivots.negative;
+      smallest_ = std::min(smallest_, pivots.smallest);
+      return;
+    }
+    is_complete_ = false;
+    std::fill(block, block + kMaxBlock * kMaxBlock, 0.0);
+    std::fill(pivots.diagonal, pivots.diagonal + n, 0.0);
+    std::fill(pivots.off, pivots.off + n, 0.0);
+  }
+
+  /// below (m, n) <- product D^-1.
+  void divide_by_pivots(const double* product, int m, int n, const BlockPivots& pivots, double* below) {
+    for (int k = 0; k < n; ++k) {
+      const double* w0 = product + static_cast<std::ptrdiff_t>(k) * m;
+      double* l0 = below + static_cast<std::ptrdiff_t>(k) * f_;
+      const double d0 = pivots.diagonal[k];
+      if (pivots.off[k] == 0) {
+        for (int i = 0; i < m; ++i) l0[i] = w0[i] * d0;
+        continue;
+      }
+      const double* w1 = w0 + m;
+      double* l1 = l0 + f_;
+      const double d1 = pivots.diagonal[k + 1];
+      const double off = pivots.off[k];
+      for (int i = 0; i < m; ++i) {
+        l0[i] = w0[i] * d0 + w1[i] * off;
+        l1[i] = w0[i] * off + w1[i] * d1;
+      }
+      ++k;
+    }
+    for (int k = 0; k < n; ++k)
+      for (int i = 0; i < m; ++i) growth_ = std::max(growth_, std::abs(below[static_cast<std::ptrdiff_t>(k) * f_ + i]));
+  }
+
+  void reduce() {
+    MPI_Allreduce(&negative_, &numbers_.negative, 1, MPI_INT64_T, MPI_SUM, plan_.comm);
+    double extremes[3] = {-smallest_, growth_, is_complete_ ? 0.0 : 1.0};
+    MPI_Allreduce(MPI_IN_PLACE, extremes, 3, MPI_DOUBLE, MPI_MAX, plan_.comm);
+    numbers_.smallest = -extremes[0];
+    numbers_.growth = extremes[1];
+    numbers_.is_complete = extremes[2] == 0;
+  }
+
+  static constexpr int kUpdateColumns = 96;
+  static constexpr int kBlockTag = 1;
+  static constexpr int kUpdateTag = 2;
+
+  const Plan& plan_;
+  LocalRows k_;
+  LocalRows m_;
+  double sigma_;
+  Numbers& numbers_;
+  const Kernels& kernels_;
+
+  // The front in work: w pivot columns of f rows, and the update matrix of the r rows behind them.
+  int w_ = 0;
+  int r_ = 0;
+  int f_ = 0;
+  Buffer columns_;
+  Buffer product_;
+  Buffer block_;
+  double* update_ = nullptr;
+  Ints where_;  // (local_nodes) node of the front in work
+  Ints to_columns_;
+  Ints to_update_;
+
+  Buffer stack_[2];
+  std::int64_t used_[2] = {0, 0};
+  std::vector<Buffer> loose_;                // update matrices for the interface
+  std::vector<std::vector<Buffer>> remote_;  // those of other ranks, packed
+  std::vector<std::vector<double>> sent_;
+  std::vector<std::vector<double>> received_;
+  std::vector<std::size_t> block_at_;
+  Ints own_of_local_;
+  std::vector<MPI_Request> block_requests_;
+  std::vector<MPI_Request> requests_;
+
+  std::int64_t negative_ = 0;
+  double smallest_ = std::numeric_limits<double>::infinity();
+  double growth_ = 0;
+  bool is_complete_ = true;
+};
+
+}  // namespace
+
+Buffer::Buffer(std::int64_t count) : size_(count) {
+  if (count == 0) return;
+  constexpr std::size_t kLargePage = std::size_t{2} << 20;
+  const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(count);
+  const std::size_t alignment = bytes >= kLargePage ? kLargePage : 64;
+  data_.reset(static_cast<double*>(std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment)));
+  if (data_ == nullptr) throw std::bad_alloc();
+  if (bytes >= kLargePage) (void)madvise(data_.get(), bytes, MADV_HUGEPAGE);
+}
+
+Numbers make_numbers(const Plan& plan) {
+  Numbers numbers;
+  std::int64_t stored = 0;
+  for (const Front& front : plan.fronts) {
+    numbers.front_offsets.push_back(stored);
+    stored += count_stored(front.width, front.size());
+  }
+  numbers.panels = Buffer(stored);
+  numbers.d_diagonal.assign(3 * static_cast<std::size_t>(plan.local_nodes), 0.0);
+  numbers.d_off.assign(3 * static_cast<std::size_t>(plan.local_nodes), 0.0);
+  return numbers;
+}
+
+void factorise_fronts(const Plan& plan, Mat stiffness, Mat mass, double sigma, Numbers& numbers) {
+  std::unique_ptr<Factoriser> factoriser;
+  petsc::run_agreed(plan.comm, [&] { factoriser = std::make_unique<Factoriser>(plan, stiffness, mass, sigma, numbers); });
+  factoriser->run();
+}
+
+}  // namespace carillon::ldlt

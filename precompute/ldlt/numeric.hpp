@@ -1,0 +1,59 @@
+// The numbers of a factorisation, and what computes and uses them.
+#pragma once
+
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "precompute/ldlt/plan.hpp"
+
+namespace carillon::ldlt {
+
+/// Uninitialised numbers, aligned for vectors, on large pages where the system has them. Throws std::bad_alloc.
+class Buffer {
+ public:
+  Buffer() = default;
+  explicit Buffer(std::int64_t count);
+  double* data() const { return data_.get(); }
+  std::int64_t size() const { return size_; }
+
+ private:
+  struct Free {
+    void operator()(double* p) const { std::free(p); }
+  };
+  std::unique_ptr<double, Free> data_;
+  std::int64_t size_ = 0;
+};
+
+/// L D L^T of this rank's fronts. Each front is a row of panels; each panel is T = L11^-1 P and then L21, both in tiles (kernels.hpp).
+struct Numbers {
+  Buffer panels;
+  std::vector<std::int64_t> front_offsets;  // where each front's panels begin
+  std::vector<double> d_diagonal;           // (3 local_nodes) the inverse of D at this rank's pivots: diagonal ...
+  std::vector<double> d_off;                // ... and between a row and the next
+  std::int64_t negative = 0;                // the rest over all ranks: negative eigenvalues of D
+  double smallest = 0;                      // least magnitude of a pivot
+  double growth = 0;                        // largest magnitude in L21
+  bool is_complete = false;                 // no pivot vanished exactly
+};
+
+/// Room for the panels. Throws std::bad_alloc.
+Numbers make_numbers(const Plan& plan);
+
+/// Computes L D L^T of K - sigma M. Collective. Throws SystemError on all ranks when memory runs out.
+void factorise_fronts(const Plan& plan, Mat stiffness, Mat mass, double sigma, Numbers& numbers);
+
+/// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
+struct Workspace {
+  std::vector<Buffer> blocks;  // one per 16 columns
+  Buffer front;                // of the largest front
+};
+
+inline constexpr int kSolveColumns = 32;  // at a time
+
+/// x <- A^-1 x for at most kSolveColumns columns. Collective.
+void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, double* x, int stride, int columns);
+Workspace make_workspace(const Plan& plan);
+
+}  // namespace carillon::ldlt

@@ -1,0 +1,484 @@
+// Method:     Each rank orders its interior by METIS and eliminates it on paper; what the roots of its forest leave on the interface is
+// gathered,
+//             and every rank plans the interface alike (interface.cpp). Whatever two ranks have to agree upon follows from that common
+//             knowledge, so no message is spent on the messages to come.
+// Source:     Duff and Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution: theory and practice (stack of update
+//             matrices).
+// Deviations: two stacks, for fronts of even and odd depth: a front and its children never share one, so an update matrix can be made while
+//             those of the children are read, and nothing has to be moved.
+#include "precompute/ldlt/plan.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "precompute/ldlt/interface.hpp"
+#include "precompute/ldlt/local_rows.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::ldlt {
+namespace {
+
+using partition::Graph;
+using petsc::check;
+
+/// Neighbours of this rank's nodes: numbers below own_nodes are this rank's, own_nodes + g is the node ghosts[g] of another.
+struct NodeLinks {
+  std::int32_t first_node = 0;
+  std::int32_t own_nodes = 0;
+  Ints ghosts;  // global, ascending
+  Lists links;  // (own_nodes) ascending, without the node itself
+};
+
+Ints list_ghost_nodes(const LocalRows& k, const LocalRows& m) {
+  Ints nodes;
+  for (const LocalRows* rows : {&k, &m})
+    for (PetscInt g = 0; g < rows->ghost_count(); ++g) nodes.push_back(rows->ghosts()[g] / 3);
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
+NodeLinks find_links(const LocalRows& k, const LocalRows& m) {
+  NodeLinks nodes;
+  nodes.first_node = k.first_row() / 3;
+  nodes.own_nodes = k.rows() / 3;
+  nodes.ghosts = list_ghost_nodes(k, m);
+  Ints mark(static_cast<std::size_t>(nodes.own_nodes) + nodes.ghosts.size(), -1);
+  for (const LocalRows* rows : {&k, &m})
+    if (rows->rows() != 3 * nodes.own_nodes || rows->first_row() != 3 * nodes.first_node)
+      throw InputError("K and M of a factorisation must have the same rows on each rank, whole nodes of three.");
+  const auto find_ghost = [&](PetscInt column) {
+    return nodes.own_nodes +
+           static_cast<std::int32_t>(std::lower_bound(nodes.ghosts.begin(), nodes.ghosts.end(), column / 3) - nodes.ghosts.begin());
+  };
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+    mark[v] = v;
+    const auto add = [&](std::int32_t u) {
+      if (mark[u] == v) return;
+      mark[u] = v;
+      nodes.links.items.push_back(u);
+    };
+    for (const LocalRows* rows : {&k, &m})
+      for (PetscInt i = 3 * v; i < 3 * v + 3; ++i)
+        rows->visit(
+            i, [&](PetscInt column, double) { add(column / 3); },
+            [&](PetscInt column, double) { add(find_ghost(rows->ghosts()[column])); });
+    std::sort(nodes.links.items.begin() + nodes.links.offsets.back(), nodes.links.items.end());
+    nodes.links.close();
+  }
+  return nodes;
+}
+
+/// Gathers the interface nodes, who they touch, and orders them. is_interface: (own and ghost nodes). Collective.
+Interface gather_interface(MPI_Comm comm, const NodeLinks& nodes, const Ints& rank_starts, std::vector<bool>& is_interface) {
+  const auto global = [&](std::int32_t v) { return v < nodes.own_nodes ? nodes.first_node + v : nodes.ghosts[v - nodes.own_nodes]; };
+  Lists own;  // one list: the nodes
+  is_interface.assign(static_cast<std::size_t>(nodes.own_nodes) + nodes.ghosts.size(), false);
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+    for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
+      is_interface[v] = is_interface[v] || global(*u) < nodes.first_node;
+    if (is_interface[v]) {
+      own.items.push_back(global(v));
+      own.close();
+    }
+  }
+  Interface interface;
+  interface.nodes = gather_lists(comm, own, interface.first_of_rank).items;
+  for (std::size_t g = 0; g < nodes.ghosts.size(); ++g)
+    is_interface[static_cast<std::size_t>(nodes.own_nodes) + g] = interface.find(nodes.ghosts[g]) >= 0;
+
+  Lists links;
+  Lists near;
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+    if (!is_interface[v]) continue;
+    Ints ranks;
+    for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u) {
+      const std::int32_t node = global(*u);
+      if (is_interface[*u]) {
+        links.items.push_back(interface.find(node));
+      } else {
+        ranks.push_back(static_cast<std::int32_t>(std::upper_bound(rank_starts.begin(), rank_starts.end(), node) - rank_starts.begin()) -
+                        1);
+      }
+    }
+    std::sort(ranks.begin(), ranks.end());
+    ranks.erase(std::unique(ranks.begin(), ranks.end()), ranks.end());
+    near.items.insert(near.items.end(), ranks.begin(), ranks.end());
+    links.close();
+    near.close();
+  }
+  interface.links = gather_lists(comm, links, interface.first_of_rank);
+  interface.near_ranks = gather_lists(comm, near, interface.first_of_rank);
+  order_interface(interface);
+  return interface;
+}
+
+/// The interior of this rank, eliminated on paper.
+struct Interior {
+  Ints own_node;  // (interior nodes) by final position
+  Ints boundary;  // first interface positions next to the interior, ascending
+  Forest forest;  // rows from interior nodes on: boundary entries
+};
+
+Graph make_interior_graph(const NodeLinks& nodes, const Ints& number, std::int32_t count) {
+  Graph graph;
+  graph.offsets.reserve(static_cast<std::size_t>(count) + 1);
+  graph.offsets.push_back(0);
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+    if (number[v] < 0 || number[v] >= count) continue;
+    for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
+      if (*u < nodes.own_nodes && number[*u] >= 0 && number[*u] < count) graph.neighbours.push_back(number[*u]);
+    graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size()));
+  }
+  return graph;
+}
+
+/// The same graph in order of elimination, with the boundary behind it. number: (own and ghost nodes) in the new order.
+Graph make_eliminated_graph(const NodeLinks& nodes, const Ints& number, std::int32_t interior, std::int32_t boundary) {
+  Ints node_at(interior, -1);
+  std::vector<Ints> inward(boundary);
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v)
+    if (number[v] >= 0 && number[v] < interior) node_at[number[v]] = v;
+  Graph graph;
+  graph.offsets.push_back(0);
+  for (std::int32_t i = 0; i < interior; ++i) {
+    const std::int32_t v = node_at[i];
+    for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u) {
+      graph.neighbours.push_back(number[*u]);
+      if (number[*u] >= interior) inward[number[*u] - interior].push_back(i);
+    }
+    graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size()));
+  }
+  for (const Ints& list : inward) {
+    graph.neighbours.insert(graph.neighbours.end(), list.begin(), list.end());
+    graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size()));
+  }
+  return graph;
+}
+
+Interior plan_interior(const NodeLinks& nodes, const Interface& interface, const std::vector<bool>& is_interface) {
+  Interior interior;
+  Ints number(is_interface.size(), -1);
+  Ints members;
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v)
+    if (!is_interface[v]) {
+      number[v] = static_cast<std::int32_t>(members.size());
+      members.push_back(v);
+    }
+  const auto count = static_cast<std::int32_t>(members.size());
+  const auto find_position = [&](std::int32_t v) {
+    return interface.position[interface.find(v < nodes.own_nodes ? nodes.first_node + v : nodes.ghosts[v - nodes.own_nodes])];
+  };
+  for (const std::int32_t v : members)
+    for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
+      if (is_interface[*u]) interior.boundary.push_back(find_position(*u));
+  std::sort(interior.boundary.begin(), interior.boundary.end());
+  interior.boundary.erase(std::unique(interior.boundary.begin(), interior.boundary.end()), interior.boundary.end());
+
+  Ints place = partition::order_nested_dissection(make_interior_graph(nodes, number, count));
+  for (const std::int32_t v : members) number[v] = place[number[v]];
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    if (!is_interface[v]) continue;
+    const auto at = std::lower_bound(interior.boundary.begin(), interior.boundary.end(), find_position(static_cast<std::int32_t>(v)));
+    number[v] = count + static_cast<std::int32_t>(at - interior.boundary.begin());
+  }
+  interior.forest =
+      find_supernodes(make_eliminated_graph(nodes, number, count, static_cast<std::int32_t>(interior.boundary.size())), 0, count);
+  interior.own_node.resize(count);
+  for (const std::int32_t v : members) interior.own_node[interior.forest.position[number[v]]] = v;
+  return interior;
+}
+
+bool leaves_rows(const Supernode& node) { return node.parent < 0 && !node.rows.empty(); }
+
+/// Sends the rows of the interior's roots to everybody and plans the interface. Collective.
+void plan_common(MPI_Comm comm, const Interior& interior, Interface& interface) {
+  const auto count = static_cast<std::int32_t>(interior.own_node.size());
+  Lists roots;
+  double work = 0;
+  for (const Supernode& node : interior.forest.supernodes) {
+    work += calc_cost_ns(node.width, node.size());
+    if (!leaves_rows(node)) continue;
+    for (const std::int32_t row : node.rows) roots.items.push_back(interior.boundary[row - count]);
+    roots.close();
+  }
+  Ints first_of_rank;
+  interface.hubs = gather_lists(comm, roots, first_of_rank);
+  for (std::size_t rank = 0; rank + 1 < first_of_rank.size(); ++rank)
+    interface.hub_rank.insert(interface.hub_rank.end(), static_cast<std::size_t>(first_of_rank[rank + 1] - first_of_rank[rank]),
+                              static_cast<std::int32_t>(rank));
+  std::vector<double> load(first_of_rank.size() - 1);
+  MPI_Allgather(&work, 1, MPI_DOUBLE, load.data(), 1, MPI_DOUBLE, comm);
+  plan_interface(interface, std::move(load));
+}
+
+/// Makes a rank's own plan of the common one.
+class PlanMaker {
+ public:
+  PlanMaker(Plan& plan, const NodeLinks& nodes, const Interface& interface) : plan_(plan), nodes_(nodes), interface_(interface) {}
+
+  void number_nodes(const Interior& interior) {
+    plan_.own_nodes = nodes_.own_nodes;
+    plan_.interior_nodes = static_cast<std::int32_t>(interior.own_node.size());
+    plan_.interior_fronts = static_cast<std::int32_t>(interior.forest.supernodes.size());
+    front_of_.assign(interface_.owner.size(), -1);
+    std::int32_t next = plan_.interior_fronts;
+    for (std::size_t s = 0; s < front_of_.size(); ++s)
+      if (interface_.owner[s] == plan_.rank) front_of_[s] = next++;
+    touched_ = find_touched_positions(interface_, plan_.rank);
+    local_of_position_.assign(interface_.nodes.size(), -1);
+    for (std::size_t k = 0; k < touched_.size(); ++k) local_of_position_[touched_[k]] = plan_.interior_nodes + static_cast<std::int32_t>(k);
+    plan_.local_nodes = plan_.interior_nodes + static_cast<std::int32_t>(touched_.size());
+    plan_.node_of_own.assign(nodes_.own_nodes, -1);
+    for (std::int32_t i = 0; i < plan_.interior_nodes; ++i) plan_.node_of_own[interior.own_node[i]] = i;
+    for (std::int32_t i = interface_.first_of_rank[plan_.rank]; i < interface_.first_of_rank[plan_.rank + 1]; ++i)
+      plan_.node_of_own[interface_.nodes[i] - nodes_.first_node] = find_local(i);
+  }
+
+  Ints find_ghosts(const LocalRows& rows) const {
+    Ints local;
+    for (PetscInt g = 0; g < rows.ghost_count(); ++g) {
+      const std::int32_t index = interface_.find(rows.ghosts()[g] / 3);
+      local.push_back(index < 0 ? -1 : find_local(index));
+    }
+    return local;
+  }
+
+  void add_interior_fronts(Interior& interior, const Ints& boundary_positions) {
+    const Ints& hub_rank = interface_.hub_rank;
+    auto hub = static_cast<std::int32_t>(std::lower_bound(hub_rank.begin(), hub_rank.end(), plan_.rank) - hub_rank.begin());
+    for (Supernode& node : interior.forest.supernodes) {
+      Front front;
+      const bool leaves = leaves_rows(node);
+      static_cast<Supernode&>(front) = std::move(node);
+      for (std::int32_t& row : front.rows)
+        if (row >= plan_.interior_nodes) row = local_of_position_[boundary_positions[row - plan_.interior_nodes]];
+      if (leaves) {
+        set_parent(front, interface_.forest.hub_parents[hub], hub);
+        ++hub;
+      }
+      plan_.fronts.push_back(std::move(front));
+    }
+    for (std::int32_t s = plan_.interior_fronts; s-- > 0;) {
+      Front& front = plan_.fronts[s];
+      if (front.parent >= 0 && front.parent < plan_.interior_fronts) front.depth = plan_.fronts[front.parent].depth + 1;
+    }
+  }
+
+  void add_interface_fronts() {
+    const std::vector<Supernode>& supernodes = interface_.forest.supernodes;
+    for (std::size_t s = 0; s < supernodes.size(); ++s) {
+      if (interface_.owner[s] != plan_.rank) continue;
+      Front front;
+      front.is_interface = true;
+      front.first = local_of_position_[supernodes[s].first];
+      front.width = supernodes[s].width;
+      for (const std::int32_t row : supernodes[s].rows) front.rows.push_back(local_of_position_[row]);
+      if (supernodes[s].parent >= 0) set_parent(front, supernodes[s].parent, interface_.hubs.count() + static_cast<std::int32_t>(s));
+      plan_.fronts.push_back(std::move(front));
+    }
+    for (std::int32_t h = 0; h < interface_.hubs.count(); ++h)
+      if (interface_.forest.hub_parents[h] >= 0)
+        add_remote_child(interface_.forest.hub_parents[h], interface_.hub_rank[h], h, interface_.hubs.begin(h), interface_.hubs.end(h));
+    for (std::size_t s = 0; s < supernodes.size(); ++s)
+      if (supernodes[s].parent >= 0)
+        add_remote_child(supernodes[s].parent, interface_.owner[s], interface_.hubs.count() + static_cast<std::int32_t>(s),
+                         supernodes[s].rows.data(), supernodes[s].rows.data() + supernodes[s].rows.size());
+    for (std::size_t s = 0; s < plan_.fronts.size(); ++s)
+      if (plan_.fronts[s].parent >= 0) plan_.fronts[plan_.fronts[s].parent].children.push_back(static_cast<std::int32_t>(s));
+  }
+
+  void add_meetings(int ranks) {
+    const std::vector<Supernode>& supernodes = interface_.forest.supernodes;
+    std::vector<Meeting> meetings(supernodes.size());
+    for (int rank = 0; rank < ranks; ++rank) {
+      const Ints touched = rank == plan_.rank ? touched_ : find_touched_positions(interface_, rank);
+      auto at = touched.begin();
+      for (std::size_t s = 0; s < supernodes.size(); ++s) {
+        const auto begin = at;
+        at = std::lower_bound(at, touched.end(), supernodes[s].first + supernodes[s].width);
+        const bool is_mine = interface_.owner[s] == plan_.rank;
+        if (begin == at || rank == interface_.owner[s] || !(is_mine || rank == plan_.rank)) continue;
+        Ints nodes;
+        for (auto p = begin; p != at; ++p) nodes.push_back(local_of_position_[*p]);
+        if (is_mine)
+          meetings[s].guests.push_back({rank, std::move(nodes)});
+        else
+          meetings[s].nodes = std::move(nodes);
+      }
+    }
+    for (std::size_t s = 0; s < supernodes.size(); ++s) {
+      meetings[s].owner = interface_.owner[s];
+      meetings[s].tag = static_cast<int>(s);
+      meetings[s].front = front_of_[s];
+      if (meetings[s].front >= 0 || !meetings[s].nodes.empty()) plan_.meetings.push_back(std::move(meetings[s]));
+    }
+  }
+
+  void add_blocks(int ranks) {
+    std::vector<BlockList> sent(ranks);
+    std::vector<BlockList> received(ranks);
+    std::size_t s = 0;
+    for (std::int32_t p = 0; p < interface_.count(); ++p) {
+      while (p >= interface_.forest.supernodes[s].first + interface_.forest.supernodes[s].width) ++s;
+      const std::int32_t i = interface_.index[p];
+      const int from = static_cast<int>(std::upper_bound(interface_.first_of_rank.begin(), interface_.first_of_rank.end(), i) -
+                                        interface_.first_of_rank.begin()) -
+                       1;
+      const int to = interface_.owner[s];
+      if (from != plan_.rank && to != plan_.rank) continue;
+      Ints rows{p};
+      for (const std::int32_t* j = interface_.links.begin(i); j != interface_.links.end(i); ++j)
+        if (interface_.position[*j] > p) rows.push_back(interface_.position[*j]);
+      std::sort(rows.begin(), rows.end());
+      for (const std::int32_t row : rows) {
+        if (from == plan_.rank) add_block(sent[to], p, row);
+        if (to == plan_.rank) add_block(received[from], p, row);
+      }
+    }
+    for (int rank = 0; rank < ranks; ++rank) {
+      sent[rank].rank = received[rank].rank = rank;
+      if (!sent[rank].columns.empty()) plan_.sent.push_back(std::move(sent[rank]));
+      if (!received[rank].columns.empty()) plan_.received.push_back(std::move(received[rank]));
+    }
+  }
+
+ private:
+  std::int32_t find_local(std::int32_t index) const { return local_of_position_[interface_.position[index]]; }
+
+  /// The parent is interface supernode `above`: a front of this rank or another's.
+  void set_parent(Front& front, std::int32_t above, int tag) const {
+    if (interface_.owner[above] == plan_.rank) {
+      front.parent = front_of_[above];
+    } else {
+      front.parent = -1;
+      front.to_parent = {interface_.owner[above], tag, {}};
+    }
+  }
+
+  void add_remote_child(std::int32_t above, int rank, int tag, const std::int32_t* begin, const std::int32_t* end) {
+    if (interface_.owner[above] != plan_.rank || rank == plan_.rank) return;
+    Edge edge{rank, tag, {}};
+    for (; begin != end; ++begin) edge.rows.push_back(local_of_position_[*begin]);
+    plan_.fronts[front_of_[above]].remote_children.push_back(std::move(edge));
+  }
+
+  void add_block(BlockList& list, std::int32_t column, std::int32_t row) const {
+    list.columns.push_back(local_of_position_[column]);
+    list.rows.push_back(local_of_position_[row]);
+  }
+
+  Plan& plan_;
+  const NodeLinks& nodes_;
+  const Interface& interface_;
+  Ints touched_;
+  Ints local_of_position_;
+  Ints front_of_;
+};
+
+/// Plays the factorisation through: stacks, peak of memory, entries and flops of this rank.
+Analysis::Rank measure(Plan& plan) {
+  Analysis::Rank own;
+  std::int64_t factor = 0;
+  std::int64_t loose = 0;  // update matrices outside the stacks
+  std::int64_t loose_peak = 0;
+  std::int64_t scratch = 0;
+  std::int64_t used[2] = {0, 0};
+  const auto square = [](std::size_t nodes) { return 9 * static_cast<std::int64_t>(nodes) * static_cast<std::int64_t>(nodes); };
+  for (const Front& front : plan.fronts) {
+    own.entries += count_entries(front.width, front.size());
+    own.flops += count_flops(front.width, front.size());
+    factor += count_stored(front.width, front.size());
+    scratch = std::max(scratch, std::int64_t{9} * front.size() * kPanelNodes);
+    const bool is_stacked = front.parent >= 0 && front.parent < plan.interior_fronts;
+    std::int64_t& room = is_stacked ? used[front.depth % 2] : loose;
+    room += square(front.rows.size());
+    for (const Edge& edge : front.remote_children) loose += square(edge.rows.size());
+    loose_peak = std::max(loose_peak, loose);
+    for (int parity = 0; parity < 2; ++parity) plan.stack_entries[parity] = std::max(plan.stack_entries[parity], used[parity]);
+    for (const Edge& edge : front.remote_children) loose -= square(edge.rows.size());
+    for (const std::int32_t child : front.children)
+      (front.is_interface ? loose : used[plan.fronts[child].depth % 2]) -= square(plan.fronts[child].rows.size());
+  }
+  const std::int64_t blocks = [&] {
+    std::int64_t count = 0;
+    for (const auto* lists : {&plan.sent, &plan.received})
+      for (const BlockList& list : *lists) count += 9 * static_cast<std::int64_t>(list.columns.size());
+    return count;
+  }();
+  constexpr std::int64_t kSolveColumns = 32;
+  own.peak_bytes =
+      8 * (factor + plan.stack_entries[0] + plan.stack_entries[1] + loose_peak + scratch + blocks + 3 * kSolveColumns * plan.local_nodes);
+  return own;
+}
+
+void gather_analysis(Plan& plan, const Analysis::Rank& own, int ranks, const Interface& interface) {
+  Analysis& all = plan.analysis;
+  all.ranks.resize(ranks);
+  MPI_Allgather(&own, sizeof own, MPI_BYTE, all.ranks.data(), sizeof own, MPI_BYTE, plan.comm);
+  for (const Analysis::Rank& rank : all.ranks) {
+    all.entries += rank.entries;
+    all.flops += rank.flops;
+    all.peak_bytes += rank.peak_bytes;
+    all.largest_peak_bytes = std::max(all.largest_peak_bytes, rank.peak_bytes);
+  }
+  const auto fronts = static_cast<std::int64_t>(plan.fronts.size());
+  MPI_Allreduce(&fronts, &all.supernodes, 1, MPI_INT64_T, MPI_SUM, plan.comm);
+  all.interface_nodes = interface.count();
+}
+
+}  // namespace
+
+std::int64_t count_stored(std::int32_t width, std::int32_t size) {
+  std::int64_t stored = 0;
+  for (std::int32_t p = 0; p < count_panels(width); ++p) {
+    const std::int64_t first = find_panel_start(width, p);
+    stored += 9 * (find_panel_start(width, p + 1) - first) * (size - first);
+  }
+  return stored;
+}
+
+Plan make_plan(Mat stiffness, Mat mass) {
+  Plan plan;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &plan.comm));
+  MPI_Comm_rank(plan.comm, &plan.rank);
+  int ranks = 1;
+  MPI_Comm_size(plan.comm, &ranks);
+  Ints rank_starts;
+  NodeLinks nodes;
+  petsc::run_agreed(plan.comm, [&] {
+    const LocalRows k(stiffness);
+    const LocalRows m(mass);
+    if (k.rows() % 3 != 0 || k.first_row() % 3 != 0)
+      throw InputError("K of a factorisation must have whole nodes of three rows on each rank.");
+    nodes = find_links(k, m);
+    const PetscInt* starts = nullptr;
+    check(MatGetOwnershipRanges(stiffness, &starts));
+    for (int rank = 0; rank <= ranks; ++rank) rank_starts.push_back(starts[rank] / 3);
+  });
+  std::vector<bool> is_interface;
+  Interface interface = gather_interface(plan.comm, nodes, rank_starts, is_interface);
+  Interior interior;
+  petsc::run_agreed(plan.comm, [&] { interior = plan_interior(nodes, interface, is_interface); });
+  const Ints first_positions = interior.boundary;
+  plan_common(plan.comm, interior, interface);
+  Analysis::Rank own;
+  petsc::run_agreed(plan.comm, [&] {
+    Ints boundary = first_positions;
+    for (std::int32_t& position : boundary) position = interface.forest.position[position];
+    PlanMaker maker(plan, nodes, interface);
+    maker.number_nodes(interior);
+    maker.add_interior_fronts(interior, boundary);
+    maker.add_interface_fronts();
+    maker.add_meetings(ranks);
+    maker.add_blocks(ranks);
+    plan.node_of_ghost_k = maker.find_ghosts(LocalRows(stiffness));
+    plan.node_of_ghost_m = maker.find_ghosts(LocalRows(mass));
+    own = measure(plan);
+  });
+  gather_analysis(plan, own, ranks, interface);
+  return plan;
+}
+
+}  // namespace carillon::ldlt

@@ -1,0 +1,86 @@
+// Who eliminates what, in which order, and which messages that takes.
+#pragma once
+
+#include <petscmat.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/ldlt/factor.hpp"
+#include "precompute/ldlt/symbolic.hpp"
+
+namespace carillon::ldlt {
+
+using Ints = std::vector<std::int32_t>;
+
+/// An update matrix that comes from or goes to another rank.
+struct Edge {
+  int rank = -1;
+  int tag = 0;
+  Ints rows;  // local nodes, ascending (of a child); empty for what goes to a parent
+};
+
+/// A front on this rank. Pivots and rows are local nodes.
+struct Front : Supernode {
+  Ints children;                      // fronts of this rank, in order of assembly
+  std::vector<Edge> remote_children;  // after them
+  Edge to_parent;                     // rank >= 0: the parent lives there
+  std::int32_t depth = 0;             // below its root among the interior fronts; the parity picks the stack of its update matrix
+  bool is_interface = false;
+};
+
+/// What happens at one supernode of the interface during the solves: its owner collects what other ranks have added to its pivots, and
+/// gives them the solution there.
+struct Meeting {
+  std::int32_t front = -1;  // on the owner
+  int owner = -1;           // elsewhere: the rank to send to
+  int tag = 0;
+  struct Guest {
+    int rank = -1;
+    Ints nodes;  // local nodes
+  };
+  std::vector<Guest> guests;  // on the owner
+  Ints nodes;                 // elsewhere: local nodes among the pivots
+};
+
+/// 3x3 blocks of A between interface nodes on their way from the rank of the column to the owner of its front. Local nodes of this rank,
+/// columns ascending, rows ascending in a column.
+struct BlockList {
+  int rank = -1;  // to or from
+  Ints columns;
+  Ints rows;
+};
+
+/// Local nodes are numbered in order of elimination: first this rank's interior nodes, then those interface nodes with which it has to do.
+struct Plan {
+  MPI_Comm comm = MPI_COMM_NULL;
+  int rank = 0;
+  std::int32_t own_nodes = 0;
+  std::int32_t interior_nodes = 0;
+  std::int32_t local_nodes = 0;
+  Ints node_of_own;           // (own_nodes) local node of each node of this rank
+  Ints node_of_ghost_k;       // (ghost columns of K) local node, -1: none
+  Ints node_of_ghost_m;       // the same for M
+  std::vector<Front> fronts;  // interior ones in postorder, then own ones of the interface
+  std::int32_t interior_fronts = 0;
+  std::vector<Meeting> meetings;  // in order of the interface: of own fronts and of those where this rank is a guest
+  std::vector<BlockList> sent;
+  std::vector<BlockList> received;
+  std::int64_t stack_entries[2] = {0, 0};  // the most that update matrices of interior fronts of even and odd depth take
+  Analysis analysis;
+};
+
+/// Plans everything. Collective; throws as Factor's constructor.
+Plan make_plan(Mat stiffness, Mat mass);
+
+/// Pivot nodes eliminated at a time, and how `width` pivot nodes are cut into such panels.
+inline constexpr std::int32_t kPanelNodes = 24;
+inline std::int32_t count_panels(std::int32_t width) { return (width + kPanelNodes - 1) / kPanelNodes; }
+/// First pivot node of panel p: panels are equal to one node.
+inline std::int32_t find_panel_start(std::int32_t width, std::int32_t p) {
+  return static_cast<std::int32_t>(static_cast<std::int64_t>(width) * p / count_panels(width));
+}
+/// Numbers stored of a front: each panel in full columns from its own first row on.
+std::int64_t count_stored(std::int32_t width, std::int32_t size);
+
+}  // namespace carillon::ldlt
