@@ -44,15 +44,16 @@ LAW = {
     "precompute/petsc": (["runtime/config"], ["fmt", "mpi", "petsc"]),
     "precompute/fem": (["runtime/config", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc"], ["fmt", "mpi", "petsc", "eigen"]),
     "precompute/estimate": (["runtime/config", "jobs/spec", "precompute/mesh", "precompute/petsc", "precompute/fem"], ["fmt", "mpi", "petsc", "eigen"]),
+    "precompute/slabs": (["runtime/config", "precompute/mesh", "precompute/petsc", "precompute/fem"], ["fmt", "mpi", "hdf5", "eigen"]),
     "precompute/ldlt": (["runtime/config", "partition", "precompute/petsc"], ["fmt", "mpi", "petsc"]),
     "precompute/eigen": (["runtime/config", "partition", "precompute/petsc", "precompute/ldlt"], ["fmt", "mpi", "petsc", "mumps", "cholmod", "eigen"]),
-    "precompute/io": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/estimate", "precompute/eigen"],
+    "precompute/io": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/shapes", "precompute/petsc", "precompute/fem", "precompute/slabs", "precompute/estimate", "precompute/eigen"],
                       ["fmt", "json", "mpi", "petsc", "hdf5"]),
     "precompute": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/estimate", "precompute/eigen", "precompute/io"],
                    ["fmt", "cli", "mpi"]),
 }
 # Finer than folders: the only files that may include these.
-ONLY_IN = {"hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/io/[a-z0-9_]+\.cpp)$"), "simbody": re.compile(r"^runtime/contact/[a-z0-9_]+\.(cpp|hpp)$"),
+ONLY_IN = {"hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/io/[a-z0-9_]+\.cpp|precompute/slabs/layout\.cpp)$"), "simbody": re.compile(r"^runtime/contact/[a-z0-9_]+\.(cpp|hpp)$"),
            "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
