@@ -44,10 +44,13 @@ class Measuring(unittest.TestCase):
         self.assertEqual(measuring.find_spread([3.0]), 0.0)
 
     def test_phases_of_a_record_add_up_to_the_total(self):
-        record = {"phases": [{"name": "read", "cpu_seconds": 0.5}, {"name": "solve", "cpu_seconds": 2.0}, {"name": "prayer", "cpu_seconds": 0.25}]}
-        phases = measuring.to_phases(record, 4.0)
-        self.assertEqual((phases["read"], phases["solve"], phases["factor"], phases["other"]), (0.5, 2.0, 0.0, 1.5))
-        self.assertAlmostEqual(sum(phases.values()), 4.0)
+        solver = {"seconds": {"analyse": 0.5, "factor": 1.5, "solve": 4.0, "iterate": 7.0, "check": 1.0}, "factorisations": 3}
+        stations = [{"name": "read", "seconds": 1.0, "cpu_seconds": 0.5}, {"name": "modes", "seconds": 10.0, "cpu_seconds": 5.0},
+                    {"name": "prayer", "seconds": 9.0, "cpu_seconds": 0.25}]
+        phases = measuring.to_phases({"stations": stations, "solver": solver}, 8.0)
+        self.assertEqual({name: value for name, value in phases.items() if value}, {"read": 0.5, "factor": 1.0, "solve": 2.0, "orthogonalise": 2.0, "other": 2.5})
+        extras = measuring.find_extras({"stations": stations, "solver": solver}, 8.0)
+        self.assertEqual([row[1] for row in extras[1:]], ["0.50", "0.50", "0.00"])
 
     def test_frequencies_that_differ_in_number_never_agree(self):
         self.assertEqual(measuring.compare_frequencies([100.0], [100.0, 200.0]), float("inf"))

@@ -7,8 +7,8 @@ import subprocess
 import tempfile
 import time
 
-PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "write", "other")
-COLOURS = ("#9aa5b1", "#c9b458", "#8fb98b", "#c8553d", "#2f6690", "#7b5ea7", "#588157", "#d9d9d9")
+PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "error bars", "write", "other")
+COLOURS = ("#9aa5b1", "#c9b458", "#8fb98b", "#c8553d", "#2f6690", "#7b5ea7", "#e09f3e", "#588157", "#d9d9d9")
 
 
 @dataclasses.dataclass
@@ -50,28 +50,47 @@ def find_spread(values):
     return (max(values) - min(values)) / 2 / find_median(values) if len(values) > 1 else 0.0
 
 
-def to_phases(record, total_s):
-    """The `run` record of a resolved job as CPU seconds by PHASES, {phase: s}; what no phase claims is "other", up to total_s.
+STATIONS = {"mesh": "read", "read": "read", "partition": "partition", "assembly": "assemble", "assemble": "assemble", "errors": "error bars",
+            "collect": "write", "bank": "write", "write": "write"}
 
-    Newer records have run.phases: [{name, cpu_seconds}]; older ones stations and the solver's own seconds, in wall time."""
+
+def to_phases(record, total_s):
+    """The `run` record of a resolved job as CPU seconds by PHASES, {phase: s}, that add up to total_s; what no phase claims is "other".
+
+    Stations tell their CPU seconds (all ranks); inside the station "modes" the wall seconds of its parts tell how they are shared out."""
     seconds = dict.fromkeys(PHASES, 0.0)
-    if record.get("phases"):
-        for phase in record["phases"]:
-            name = phase["name"] if phase["name"] in seconds else "other"
-            seconds[name] += phase.get("cpu_seconds", phase.get("seconds", 0.0))
-    else:
-        stations = {station["name"]: station["seconds"] for station in record["stations"]}
-        solver = record["solver"]["seconds"]
-        seconds["read"] = stations.get("mesh", 0.0)
-        seconds["partition"] = stations.get("partition", 0.0) + solver.get("analyse", 0.0)
-        seconds["assemble"] = stations.get("assembly", 0.0)
-        seconds["factor"] = solver.get("factor", 0.0)
-        seconds["solve"] = solver.get("solve", 0.0)
-        seconds["orthogonalise"] = solver.get("orthogonalise", solver.get("iterate", 0.0) - solver.get("solve", 0.0))
-        seconds["write"] = stations.get("bank", 0.0)
+    solver = record["solver"]["seconds"]
+    for station in record["stations"]:
+        cpu_s = station.get("cpu_seconds", station["seconds"])
+        if station["name"] != "modes":
+            seconds[STATIONS.get(station["name"], "other")] += cpu_s
+            continue
+        share = cpu_s / max(station["seconds"], 1e-9)
+        parts = {"factor": solver.get("analyse", 0.0) + solver["factor"], "solve": solver["solve"]}
+        for name, value in parts.items():
+            seconds[name] += value * share
+        seconds["orthogonalise"] += max(cpu_s - share * sum(parts.values()), 0.0)
     claimed = sum(value for name, value in seconds.items() if name != "other")
-    seconds["other"] = max(seconds["other"], total_s - claimed, 0.0)
-    return seconds
+    seconds["other"] = max(total_s - claimed, 0.0)
+    excess = max(claimed / total_s, 1.0)  # clocks of different grain, and records of before that have wall seconds alone
+    return {name: value / excess for name, value in seconds.items()}
+
+
+def find_extras(record, total_s):
+    """What trust costs: rows (part, CPU s, share of the run) of counting, checking and error bars; as to_phases() shares them out."""
+    solver = record["solver"]["seconds"]
+    station = next(s for s in record["stations"] if s["name"] == "modes")
+    share = station.get("cpu_seconds", station["seconds"]) / max(station["seconds"], 1e-9)
+    factorisations = max(record["solver"]["factorisations"], 1)
+    rows = [("part of the run", "CPU s", "share")]
+
+    def add(name, cpu_s):
+        rows.append((name, f"{cpu_s:.2f}", f"{100 * cpu_s / total_s:.1f} %"))
+
+    add(f"proof: 2 of {factorisations} factorisations, at the ends of the band", share * solver["factor"] * min(2, factorisations) / factorisations)
+    add("residuals, orthonormality, canonical basis", share * solver["check"])
+    add("error bars", to_phases(record, total_s)["error bars"])
+    return rows
 
 
 def compare_frequencies(reference_hz, other_hz):
