@@ -1,0 +1,25 @@
+// How far the computed eigenvalues can be from those of K phi = lambda M phi: bounds, not estimates.
+#pragma once
+
+#include <mpi.h>
+#include <petscmat.h>
+
+#include <vector>
+
+#include "precompute/estimate/error_bars.hpp"
+
+namespace carillon::estimate {
+
+/// Constants with least D <= M <= greatest D, D = diag(M), in the sense of quadratic forms; the same on every rank.
+struct MassBounds {
+  double least = 1.0;
+  double greatest = 1.0;
+};
+
+/// From the elements: M = sum M_e and D = sum D_e, so the extreme eigenvalues of all D_e^-1 M_e bound those of D^-1 M. Collective.
+MassBounds find_mass_bounds(MPI_Comm comm, const fem::LocalMesh& local, spec::Mass mass_kind);
+
+/// The bound per mode in cents; see ErrorBars::algebraic_cents. Collective.
+std::vector<double> calc_algebraic_cents(MPI_Comm comm, Mat stiffness, Mat mass, const MassBounds& bounds, const Solution& solution);
+
+}  // namespace carillon::estimate

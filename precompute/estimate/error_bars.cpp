@@ -1,0 +1,191 @@
+// Method: discretisation: the strains of a mode are smoothed over patches of elements; the energy of the difference is about lambda_h -
+//   lambda, since lambda_h - lambda = |u - u_h|_E^2 - lambda |u - u_h|_M^2 for a consistent mass and the second term is of higher order. A
+//   lumped mass adds lambda phi^T (M_l - M) phi, known exactly. A smooth surface that the mesh cuts short changes lambda by Hadamard's
+//   formula, integral (2 W - lambda rho |u|^2) V_n dS. Cents: predict.cpp. Modes may change places: from the interval of each mode follow
+//   those of the k-th lowest.
+// Source: Zienkiewicz and Zhu 1992, IJNME 33, 1331; Strang and Fix 1973, ch. 6; Hadamard 1908; algebraic part: algebraic.cpp.
+// Deviations: the error energies are estimates, with safety factors found by measurement (docs/error-bars.md).
+#include "precompute/estimate/error_bars.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "precompute/estimate/algebraic.hpp"
+#include "precompute/estimate/recovery.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::estimate {
+namespace {
+
+using fem::Vec3;
+
+void check_arguments(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
+                     std::span<const std::int32_t> material_of_tet, const Solution& solution) {
+  petsc::run_agreed(comm, [&] {
+    if (solids.empty()) throw InputError("error bars need a material");
+    if (material_of_tet.empty() ? solids.size() > 1 : material_of_tet.size() != static_cast<std::size_t>(local.tet_count()))
+      throw InputError(fmt::format("{} elements have {} materials", local.tet_count(), material_of_tet.size()));
+    for (const std::int32_t m : material_of_tet)
+      if (m < 0 || m >= static_cast<std::int32_t>(solids.size())) throw InputError(fmt::format("there is no material {}", m));
+    if (solution.residual.size() != solution.lambda.size())
+      throw InputError(fmt::format("{} modes have {} residuals", solution.lambda.size(), solution.residual.size()));
+    for (const double lambda : solution.lambda)
+      if (!(lambda > 0)) throw InputError("error bars are for modes with a positive frequency");
+    if (solution.lambda.empty()) return;
+    PetscInt rows = 0, columns = 0, own = 0;
+    petsc::check(MatGetLocalSize(solution.shapes, &own, nullptr));
+    petsc::check(MatGetSize(solution.shapes, &rows, &columns));
+    if (own != 3 * local.free_nodes || columns != static_cast<PetscInt>(solution.lambda.size()))
+      throw InputError(fmt::format("{} rows and {} mode shapes do not fit {} nodes and {} modes", own, columns, local.free_nodes,
+                                   solution.lambda.size()));
+  });
+}
+
+/// What the blocks of modes work in.
+struct Room {
+  std::vector<DoubleLanes> displacement;  // (nodes, 3), divided by omega
+  std::vector<Strain> strains;            // (e, s)
+  std::vector<Strain> patches;            // (vertices * materials, t)
+  std::vector<Strain> values;             // (nodes * materials); T4: the patches themselves
+};
+
+void load_displacement(const fem::LocalMesh& local, const double* shapes, std::size_t stride, std::size_t first, std::size_t count,
+                       const Solution& solution, std::vector<DoubleLanes>& displacement) {
+  auto* to = reinterpret_cast<double*>(displacement.data());
+  const std::size_t rows = 3 * static_cast<std::size_t>(local.free_nodes);
+  std::fill(displacement.begin(), displacement.end(), DoubleLanes{});
+  constexpr std::size_t kTile = 64;
+  std::array<double, kLanes> scale{};
+  for (std::size_t m = 0; m < count; ++m) scale[m] = 1 / std::sqrt(solution.lambda[first + m]);
+  for (std::size_t begin = 0; begin < rows; begin += kTile)
+    for (std::size_t m = 0; m < count; ++m) {
+      const double* column = shapes + (first + m) * stride;
+      for (std::size_t i = begin; i < std::min(rows, begin + kTile); ++i) to[i * kLanes + m] = column[i] * scale[m];
+    }
+}
+
+/// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude.
+constexpr int kSums = 5;
+using Sums = std::array<DoubleLanes, kSums>;
+
+Sums calc_block(Recovery& recovery, Room& room, spec::Mass mass_kind, const DoubleLanes& lambda) {
+  const Elements& elements = recovery.elements;
+  Sums sums{};
+  recovery.nodes.copy_to_halo(reinterpret_cast<double*>(room.displacement.data()), 3 * kLanes);
+  std::fill(room.patches.begin(), room.patches.end(), Strain{});
+  find_strains(elements, room.displacement.data(), room.strains.data(), room.patches.data());
+  recovery.vertices.sum(reinterpret_cast<float*>(room.patches.data()),
+                        static_cast<std::size_t>(elements.terms) * elements.materials * 6 * kLanes);
+  const Strain* values = room.patches.data();
+  if (elements.terms > 1) {
+    for (std::size_t v = 0; v < recovery.vertex_node.size(); ++v)
+      for (int m = 0; m < elements.materials; ++m)
+        room.values[static_cast<std::size_t>(recovery.vertex_node[v]) * elements.materials + m] =
+            room.patches[(v * elements.materials + m) * elements.terms];
+    find_middles(recovery.middles, elements.materials, room.patches.data(), room.values.data());
+    values = room.values.data();
+  }
+  add_energies(elements, recovery.value_of.data(), values, room.strains.data(), sums[0], sums[1]);
+  if (mass_kind == spec::Mass::lumped) add_lumping(elements, room.displacement.data(), sums[2]);
+  add_shifts(recovery.shifts, values, room.displacement.data(), lambda, sums[3], sums[4]);
+  sums[2] *= lambda;
+  return sums;
+}
+
+/// (modes, kSums), shares of lambda, summed over the ranks.
+std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recovery& recovery, spec::Mass mass_kind,
+                              const Solution& solution) {
+  const Elements& elements = recovery.elements;
+  const std::size_t count = solution.lambda.size(), materials = static_cast<std::size_t>(elements.materials);
+  Room room;
+  std::vector<double> result(count * kSums, 0.0);
+  petsc::run_agreed(comm, [&] {
+    room.displacement.resize(3 * local.nodes_m.size());
+    room.strains.resize(elements.count * elements.samples);
+    room.patches.resize(recovery.vertex_node.size() * materials * elements.terms);
+    if (elements.terms > 1) room.values.resize(local.nodes_m.size() * materials);
+    recovery.nodes.reserve(3 * kLanes);
+    recovery.vertices.reserve(static_cast<std::size_t>(elements.terms) * materials * 6 * kLanes);
+  });
+  PetscInt stride = 0;
+  const PetscScalar* shapes = nullptr;
+  petsc::check(MatDenseGetLDA(solution.shapes, &stride));
+  petsc::check(MatDenseGetArrayRead(solution.shapes, &shapes));
+  for (std::size_t first = 0; first < count; first += kLanes) {
+    const std::size_t modes = std::min<std::size_t>(kLanes, count - first);
+    DoubleLanes lambda{};
+    for (std::size_t m = 0; m < modes; ++m) lambda[m] = solution.lambda[first + m];
+    load_displacement(local, shapes, static_cast<std::size_t>(stride), first, modes, solution, room.displacement);
+    const Sums sums = calc_block(recovery, room, mass_kind, lambda);
+    for (std::size_t m = 0; m < modes; ++m)
+      for (int s = 0; s < kSums; ++s) result[(first + m) * kSums + s] = sums[s][m];
+  }
+  petsc::check(MatDenseRestoreArrayRead(solution.shapes, &shapes));
+  MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
+  return result;
+}
+
+bool is_curved(MPI_Comm comm, const fem::LocalMesh& local) {
+  int curved = 0;
+  if (local.order == 2)
+    for (std::size_t e = 0; e < local.tets.size() && curved == 0; e += 10)
+      for (int m = 0; m < 6; ++m) {
+        const Vec3 &a = local.nodes_m[local.tets[e + mesh::kEdges[m][0]]], &b = local.nodes_m[local.tets[e + mesh::kEdges[m][1]]];
+        const Vec3& middle = local.nodes_m[local.tets[e + 4 + m]];
+        double off = 0, length = 0;
+        for (int k = 0; k < 3; ++k) {
+          off += std::pow(middle[k] - (a[k] + b[k]) / 2, 2);
+          length += std::pow(b[k] - a[k], 2);
+        }
+        if (off > 1e-12 * length) curved = 1;
+      }
+  MPI_Allreduce(MPI_IN_PLACE, &curved, 1, MPI_INT, MPI_MAX, comm);
+  return curved != 0;
+}
+
+/// The k-th lowest of numbers that lie in intervals around `centre` lies between the k-th lowest of all lower and of all upper ends.
+std::vector<double> widen_for_order(std::span<const double> lambda, const std::vector<double>& cents) {
+  const std::size_t count = cents.size();
+  std::vector<double> low(count), high(count), result(count);
+  const auto centre = [&](std::size_t m) { return 600 * std::log2(lambda[m] / lambda[0]); };
+  for (std::size_t m = 0; m < count; ++m) {
+    low[m] = centre(m) - cents[m];
+    high[m] = centre(m) + cents[m];
+  }
+  std::sort(low.begin(), low.end());
+  std::sort(high.begin(), high.end());
+  for (std::size_t m = 0; m < count; ++m) result[m] = std::max(centre(m) - low[m], high[m] - centre(m));
+  return result;
+}
+
+}  // namespace
+
+ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffness, Mat mass, std::span<const Solid> solids,
+                          std::span<const std::int32_t> material_of_tet, spec::Mass mass_kind, const Solution& solution) {
+  check_arguments(comm, local, solids, material_of_tet, solution);
+  ErrorBars bars;
+  if (solution.lambda.empty()) return bars;
+  bars.algebraic_cents = calc_algebraic_cents(comm, stiffness, mass, find_mass_bounds(comm, local, mass_kind), solution);
+  Recovery recovery = make_recovery(comm, local, solids, material_of_tet);
+  const std::vector<double> sums = calc_sums(comm, local, recovery, mass_kind, solution);
+  const Kind kind = local.order == 1 ? Kind::kT4 : is_curved(comm, local) ? Kind::kT10Curved : Kind::kT10;
+  std::vector<double> cents;
+  for (std::size_t m = 0; m < solution.lambda.size(); ++m) {
+    const double* sum = &sums[m * kSums];
+    ErrorBars::Parts parts;
+    parts.interpolation = sum[0];
+    parts.energy = sum[1];
+    parts.lumping = sum[2];
+    parts.geometry = sum[3];
+    parts.geometry_noise = sum[4];
+    bars.parts.push_back(parts);
+    cents.push_back(predict_cents(parts, kind));
+  }
+  bars.discretisation_cents = widen_for_order(solution.lambda, cents);
+  return bars;
+}
+
+}  // namespace carillon::estimate

@@ -1,0 +1,120 @@
+// Method: owners announce their nodes at a meeting place (rank = number modulo ranks), users ask there who owns theirs; afterwards every
+// rank
+//   exchanges with its neighbours alone.
+// Source: the rendezvous of Pinar and Hendrickson 2001, as Zoltan's distributed directory.
+// Deviations: none.
+#include "precompute/estimate/exchange.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <unordered_map>
+
+namespace carillon::estimate {
+
+NodeExchange::NodeExchange(MPI_Comm comm, const fem::LocalMesh& local, const std::vector<std::int32_t>& place) : comm_(comm) {
+  int ranks = 1;
+  MPI_Comm_size(comm, &ranks);
+  if (ranks == 1) return;
+  const auto count = static_cast<std::int32_t>(local.nodes_m.size());
+  std::vector<std::vector<std::int32_t>> announced(ranks), asked(ranks), asked_local(ranks);
+  for (std::int32_t n = 0; n < local.owned_nodes; ++n) announced[local.node_in_mesh[n] % ranks].push_back(local.node_in_mesh[n]);
+  for (std::int32_t n = local.owned_nodes; n < count; ++n) {
+    if (place[n] < 0) continue;
+    asked[local.node_in_mesh[n] % ranks].push_back(local.node_in_mesh[n]);
+    asked_local[local.node_in_mesh[n] % ranks].push_back(place[n]);
+  }
+  const auto known = exchange_lists(comm, announced);
+  const auto questions = exchange_lists(comm, asked);
+  std::unordered_map<std::int32_t, std::int32_t> owner_of;
+  for (int r = 0; r < ranks; ++r)
+    for (const std::int32_t id : known[r]) owner_of[id] = r;
+  std::vector<std::vector<std::int32_t>> answers(ranks);
+  for (int r = 0; r < ranks; ++r)
+    for (const std::int32_t id : questions[r]) answers[r].push_back(owner_of.at(id));
+  const auto owners = exchange_lists(comm, answers);
+
+  std::vector<std::vector<std::int32_t>> halo(ranks), halo_ids(ranks);
+  for (int r = 0; r < ranks; ++r)
+    for (std::size_t i = 0; i < owners[r].size(); ++i) {
+      halo[owners[r][i]].push_back(asked_local[r][i]);
+      halo_ids[owners[r][i]].push_back(asked[r][i]);
+    }
+  const auto wanted = exchange_lists(comm, halo_ids);
+  std::unordered_map<std::int32_t, std::int32_t> local_of;
+  for (std::int32_t n = 0; n < local.owned_nodes; ++n) local_of[local.node_in_mesh[n]] = place[n];
+  for (int r = 0; r < ranks; ++r) {
+    if (halo[r].empty() && wanted[r].empty()) continue;
+    Neighbour neighbour{r, std::move(halo[r]), {}};
+    for (const std::int32_t id : wanted[r]) neighbour.owned.push_back(local_of.at(id));
+    neighbours_.push_back(std::move(neighbour));
+  }
+  requests_.resize(2 * neighbours_.size());
+}
+
+void NodeExchange::reserve(std::size_t width) {
+  std::size_t halo = 0, owned = 0;
+  for (const Neighbour& neighbour : neighbours_) {
+    halo += neighbour.halo.size();
+    owned += neighbour.owned.size();
+  }
+  const std::size_t bytes = std::max(halo, owned) * width * sizeof(double);
+  if (send_.size() < bytes) {
+    send_.resize(bytes);
+    receive_.resize(bytes);
+  }
+}
+
+template <typename T, typename Take>
+void NodeExchange::pass(T* values, std::size_t width, std::vector<std::int32_t> Neighbour::*from, std::vector<std::int32_t> Neighbour::*to,
+                        const Take& take) {
+  constexpr int kTag = 71;
+  T* send = reinterpret_cast<T*>(send_.data());
+  T* receive = reinterpret_cast<T*>(receive_.data());
+  std::size_t at = 0, request = 0;
+  for (const Neighbour& neighbour : neighbours_) {
+    const std::size_t size = (neighbour.*to).size() * width;
+    MPI_Irecv(receive + at, static_cast<int>(size * sizeof(T)), MPI_BYTE, neighbour.rank, kTag, comm_, &requests_[request++]);
+    at += size;
+  }
+  at = 0;
+  for (const Neighbour& neighbour : neighbours_) {
+    T* begin = send + at;
+    for (const std::int32_t node : neighbour.*from) {
+      std::memcpy(send + at, values + static_cast<std::size_t>(node) * width, width * sizeof(T));
+      at += width;
+    }
+    MPI_Isend(begin, static_cast<int>((send + at - begin) * static_cast<std::ptrdiff_t>(sizeof(T))), MPI_BYTE, neighbour.rank, kTag, comm_,
+              &requests_[request++]);
+  }
+  MPI_Waitall(static_cast<int>(request), requests_.data(), MPI_STATUSES_IGNORE);
+  at = 0;
+  for (const Neighbour& neighbour : neighbours_)
+    for (const std::int32_t node : neighbour.*to) {
+      take(values + static_cast<std::size_t>(node) * width, receive + at);
+      at += width;
+    }
+}
+
+template <typename T>
+void NodeExchange::copy_to_halo(T* values, std::size_t width) {
+  if (neighbours_.empty()) return;
+  reserve(width);
+  pass(values, width, &Neighbour::owned, &Neighbour::halo, [&](T* to, const T* from) { std::memcpy(to, from, width * sizeof(T)); });
+}
+
+template <typename T>
+void NodeExchange::sum(T* values, std::size_t width) {
+  if (neighbours_.empty()) return;
+  reserve(width);
+  pass(values, width, &Neighbour::halo, &Neighbour::owned, [&](T* to, const T* from) {
+    for (std::size_t i = 0; i < width; ++i) to[i] += from[i];
+  });
+  copy_to_halo(values, width);
+}
+
+template void NodeExchange::copy_to_halo(float*, std::size_t);
+template void NodeExchange::copy_to_halo(double*, std::size_t);
+template void NodeExchange::sum(float*, std::size_t);
+template void NodeExchange::sum(double*, std::size_t);
+
+}  // namespace carillon::estimate

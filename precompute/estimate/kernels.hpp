@@ -1,0 +1,64 @@
+// The arithmetic of the estimate, for a block of modes at once: strains, patches, errors. Inner header of estimate.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace carillon::estimate {
+
+inline constexpr int kLanes = 16;  // modes of a block
+using Lanes = float __attribute__((vector_size(4 * kLanes)));
+using DoubleLanes = double __attribute__((vector_size(8 * kLanes)));
+
+/// The scaled strain q of a point: six numbers with q . q = strain^T C strain, twice the density of the elastic energy.
+using Strain = std::array<Lanes, 6>;
+
+/// What is known of the elements before any mode. n = 4 or 10 nodes; s = 1 or 4 points where an element's strain is taken; t = 1 or 10
+/// terms of a patch's polynomial that are kept.
+struct Elements {
+  int nodes = 4;
+  int samples = 1;
+  int terms = 1;
+  int materials = 1;
+  std::size_t count = 0;
+  std::vector<std::int32_t> node;           // (e, n) local nodes
+  std::vector<std::int32_t> patch;          // (e, 4) patches of its corners
+  std::vector<std::int32_t> material;       // (e)
+  std::vector<float> gradient;              // (e, s, n - 1, 3) of the shape functions 1 ... n - 1 [1/m]
+  std::vector<float> weight;                // (e, 4, s, t) what a sample adds to the terms of the patches
+  std::vector<float> volume;                // (e) [m^3]
+  std::vector<std::array<float, 36>> root;  // (materials) U with U^T U = C, row-major, upper triangular
+  std::vector<float> density;               // (materials) [kg/m^3]
+};
+
+/// A mid-side node: the mean of what the patches at both ends of its edge say there.
+struct Middle {
+  std::int32_t node = 0;
+  std::array<std::int32_t, 2> patch{};
+  std::array<std::array<float, 10>, 2> monomials{};
+};
+
+/// Where the surface of the mesh should move: an edge of a face, see SurfaceEdge.
+struct Shift {
+  std::array<std::int32_t, 2> value{};  // recovered strains whose mean is taken
+  std::array<std::int32_t, 2> node{};   // displacements whose mean is taken
+  float volume_m3 = 0.0F;               // gap times area
+  float density = 0.0F;                 // 0 where held
+};
+
+/// q of every sample, added into the patches' terms. displacement: (nodes, 3); strains: (e, s), patches: (patches, t).
+void find_strains(const Elements& elements, const DoubleLanes* displacement, Strain* strains, Strain* patches);
+/// Recovered strains at nodes from patches with ten terms. corner_node: (patch corners) node of each corner; values: (nodes * materials).
+void find_middles(const std::vector<Middle>& middles, int materials, const Strain* patches, Strain* values);
+/// Adds per element the energies of recovered minus computed strain, and of the computed one.
+void add_energies(const Elements& elements, const std::int32_t* value_of, const Strain* values, const Strain* strains, DoubleLanes& error,
+                  DoubleLanes& energy);
+/// Adds phi^T (M_lumped - M_consistent) phi.
+void add_lumping(const Elements& elements, const DoubleLanes* displacement, DoubleLanes& difference);
+/// Adds gap times (2 W - lambda rho |u|^2), and the sum of its magnitudes.
+void add_shifts(const std::vector<Shift>& shifts, const Strain* values, const DoubleLanes* displacement, const DoubleLanes& lambda,
+                DoubleLanes& change, DoubleLanes& magnitude);
+
+}  // namespace carillon::estimate

@@ -1,0 +1,271 @@
+// Method: at every vertex a polynomial (linear for T4, quadratic for T10) is fitted by least squares to the strains that the elements
+// around
+//   have at their best points (centroid; the four points of degree 2). The fit is linear in the strains, so it is kept as weights. Where
+//   the samples do not fix a term (a corner with one element), a small ridge lets the term be zero.
+// Source: Zienkiewicz and Zhu 1992, IJNME 33, 1331 ("superconvergent patch recovery").
+// Deviations: ridge instead of wider patches, which would reach beyond the neighbours' ranks; strains scaled by the root of the elasticity.
+#include "precompute/estimate/recovery.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "precompute/estimate/surface.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::estimate {
+namespace {
+
+using fem::Vec3;
+
+constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-4;
+
+/// 1, x, y, z, xx, yy, zz, xy, yz, xz of the place seen from the patch's vertex, in units of `scale`.
+std::array<double, 10> calc_monomials(const Vec3& at, const Vec3& vertex, double scale) {
+  const double x = (at[0] - vertex[0]) / scale, y = (at[1] - vertex[1]) / scale, z = (at[2] - vertex[2]) / scale;
+  return {1, x, y, z, x * x, y * y, z * z, x * y, y * z, x * z};
+}
+
+/// Gradients of the shape functions, place and volume share of one sample.
+struct Sample {
+  std::array<Vec3, 10> gradient{};
+  Vec3 at{};
+  double volume_m3 = 0.0;
+};
+
+/// One sample of an element: T4 ignores `l`.
+Sample calc_sample(std::span<const Vec3> x, const std::array<double, 4>& l) {
+  const int n = static_cast<int>(x.size());
+  std::array<double, 10> value{};
+  std::array<std::array<double, 4>, 10> by_l{};  // d N_i / d L_j
+  for (int i = 0; i < 4; ++i) {
+    value[i] = n == 4 ? l[i] : l[i] * (2 * l[i] - 1);
+    by_l[i][i] = n == 4 ? 1 : 4 * l[i] - 1;
+  }
+  for (int m = 4; m < n; ++m) {
+    const auto [a, b] = mesh::kEdges[m - 4];
+    value[m] = 4 * l[a] * l[b];
+    by_l[m][a] = 4 * l[b];
+    by_l[m][b] = 4 * l[a];
+  }
+  Sample sample;
+  Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();  // d x_k / d L_d, d = 1 2 3
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k) {
+      sample.at[k] += value[i] * x[i][k];
+      for (int d = 0; d < 3; ++d) jacobian(k, d) += x[i][k] * (by_l[i][d + 1] - by_l[i][0]);
+    }
+  const Eigen::Matrix3d inverse = jacobian.inverse();
+  sample.volume_m3 = jacobian.determinant() / 6;
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k)
+      for (int d = 0; d < 3; ++d) sample.gradient[i][k] += (by_l[i][d + 1] - by_l[i][0]) * inverse(d, k);
+  return sample;
+}
+
+constexpr double kNear = 0.58541019662496845, kFar = 0.13819660112501052;
+
+std::array<double, 4> find_place(int samples, int s) {
+  if (samples == 1) return {0.25, 0.25, 0.25, 0.25};
+  std::array<double, 4> l{kFar, kFar, kFar, kFar};
+  l[s] = kNear;
+  return l;
+}
+
+std::array<float, 36> calc_root(const Solid& solid) {
+  using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+  const Eigen::LLT<Matrix6> llt(Eigen::Map<const Matrix6>(solid.elasticity_pa.data()));
+  if (llt.info() != Eigen::Success) throw InputError("a material's elasticity is not positive definite; mend its constants");
+  std::array<float, 36> root{};
+  const Matrix6 upper = llt.matrixU();
+  for (int i = 0; i < 36; ++i) root[i] = static_cast<float>(upper.data()[i]);
+  return root;
+}
+
+/// The normal matrices of all patches, summed over the ranks, then their regularised inverses.
+class Patches {
+ public:
+  Patches(int terms, std::size_t count, double scale) : terms_(terms), scale_(scale), normal_(count * terms * terms, 0.0) {}
+
+  std::array<double, 10> monomials(const Vec3& at, const Vec3& vertex) const { return calc_monomials(at, vertex, scale_); }
+
+  void add(std::size_t patch, const std::array<double, 10>& p) {
+    double* n = &normal_[patch * terms_ * terms_];
+    for (int r = 0; r < terms_; ++r)
+      for (int c = 0; c < terms_; ++c) n[r * terms_ + c] += p[r] * p[c];
+  }
+
+  void sum(NodeExchange& vertices, int materials) { vertices.sum(normal_.data(), static_cast<std::size_t>(terms_) * terms_ * materials); }
+
+  /// N becomes D (D N D + ridge)^-1 D with D = diag(N)^-1/2; the constant term has no ridge, so constant strains are met exactly.
+  void invert() {
+    const double ridge = terms_ == 4 ? kRidgeT4 : kRidgeT10;
+    for (std::size_t at = 0; at < normal_.size(); at += static_cast<std::size_t>(terms_) * terms_) {
+      Eigen::Map<Eigen::MatrixXd> normal(&normal_[at], terms_, terms_);
+      if (normal(0, 0) == 0.0) continue;
+      const Eigen::VectorXd scale =
+          normal.diagonal().unaryExpr([&](double d) { return d > 1e-12 * normal(0, 0) ? 1 / std::sqrt(d) : 0.0; });
+      Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+      for (int i = 0; i < terms_; ++i) scaled(i, i) += scale[i] == 0.0 ? 1.0 : i == 0 ? 0.0 : ridge;
+      normal = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
+    }
+  }
+
+  /// What a sample with monomials p adds to term t of the patch's polynomial.
+  double weight(std::size_t patch, const std::array<double, 10>& p, int t) const {
+    const double* row = &normal_[(patch * terms_ + t) * terms_];
+    return std::inner_product(row, row + terms_, p.begin(), 0.0);
+  }
+
+ private:
+  int terms_;
+  double scale_;
+  std::vector<double> normal_;
+};
+
+/// (nodes) a running number for corners, -1 for mid-side nodes.
+std::vector<std::int32_t> find_vertex_places(const fem::LocalMesh& local) {
+  const int n = local.nodes_per_tet();
+  std::vector<std::int32_t> place(local.nodes_m.size(), -1);
+  for (std::size_t i = 0; i < local.tets.size(); ++i)
+    if (static_cast<int>(i % n) < 4) place[local.tets[i]] = 0;
+  std::int32_t next = 0;
+  for (std::int32_t& p : place)
+    if (p == 0) p = next++;
+  return place;
+}
+
+std::vector<std::int32_t> count_up(std::size_t count) {
+  std::vector<std::int32_t> all(count);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+void fill_elements(const fem::LocalMesh& local, std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet,
+                   Recovery& recovery) {
+  Elements& elements = recovery.elements;
+  const int n = elements.nodes, s = elements.samples;
+  elements.node = local.tets;
+  for (const Solid& solid : solids) {
+    elements.root.push_back(calc_root(solid));
+    elements.density.push_back(static_cast<float>(solid.density_kg_m3));
+  }
+  elements.material.assign(material_of_tet.begin(), material_of_tet.end());
+  elements.material.resize(elements.count, 0);
+  elements.gradient.resize(elements.count * s * (n - 1) * 3);
+  elements.volume.resize(elements.count);
+  elements.patch.resize(elements.count * 4);
+  recovery.value_of.resize(elements.count * n);
+  std::vector<Vec3> x(n);
+  for (std::size_t e = 0; e < elements.count; ++e) {
+    for (int i = 0; i < n; ++i) x[i] = local.nodes_m[local.tets[e * n + i]];
+    double volume = 0;
+    for (int k = 0; k < s; ++k) {
+      const Sample sample = calc_sample(x, find_place(s, k));
+      volume += sample.volume_m3 / s;
+      for (int i = 1; i < n; ++i)
+        for (int d = 0; d < 3; ++d) elements.gradient[((e * s + k) * (n - 1) + i - 1) * 3 + d] = static_cast<float>(sample.gradient[i][d]);
+    }
+    if (!(volume > 0)) throw InputError(fmt::format("element {} of the mesh has no volume; remesh there", local.tet_in_mesh[e] + 1));
+    elements.volume[e] = static_cast<float>(volume);
+    for (int v = 0; v < 4; ++v)
+      elements.patch[4 * e + v] = recovery.vertex_place[local.tets[e * n + v]] * elements.materials + elements.material[e];
+    for (int i = 0; i < n; ++i) recovery.value_of[e * n + i] = local.tets[e * n + i] * elements.materials + elements.material[e];
+  }
+}
+
+/// Calls use(element, corner, sample, patch, monomials) for every sample of every element and corner.
+template <typename Use>
+void for_each_sample(const fem::LocalMesh& local, const Elements& elements, const Patches& patches, const Use& use) {
+  const int n = elements.nodes, s = elements.samples;
+  std::vector<Vec3> x(n);
+  for (std::size_t e = 0; e < elements.count; ++e) {
+    for (int i = 0; i < n; ++i) x[i] = local.nodes_m[local.tets[e * n + i]];
+    for (int k = 0; k < s; ++k) {
+      const Vec3 at = calc_sample(x, find_place(s, k)).at;
+      for (int v = 0; v < 4; ++v) use(e, v, k, static_cast<std::size_t>(elements.patch[4 * e + v]), patches.monomials(at, x[v]));
+    }
+  }
+}
+
+void find_middles(const fem::LocalMesh& local, const Patches& patches, Recovery& recovery) {
+  std::vector<char> done(local.nodes_m.size(), 0);
+  for (std::size_t e = 0; e < recovery.elements.count; ++e)
+    for (int m = 0; m < 6; ++m) {
+      const std::int32_t node = local.tets[10 * e + 4 + m];
+      if (done[node]++ != 0) continue;
+      Middle middle;
+      middle.node = node;
+      for (int end = 0; end < 2; ++end) {
+        const std::int32_t vertex = local.tets[10 * e + mesh::kEdges[m][end]];
+        middle.patch[end] = recovery.vertex_place[vertex];
+        const auto p = patches.monomials(local.nodes_m[node], local.nodes_m[vertex]);
+        for (int t = 0; t < 10; ++t) middle.monomials[end][t] = static_cast<float>(p[t]);
+      }
+      recovery.middles.push_back(middle);
+      done[node] = 1;
+    }
+}
+
+void find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& local, Recovery& recovery) {
+  const Elements& elements = recovery.elements;
+  for (const SurfaceEdge& edge : edges) {
+    const std::size_t first = static_cast<std::size_t>(edge.tet) * elements.nodes;
+    std::array<int, 2> at = mesh::kEdges[edge.edge];
+    if (elements.nodes == 10) at = {4 + edge.edge, 4 + edge.edge};
+    Shift shift;
+    for (int end = 0; end < 2; ++end) {
+      shift.node[end] = local.tets[first + at[end]];
+      shift.value[end] = recovery.value_of[first + at[end]];
+    }
+    shift.volume_m3 = static_cast<float>((edge.held ? -1 : 1) * edge.gap_m * edge.third_m2);
+    shift.density = edge.held ? 0.0F : elements.density[elements.material[edge.tet]];
+    recovery.shifts.push_back(shift);
+  }
+}
+
+}  // namespace
+
+Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
+                       std::span<const std::int32_t> material_of_tet) {
+  const std::vector<std::int32_t> place = find_vertex_places(local);
+  Recovery recovery{{}, place, {}, {}, {}, {}, NodeExchange(comm, local, count_up(local.nodes_m.size())), NodeExchange(comm, local, place)};
+  Elements& elements = recovery.elements;
+  elements.nodes = local.nodes_per_tet();
+  elements.samples = local.order == 1 ? 1 : 4;
+  elements.terms = local.order == 1 ? 1 : 10;
+  elements.materials = static_cast<int>(solids.size());
+  elements.count = static_cast<std::size_t>(local.tet_count());
+  std::array<double, 2> size{0.0, static_cast<double>(elements.count)};  // volume, elements
+  petsc::run_agreed(comm, [&] {
+    for (std::size_t n = 0; n < place.size(); ++n)
+      if (place[n] >= 0) recovery.vertex_node.push_back(static_cast<std::int32_t>(n));
+    fill_elements(local, solids, material_of_tet, recovery);
+    for (const float volume : elements.volume) size[0] += volume;
+  });
+  MPI_Allreduce(MPI_IN_PLACE, size.data(), 2, MPI_DOUBLE, MPI_SUM, comm);
+
+  std::optional<Patches> patches;
+  petsc::run_agreed(comm, [&] {
+    patches.emplace(local.order == 1 ? 4 : 10, recovery.vertex_node.size() * solids.size(), std::cbrt(size[0] / size[1]));
+    for_each_sample(local, elements, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
+  });
+  patches->sum(recovery.vertices, elements.materials);
+  const std::vector<SurfaceEdge> edges = find_surface_edges(comm, local);
+  petsc::run_agreed(comm, [&] {
+    patches->invert();
+    elements.weight.resize(elements.count * 4 * elements.samples * elements.terms);
+    for_each_sample(local, elements, *patches, [&](std::size_t e, int v, int s, std::size_t patch, const auto& p) {
+      float* weight = &elements.weight[((e * 4 + v) * elements.samples + s) * elements.terms];
+      for (int t = 0; t < elements.terms; ++t) weight[t] = static_cast<float>(patches->weight(patch, p, t));
+    });
+    if (local.order == 2) find_middles(local, *patches, recovery);
+    find_shifts(edges, local, recovery);
+  });
+  return recovery;
+}
+
+}  // namespace carillon::estimate

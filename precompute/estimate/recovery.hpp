@@ -1,0 +1,32 @@
+// What the estimate knows of the mesh before it sees a mode: gradients, patches of elements around vertices, where the surface is off.
+#pragma once
+
+#include <mpi.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/estimate/error_bars.hpp"
+#include "precompute/estimate/exchange.hpp"
+#include "precompute/estimate/kernels.hpp"
+
+namespace carillon::estimate {
+
+/// A patch belongs to a vertex and a material: strains of different materials are not averaged, as they jump at the interface. The patch of
+/// vertex place p and material m has number p * materials + m, the recovered value of node n likewise n * materials + m.
+struct Recovery {
+  Elements elements;
+  std::vector<std::int32_t> vertex_place;  // (nodes) place among the vertices, -1 for mid-side nodes
+  std::vector<std::int32_t> vertex_node;   // (vertices) its node
+  std::vector<Middle> middles;             // T10 only
+  std::vector<std::int32_t> value_of;      // (e, n) where the recovered value of an element's node is
+  std::vector<Shift> shifts;
+  NodeExchange nodes, vertices;
+};
+
+/// Collective. Throws InputError naming an element without volume and a material that is not positive definite, on all ranks alike.
+Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
+                       std::span<const std::int32_t> material_of_tet);
+
+}  // namespace carillon::estimate

@@ -1,0 +1,27 @@
+// How far the surface of the mesh lies from the smooth surface that its vertices seem to come from.
+#pragma once
+
+#include <mpi.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/fem/distribute.hpp"
+
+namespace carillon::estimate {
+
+/// One edge of a face of the body's surface. The gap between the mesh and the smooth surface is, on a face, sum over its edges of
+/// 4 L_a L_b gap, so that its integral is area / 3 * gap for each edge.
+struct SurfaceEdge {
+  std::int32_t tet = 0;   // local element
+  std::int8_t edge = 0;   // of mesh::kEdges
+  bool held = false;      // on a face whose nodes are all held
+  double gap_m = 0.0;     // at the middle of the edge, outwards
+  double third_m2 = 0.0;  // a third of the face's area
+};
+
+/// The edges of all surface faces of this rank's elements. Faces that meet at less than 50 degrees belong to one smooth surface; at sharper
+/// edges each side is smooth by itself. Collective.
+std::vector<SurfaceEdge> find_surface_edges(MPI_Comm comm, const fem::LocalMesh& local);
+
+}  // namespace carillon::estimate
