@@ -21,12 +21,14 @@ void run(const bench::Arguments& arguments) {
   const a_int nev = arguments.modes;
   const a_int ncv = std::min(2 * nev, n);
   const a_int work_size = ncv * (ncv + 8);
-  std::vector<double> basis(static_cast<std::size_t>(n) * ncv), work(3 * static_cast<std::size_t>(n)), inner(work_size), start(n), product(n);
+  std::vector<double> basis(static_cast<std::size_t>(n) * ncv), work(3 * static_cast<std::size_t>(n)), inner(work_size), start(n),
+      product(n);
   a_int parameters[11] = {1, 0, 1000, 1, 0, 0, 3};  // exact shifts, at most 1000 restarts, mode 3
   a_int pointers[14] = {};
   a_int ido = 0, info = 0;
   for (;;) {
-    dsaupd_c(&ido, "G", n, "LM", nev, arguments.tolerance, start.data(), ncv, basis.data(), n, parameters, pointers, work.data(), inner.data(), work_size, &info);
+    dsaupd_c(&ido, "G", n, "LM", nev, arguments.tolerance, start.data(), ncv, basis.data(), n, parameters, pointers, work.data(),
+             inner.data(), work_size, &info);
     double* x = work.data() + pointers[0] - 1;
     double* y = work.data() + pointers[1] - 1;
     if (ido == -1) {
@@ -47,8 +49,8 @@ void run(const bench::Arguments& arguments) {
   bench::demand(info == 0, fmt::format("dsaupd: info {}", info));
   std::vector<double> lambda(nev);
   std::vector<a_int> select(ncv);
-  dseupd_c(1, "A", select.data(), lambda.data(), basis.data(), n, arguments.sigma, "G", n, "LM", nev, arguments.tolerance, start.data(), ncv, basis.data(), n,
-           parameters, pointers, work.data(), inner.data(), work_size, &info);
+  dseupd_c(1, "A", select.data(), lambda.data(), basis.data(), n, arguments.sigma, "G", n, "LM", nev, arguments.tolerance, start.data(),
+           ncv, basis.data(), n, parameters, pointers, work.data(), inner.data(), work_size, &info);
   bench::demand(info == 0 && parameters[4] >= nev, fmt::format("dseupd: info {}, {} of {} converged", info, parameters[4], nev));
   phases.end("orthogonalise");
   bench::write_answer(arguments.answer, n, lambda, basis.data());

@@ -1,10 +1,10 @@
 // Spectra's SymGEigsShiftSolver. Two operators: Eigen's SimplicialLDLT, and CHOLMOD's supernodal factor. Spectra's own SymShiftInvert
 // factorises with Eigen's SparseLU, which is slower than either.
+#include <Spectra/MatOp/SparseSymMatProd.h>
+#include <Spectra/SymGEigsShiftSolver.h>
 #include <fmt/core.h>
 
 #include <Eigen/SparseCholesky>
-#include <Spectra/MatOp/SparseSymMatProd.h>
-#include <Spectra/SymGEigsShiftSolver.h>
 #include <algorithm>
 #include <cstring>
 #include <memory>
@@ -16,7 +16,9 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 using View = Eigen::Map<const Sparse>;
 
-View view(const bench::Matrix& matrix) { return {matrix.n, matrix.n, matrix.nnz, matrix.first.data(), matrix.column.data(), matrix.value.data()}; }
+View view(const bench::Matrix& matrix) {
+  return {matrix.n, matrix.n, matrix.nnz, matrix.first.data(), matrix.column.data(), matrix.value.data()};
+}
 
 /// What Spectra asks of an operator of its own kind.
 class SimplicialOperator {
@@ -83,7 +85,8 @@ void run(const bench::Arguments& arguments) {
   phases.end("factor");
   solver.init();
   const auto found = solver.compute(Spectra::SortRule::LargestMagn, 1000, arguments.tolerance, Spectra::SortRule::SmallestAlge);
-  bench::demand(solver.info() == Spectra::CompInfo::Successful && found >= arguments.modes, fmt::format("{} of {} converged", found, arguments.modes));
+  bench::demand(solver.info() == Spectra::CompInfo::Successful && found >= arguments.modes,
+                fmt::format("{} of {} converged", found, arguments.modes));
   const Eigen::VectorXd lambda = solver.eigenvalues();
   const Eigen::MatrixXd vectors = solver.eigenvectors();
   phases.end("orthogonalise");

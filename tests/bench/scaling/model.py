@@ -1,0 +1,212 @@
+"""How long carillon-precompute takes on p ranks, phase by phase: a model from measured times, sizes and message counts.
+
+Every line of the model is a function here and a row of the table of assumptions in docs/scaling.md. Pure; measure reads, runs and draws.
+Symbols: N unknowns, n = N / 3 nodes, p ranks, m modes, b columns per block, k basis size, s order (unknowns) of a separator.
+"""
+import dataclasses
+import math
+
+PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "write")
+
+
+@dataclasses.dataclass(frozen=True)
+class Machine:
+    """Rates of one rank while all ranks of its node work."""
+    name: str
+    dense_gflops: float  # DGEMM
+    memory_gb_s: float
+    latency_s: float  # one message
+    transfer_gb_s: float
+    disk_gb_s: float  # parallel file system, all ranks together
+
+
+# A cluster node of two 32-core processors, one rank a core: DGEMM at the clock that all cores hold together, 300 GB/s of memory and one
+# 100 Gbit/s link shared by 64 ranks; 2 us between any two nodes.
+CLUSTER = Machine("64 ranks a node, 100 Gbit/s", dense_gflops=30.0, memory_gb_s=300 / 64, latency_s=2e-6, transfer_gb_s=12.5 / 64, disk_gb_s=5.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """What is solved, and how. Measured at one size; grow() makes a finer mesh of the same body."""
+    unknowns: float
+    modes: float
+    entries: float  # of the factor
+    factor_flops: float  # of one factorisation
+    factorisations: float
+    right_sides: float  # all solves
+    block: float  # columns per solve
+    basis: float  # columns that a new block is made orthogonal to, at the end of a slice
+    separator: float  # unknowns of the separator that halves the body
+    surface_nodes: float
+    file_bytes: float
+    mass_entries_per_row: float = 1.0  # 1: lumped
+
+    def grow(self, unknowns, entries_power, flops_power):
+        """The body with that many unknowns: modes, band and so the Krylov space stay (they belong to the body); its faces, separators and
+        surface grow as the area, N^(2/3)."""
+        ratio = unknowns / self.unknowns
+        area = ratio ** (2 / 3)
+        return dataclasses.replace(self, unknowns=unknowns, entries=self.entries * ratio**entries_power, factor_flops=self.factor_flops * ratio**flops_power,
+                                   separator=self.separator * area, surface_nodes=self.surface_nodes * area, file_bytes=self.file_bytes * ratio)
+
+
+@dataclasses.dataclass(frozen=True)
+class Rates:
+    """What the code reaches on the measuring machine, one rank. Seconds per unit of work, from the run on one rank."""
+    dense_gflops: float  # of that machine, to carry the others over
+    memory_gb_s: float
+    read_s_per_unknown: float
+    partition_s_per_unknown: float
+    assemble_s_per_unknown: float
+    factor_gflops: float
+    front_gflops: float  # one large front on one rank
+    solve_gflops: float
+    orthogonalise_gflops: float
+    write_s_per_value: float  # surface node x mode
+    plan_s_per_group2: float  # order of the interface: seconds over (groups of interface nodes)^2, on every rank alike
+
+
+def find_levels(ranks):
+    """Levels of the elimination tree above the ranks' own subtrees."""
+    return max(0, math.ceil(math.log2(ranks)))
+
+
+def find_fronts(body, ranks):
+    """[(pivots, order)] of the largest front of each level above the subtrees, root first. Halving a body's volume shrinks its separators by
+    2^(-2/3); a front other than the root has the separators around it for a border: in all about 2.5 times its pivots."""
+    return [(body.separator * 2 ** (-2 / 3 * level), body.separator * 2 ** (-2 / 3 * level) * (1.0 if level == 0 else 2.5)) for level in range(find_levels(ranks))]
+
+
+def find_interface_unknowns(body, ranks):
+    """Unknowns between the ranks: level l has 2^l separators of s 2^(-2l/3)."""
+    return min(sum(body.separator * 2 ** (level / 3) for level in range(find_levels(ranks))), body.unknowns)
+
+
+def find_halo_unknowns(body, ranks):
+    """Unknowns that one rank gets from its neighbours for a product with K or M: the faces of its part. A part's area is that of a separator
+    of the level of p parts, on all its sides (three pairs; half of a shell's lie in the open)."""
+    return 0.0 if ranks == 1 else 3 * body.separator * ranks ** (-2 / 3)
+
+
+def count_meetings(ranks):
+    """Fronts of the interface at which one rank meets others: one for two ranks; a part inside a body has about 14 neighbours, and every set of
+    neighbours that share nodes is a front of its own."""
+    return 0 if ranks == 1 else min(ranks - 1, 14) + find_levels(ranks) - 1
+
+
+PROJECTED_SHARE = 0.2  # of DGEMM's rate: what a dense symmetric eigensolver reaches
+PROJECTED_TRIES = 4  # convergence tests of a slice
+
+
+def count_projected_flops(body):
+    """Dense eigenproblems of the basis' size with vectors, about 9 k^3 each; rank 0 solves them for all."""
+    return PROJECTED_TRIES * 9 * body.basis**3
+
+
+def count_front_flops(pivots, order):
+    return pivots * order**2 - pivots**2 * order + pivots**3 / 3
+
+
+class Model:
+    def __init__(self, body, rates, machine):
+        self.body, self.rates, self.machine = body, rates, machine
+        # A rate of the code changes with the processor as DGEMM does, or with memory where a step is bound by that.
+        self.speed = machine.dense_gflops / rates.dense_gflops
+        self.memory = machine.memory_gb_s / rates.memory_gb_s
+
+    def reduce_s(self, ranks, size):
+        """Allreduce of `size` bytes: log2(p) steps there and back for short ones, each byte twice over the wire for long ones."""
+        return 0.0 if ranks == 1 else 2 * find_levels(ranks) * self.machine.latency_s + 2 * size / (1e9 * self.machine.transfer_gb_s)
+
+    def send_s(self, messages, size):
+        return messages * self.machine.latency_s + size / (1e9 * self.machine.transfer_gb_s)
+
+    def compute_s(self, flops, gflops, size):
+        """A step is bound by arithmetic or by memory, whichever takes longer."""
+        return max(flops / (1e9 * gflops * self.speed), size / (1e9 * self.machine.memory_gb_s))
+
+    def calc(self, ranks, parallel_reading=True):
+        """{phase: (computing shared by all ranks, computing that does not shrink, messages)}, seconds on the critical path."""
+        body, rates, machine, p = self.body, self.rates, self.machine, ranks
+        n = body.unknowns
+        levels = find_levels(p)
+        blocks = body.right_sides / body.block
+        small = 8 * body.block
+        slow = 1 / min(self.speed, self.memory)  # codes of pointers and branches: whatever of processor and memory is worse
+        out = {}
+
+        # Reading and cutting: on rank 0 (METIS), or by slabs of the file with recursive bisection (about 70 collective steps a level) and
+        # the elements sent to their ranks once.
+        if parallel_reading and p > 4:
+            out["read"] = (rates.read_s_per_unknown * n / p * slow, 0.0, body.file_bytes / (1e9 * machine.disk_gb_s) + self.send_s(4 * p, 3 * body.file_bytes / p))
+            out["partition"] = (rates.partition_s_per_unknown * n / p * slow, 0.0, 70 * levels * self.reduce_s(p, 8 * p) + self.send_s(2 * p, 2 * body.file_bytes / p))
+        else:
+            out["read"] = (0.0, rates.read_s_per_unknown * n * slow, 0.0)
+            out["partition"] = (0.0, rates.partition_s_per_unknown * n * slow, self.send_s(p - 1, body.file_bytes * (p - 1) / p))
+        halo = find_halo_unknowns(body, p)
+        out["assemble"] = (rates.assemble_s_per_unknown * n / p * slow, 0.0, 0.0 if p == 1 else self.send_s(14, 8 * 9 * 15 * halo / 3))
+
+        # Factor: the subtrees run side by side; above them one rank after the other, each front where it stands.
+        fronts = find_fronts(body, p)
+        top = sum(2**level * count_front_flops(*front) for level, front in enumerate(fronts))
+        shared = body.factorisations * max(body.factor_flops - top, 0.0) / p / (1e9 * rates.factor_gflops * self.speed)
+        path = sum(count_front_flops(*front) for front in fronts) / (1e9 * rates.front_gflops * self.speed)
+        updates = sum(self.send_s(2, 8 * (order - pivots) ** 2 / 2) for pivots, order in fronts)
+        groups = 7.0 * p if p > 2 else p - 1.0  # sets of ranks that share nodes: a part has about 14 neighbours, each pair counts once
+        plan = rates.plan_s_per_group2 * groups**2 * slow
+        out["factor"] = (shared, body.factorisations * path + plan, body.factorisations * updates)
+
+        # Solve: L is read twice per block of columns; fronts on the path wait for one another twice, down and up.
+        top_entries = sum(2**level * (pivots * order - pivots**2 / 2) for level, (pivots, order) in enumerate(fronts))
+        own = max(body.entries - top_entries, 0.0) / p
+        shared = blocks * self.compute_s(4 * own * body.block, rates.solve_gflops, 16 * own)
+        path_entries = sum(pivots * order - pivots**2 / 2 for pivots, order in fronts)
+        path = blocks * self.compute_s(4 * path_entries * body.block, rates.solve_gflops, 16 * path_entries)
+        exchange = blocks * sum(2 * self.send_s(1, small * order) for _, order in fronts)
+        out["solve"] = (shared, path, exchange)
+
+        # Orthogonalise: per block one recurrence and one pass against the whole basis (half of its final size on average), Ritz vectors at
+        # the end; six small sums over the ranks a block; M z needs the halo when M is not diagonal. The projected problem is rank 0's.
+        flops = blocks * 4 * n * (body.basis / 2) * body.block + 2 * n * body.basis * body.modes
+        shared = self.compute_s(flops / p, rates.orthogonalise_gflops, 0.0)
+        projected = count_projected_flops(body) / (1e9 * PROJECTED_SHARE * rates.dense_gflops * self.speed)
+        sums = blocks * (5 * self.reduce_s(p, small * body.block) + self.reduce_s(p, small * body.basis / 2)) + self.reduce_s(p, 8 * body.basis * body.modes)
+        products = 0.0 if body.mass_entries_per_row <= 1 or p == 1 else blocks * 4 * self.send_s(14, small * halo)
+        out["orthogonalise"] = (shared, projected, sums + products)
+
+        # Write: the surface's values go to rank 0, which packs and writes them.
+        values = body.surface_nodes * body.modes
+        out["write"] = (0.0, rates.write_s_per_value * values * slow, 0.0 if p == 1 else self.send_s(p, 24 * values * (p - 1) / p))
+        return out
+
+    def calc_seconds(self, ranks, **options):
+        return {phase: sum(parts) for phase, parts in self.calc(ranks, **options).items()}
+
+    def calc_memory_bytes(self, ranks):
+        """Of the largest rank: its share of L and of the basis, and the largest front above the subtrees with what it comes from."""
+        body = self.body
+        fronts = find_fronts(body, ranks)
+        largest = max((8 * order**2 / 2 for _, order in fronts), default=0.0)
+        return 8 * body.entries / ranks + 8 * body.unknowns * (body.basis + 3 * body.block) / ranks + 2 * largest
+
+    def count_messages(self, ranks):
+        """{phase: (collective sums, point-to-point messages)} of a rank, for the check against counted ones."""
+        p, body = ranks, self.body
+        if p == 1:
+            return {}
+        blocks = body.right_sides / body.block
+        return {"orthogonalise": (6 * blocks, 0), "solve": (0, blocks * count_meetings(p)), "factor": (3 * body.factorisations, body.factorisations * count_meetings(p))}
+
+
+def find_limit(model, phase, ranks):
+    """Which of the three parts of a phase is the largest: "shared", "serial" or "messages"."""
+    parts = model.calc(ranks)[phase]
+    return ("shared", "serial", "messages")[max(range(3), key=lambda i: parts[i])]
+
+
+def fit_power(sizes, values):
+    """a of values ~ sizes^a, least squares in logarithms."""
+    x = [math.log(size) for size in sizes]
+    y = [math.log(value) for value in values]
+    mean_x, mean_y = sum(x) / len(x), sum(y) / len(y)
+    return sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y)) / sum((a - mean_x) ** 2 for a in x)
