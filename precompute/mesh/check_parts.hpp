@@ -18,7 +18,7 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
 /// Volume, box, dihedral angles and mean ratios of the straight-sided elements.
 void calc_quality(const TetMesh& mesh, CheckReport& report);
 
-/// Counts curved quadratic elements and straightens those whose Jacobian is not positive at the points of the 4- and 11-point rules.
+/// Counts curved quadratic elements and straightens those that fold (curved.hpp).
 void straighten_folded(TetMesh& mesh, CheckReport& report);
 
 }  // namespace carillon::mesh

@@ -1,36 +1,22 @@
-// Method: the unsigned distance in a narrow band from OpenVDB's meshToVolume; the sign from the winding number, found by
-//   crossing the surface with one line along x per row of samples. A signed flood fill (OpenVDB's own) would fill a body's
-//   closed cavities and needs watertight voxels; the winding number needs neither and takes overlapping parts as one body.
-// Source: Museth, "VDB: high-resolution sparse volumes with dynamic topology", ACM TOG 32(3), 2013; the tie rule of the
-//   crossings is the "simulation of simplicity" of Edelsbrunner and Muecke 1990 (the line is moved by an infinitesimal).
-// Deviations: samples are kept dense: the meshers read them in random order some ten million times.
+// Method: the distance in a band around the surface by handing the nearest triangle on from sample to sample (nearest_triangle.hpp); the
+// sign
+//   from the winding number, found by crossing the surface with one line along x per row of samples. A flood fill would fill a body's
+//   closed cavities and needs a watertight surface; the winding number needs neither and takes overlapping parts as one body.
+// Source: the tie rule of the crossings is the "simulation of simplicity" of Edelsbrunner and Muecke 1990 (the line is moved by an
+//   infinitesimal).
+// Deviations: none.
 #include "precompute/mesher/distance_field.hpp"
 
 #include <fmt/core.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/tools/MeshToVolume.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "precompute/mesher/nearest_triangle.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::mesher {
 namespace {
-
-/// The surface in index space of the grid, as OpenVDB wants it.
-struct IndexSpaceSurface {
-  const TriangleSurface& surface;
-  Vec3 origin;
-  double voxel_m;
-  std::size_t polygonCount() const { return surface.triangles.size(); }
-  std::size_t pointCount() const { return surface.points.size(); }
-  std::size_t vertexCount(std::size_t) const { return 3; }
-  void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& p) const {
-    const Vec3& q = surface.points[static_cast<std::size_t>(surface.triangles[n][v])];
-    for (int c = 0; c < 3; ++c) p[c] = (q[c] - origin[c]) / voxel_m;
-  }
-};
 
 /// Twice the signed area of (a, b, p) in the yz plane, with the sign that p has when it is moved by (eps, eps^2): never 0 for
 /// a != b. Computed from the lower index to the higher one, so the two triangles of an edge see exactly opposite signs.
@@ -77,9 +63,11 @@ void collect_crossings(const TriangleSurface& surface, const DistanceField& fiel
   }
 }
 
-void apply_signs(const TriangleSurface& surface, DistanceField& field) {
+/// 1 for every sample inside the surface.
+std::vector<char> find_inside(const TriangleSurface& surface, const DistanceField& field) {
   std::vector<std::vector<Crossing>> rows(static_cast<std::size_t>(field.size[1]) * field.size[2]);
   collect_crossings(surface, field, rows);
+  std::vector<char> inside(field.samples.size(), 0);
   for (std::size_t row = 0; row < rows.size(); ++row) {
     auto& crossings = rows[row];
     if (crossings.empty()) continue;
@@ -89,12 +77,10 @@ void apply_signs(const TriangleSurface& surface, DistanceField& field) {
     int winding = 0;
     for (std::int32_t i = 0; i < field.size[0]; ++i) {
       for (; next < crossings.size() && crossings[next].x <= static_cast<float>(i); ++next) winding += crossings[next].turn;
-      if (winding > 0) {
-        float& d = field.samples[row * static_cast<std::size_t>(field.size[0]) + i];
-        d = -d;
-      }
+      inside[row * static_cast<std::size_t>(field.size[0]) + i] = winding > 0;
     }
   }
+  return inside;
 }
 
 }  // namespace
@@ -104,7 +90,7 @@ double DistanceField::calc_distance(const Vec3& p) const {
   std::array<double, 3> f;
   for (int c = 0; c < 3; ++c) {
     const double x = (p[c] - origin[c]) / voxel_m;
-    if (!(x >= 0) || x > size[c] - 1) return band_m;
+    if (!(x >= 0) || x > size[c] - 1) return outside_m;
     cell[c] = std::min(static_cast<std::int32_t>(x), size[c] - 2);
     f[c] = x - cell[c];
   }
@@ -116,12 +102,14 @@ double DistanceField::calc_distance(const Vec3& p) const {
   return y0 + f[2] * (y1 - y0);
 }
 
-DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m, double band_m, double offset_m) {
+DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m, const FieldReach& reach, double offset_m) {
+  constexpr float kFar = 1e9f;  // in voxels
   constexpr double kMostSamples = 4e8;
   const Box box = calc_box(surface.points);
   DistanceField field;
   field.voxel_m = voxel_m;
-  field.band_m = band_m;
+  field.outside_m = reach.outside_m;
+  field.inside_m = reach.inside_m;
   double count = 1;
   constexpr int kMargin = 3;
   for (int c = 0; c < 3; ++c) {
@@ -136,29 +124,16 @@ DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m
     // The grid is off the box by an odd fraction, so that flat faces do not lie on samples.
     field.origin[c] = 0.5 * (box.low[c] + box.high[c]) - voxel_m * (0.5 * cells + 0.0137 * (c + 1));
   }
-  field.samples.assign(static_cast<std::size_t>(field.size[0]) * field.size[1] * field.size[2], static_cast<float>(band_m));
+  field.samples.assign(static_cast<std::size_t>(field.size[0]) * field.size[1] * field.size[2], kFar);
 
-  openvdb::initialize();
-  const auto band_voxels = static_cast<float>(band_m / voxel_m + 1);
-  const IndexSpaceSurface mesh{surface, field.origin, voxel_m};
-  const auto transform = openvdb::math::Transform::createLinearTransform(1.0);
-  const auto grid =
-      openvdb::tools::meshToVolume<openvdb::FloatGrid>(mesh, *transform, band_voxels, band_voxels, openvdb::tools::UNSIGNED_DISTANCE_FIELD);
-  for (auto value = grid->cbeginValueOn(); value; ++value) {
-    const openvdb::CoordBBox box_ijk = [&] {
-      openvdb::CoordBBox b;
-      value.getBoundingBox(b);
-      return b;
-    }();
-    const auto d = static_cast<float>(std::min<double>(*value * voxel_m, band_m));
-    for (int k = std::max(box_ijk.min().z(), 0); k <= std::min(box_ijk.max().z(), field.size[2] - 1); ++k)
-      for (int j = std::max(box_ijk.min().y(), 0); j <= std::min(box_ijk.max().y(), field.size[1] - 1); ++j)
-        for (int i = std::max(box_ijk.min().x(), 0); i <= std::min(box_ijk.max().x(), field.size[0] - 1); ++i)
-          field.samples[i + static_cast<std::size_t>(field.size[0]) * (j + static_cast<std::size_t>(field.size[1]) * k)] = d;
+  TriangleSurface scaled = surface;
+  for (Vec3& p : scaled.points) p = (1 / voxel_m) * (p - field.origin);
+  const std::vector<char> inside = find_inside(surface, field);
+  fill_distances(scaled, field.size, inside, {reach.outside_m / voxel_m, (reach.inside_m + offset_m) / voxel_m}, field.samples);
+  for (std::size_t n = 0; n < field.samples.size(); ++n) {
+    const double d = (inside[n] ? -1.0 : 1.0) * voxel_m * field.samples[n] + offset_m;
+    field.samples[n] = static_cast<float>(std::clamp(d, -field.inside_m, field.outside_m));
   }
-  apply_signs(surface, field);
-  if (offset_m != 0)
-    for (float& d : field.samples) d = std::min(d + static_cast<float>(offset_m), static_cast<float>(band_m));
   return field;
 }
 

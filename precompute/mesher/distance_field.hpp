@@ -9,13 +9,13 @@
 
 namespace carillon::mesher {
 
-/// Samples of the signed distance (positive outside) at origin + voxel * (i, j, k), x fastest. Exact to float precision within
-/// `band_m` of the surface, +-band_m beyond it.
+/// Samples of the signed distance (positive outside) at origin + voxel * (i, j, k), x fastest. Exact to float precision from
+/// `inside_m` under the surface to `outside_m` above it, -inside_m and outside_m beyond.
 struct DistanceField {
   Vec3 origin{};
   double voxel_m = 0;
   std::array<std::int32_t, 3> size{};
-  double band_m = 0;
+  double outside_m = 0, inside_m = 0;
   std::vector<float> samples;
 
   float sample(std::int32_t i, std::int32_t j, std::int32_t k) const {
@@ -28,7 +28,10 @@ struct DistanceField {
 
 /// `surface` is closed and oriented outward (it may intersect itself: inside is where its winding number is positive).
 /// `offset_m` is added to every distance. Throws InputError if the grid would have more than 400 million samples.
-DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m, double band_m, double offset_m);
+struct FieldReach {
+  double outside_m = 0, inside_m = 0;
+};
+DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m, const FieldReach& reach, double offset_m);
 
 /// The body within the field: {d < 0}, or with wall_m > 0 the shell {-wall_m < d < 0}. Negative inside.
 inline double calc_body(const DistanceField& field, double wall_m, const Vec3& p) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "precompute/mesh/check.hpp"
+#include "precompute/mesh/curved.hpp"
 #include "precompute/mesh/write.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/shapes/shapes.hpp"
@@ -34,6 +35,7 @@ struct Order {
   std::optional<long long> nodes;
   std::string up, method;
   int order = 1;
+  bool straight = false;
   bool quiet = false;
 };
 
@@ -94,6 +96,7 @@ void check_options(const Order& order) {
     throw InputError(fmt::format("both a surface ({}) and --shape {} are given; give one of them", order.surface, order.shape));
   }
   if (order.nodes && order.edge) throw InputError("--nodes and --edge exclude each other; give one of them");
+  if (order.straight && order.order != 2) throw InputError("--straight is for tetrahedra of ten nodes; add --order 2");
   if (std::filesystem::path(order.out).extension() != ".msh") {
     throw InputError(fmt::format("{}: the mesh is written in Gmsh's format; give the output a name that ends in .msh", order.out));
   }
@@ -136,6 +139,7 @@ Result make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.edge_m = order.edge;
   options.nodes = order.nodes;
   options.order = order.order;
+  options.straight = order.straight;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
   Result result;
@@ -158,6 +162,7 @@ Result make_from_shape(const Order& order, const mesher::Progress& progress) {
   options.edge_m = order.edge;
   Result result;
   result.mesh = shapes::make_shape(options);
+  if (order.straight) mesh::straighten(result.mesh);
   result.seconds.emplace_back("mesh", calc_seconds(start));
   return result;
 }
@@ -198,6 +203,8 @@ std::string format_json(const Order& order, const Result& result, const mesh::Ch
   text += fmt::format("  \"volume_m3\": {:.12g},\n  \"box_low_m\": [{:.12g}],\n  \"box_high_m\": [{:.12g}],\n", check.volume_m3,
                       fmt::join(check.box_low, ", "), fmt::join(check.box_high, ", "));
   text += fmt::format("  \"min_dihedral_deg\": {:.4f},\n  \"max_dihedral_deg\": {:.4f},\n", check.min_dihedral_deg, check.max_dihedral_deg);
+  text += fmt::format("  \"curved_tets\": {},\n  \"straightened_tets\": {},\n", check.curved,
+                      check.straightened + (result.surface ? result.surface->straightened_tets : 0));
   text += fmt::format("  \"mean_ratio_min\": {:.5f},\n  \"mean_ratio_mean\": {:.5f},\n", check.mean_ratio_min, check.mean_ratio_mean);
   if (result.surface) {
     const mesher::SurfaceReport& s = *result.surface;
@@ -223,6 +230,9 @@ std::string format_report(const Order& order, const Result& result, const mesh::
                       check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2], check.volume_m3);
   text += fmt::format("  quality   dihedral angles {:.1f} to {:.1f} degrees, mean ratio {:.3f} on average, {:.3f} at worst\n",
                       check.min_dihedral_deg, check.max_dihedral_deg, check.mean_ratio_mean, check.mean_ratio_min);
+  if (result.mesh.order == 2)
+    text += fmt::format("  curved    {} tetrahedra; {} made straight-sided since they would have folded over\n", check.curved,
+                        check.straightened + (result.surface ? result.surface->straightened_tets : 0));
   std::vector<std::string> sets, seconds;
   for (const auto& [name, nodes] : result.mesh.node_sets) sets.push_back(fmt::format("{} ({})", name, nodes.size()));
   if (!sets.empty()) text += fmt::format("  node sets {}\n", fmt::join(sets, ", "));
@@ -301,6 +311,7 @@ int run(int argc, char** argv) {
   app.add_option("--nodes", order.nodes, "About how many nodes, mid-side nodes among them (within 10 %)");
   app.add_option("--edge", order.edge, "Length of the edges in metres, in place of --nodes");
   app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [1]")->check(CLI::IsMember({1, 2}));
+  app.add_flag("--straight", order.straight, "Order 2: mid-side nodes in the middle of their edges, not on the true surface");
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
   app.add_flag("--quiet", order.quiet, "No progress on the way");
   std::map<std::string, std::string> help{

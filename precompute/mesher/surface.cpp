@@ -11,11 +11,9 @@
 #include <new>
 
 #include "precompute/mesh/check.hpp"
-#include "precompute/mesher/count_search.hpp"
-#include "precompute/mesher/delaunay.hpp"
-#include "precompute/mesher/distance_field.hpp"
-#include "precompute/mesher/inset_curves.hpp"
-#include "precompute/mesher/nearest.hpp"
+#include "precompute/mesh/curved.hpp"
+#include "precompute/mesher/body.hpp"
+#include "precompute/mesher/curve_mesh.hpp"
 #include "precompute/mesher/part_nodes.hpp"
 #include "precompute/mesher/quiet.hpp"
 #include "precompute/mesher/smooth.hpp"
@@ -27,15 +25,12 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kMostNodes = 2e7;
 constexpr double kCountTolerance = 0.10;             // promised
 constexpr double kCountAim = 0.04;                   // where the search is content
 constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kSliverDeg = 12;
-// Edges longer than the body is thick do not make the mesh coarser: on plates and cubes its count levels out at what the model gives for
-// this multiple of the mean thickness. A target under this part of that count is refused at once.
-constexpr double kEdgePerThickness = 1.4;
+// A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
 constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
@@ -118,98 +113,6 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
         "The body is {:.3g} m long. If the file is not in metres, give its height or a scale (0.001 for millimetres).", largest));
 }
 
-/// Everything the meshers need of the body.
-struct Body {
-  MendedSurface mended;
-  std::optional<DistanceField> field;
-  std::optional<NearestPoint> nearest;
-  double wall_m = 0;
-  double thickness_m = 0;  // of the wall, or of the solid: volume over half its area
-  CountModel model{};
-};
-
-[[noreturn]] void throw_solid(const SurfaceOptions& options, double deepest_m) {
-  throw InputError(
-      fmt::format("{}: a wall of {:.4g} m leaves no hollow: no point of the body is deeper than {:.4g} m under its surface; "
-                  "give a thinner wall, or none for a solid",
-                  options.surface.string(), *options.wall_m, deepest_m));
-}
-
-DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m) {
-  const Vec3 extent = calc_box(body.mended.surface.points).extent();
-  const double diagonal = norm(extent);
-  // Three samples an edge and eight through the wall, as far as sixty million samples reach.
-  constexpr double kPleasantSamples = 6e7;
-  double voxel = std::min({edge_m / 3, diagonal / 80, body.wall_m > 0 ? body.wall_m / 8 : diagonal});
-  voxel = std::max(voxel, std::cbrt(extent[0] * extent[1] * extent[2] / kPleasantSamples));
-  if (body.wall_m > 0) voxel = std::min(voxel, body.wall_m / 4);
-  const double half = 0.5 * std::min({extent[0], extent[1], extent[2]});
-  if (body.wall_m >= half) throw_solid(options, half);
-  DistanceField field = [&] {
-    try {
-      return calc_distance_field(body.mended.surface, voxel, body.wall_m + 4 * voxel, body.mended.offset_m);
-    } catch (const InputError& failure) {
-      throw InputError(fmt::format("{}: {}", options.surface.string(), failure.what()));
-    }
-  }();
-  const auto deepest = *std::min_element(field.samples.begin(), field.samples.end());
-  if (deepest >= 0)
-    throw InputError(
-        fmt::format("{}: the surface encloses nothing thicker than {:.3g} m, the resolution for edges of {:.3g} m; "
-                    "ask for shorter edges or more nodes",
-                    options.surface.string(), voxel, edge_m));
-  if (body.wall_m > 0 && deepest >= -body.wall_m) throw_solid(options, -static_cast<double>(deepest));
-  return field;
-}
-
-std::unique_ptr<DelaunayBody> make_delaunay(const Body& body, const SurfaceOptions& options, double edge_m, bool keep_sharp,
-                                            SurfaceReport& report) {
-  std::vector<Polyline> curves;
-  report.sharp_edges_m = 0;
-  report.sharp_curves = 0;
-  if (keep_sharp && !report.wrapped) {
-    const double diagonal = calc_box(body.mended.surface.points).diagonal();
-    curves = find_sharp_curves(body.mended.surface, options.sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m);
-    report.sharp_curves = static_cast<std::int64_t>(curves.size());
-    for (const Polyline& curve : curves)
-      for (std::size_t i = 1; i < curve.size(); ++i) report.sharp_edges_m += norm(curve[i] - curve[i - 1]);
-    if (body.wall_m > 0 && !curves.empty()) {
-      const auto inset = make_inset_curves(body.mended.surface, curves, *body.nearest, body.wall_m, 0.5 * edge_m);
-      curves.insert(curves.end(), inset.begin(), inset.end());
-    }
-  }
-  return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.mended.surface, curves);
-}
-
-DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m) {
-  const double distance = body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m;
-  // Far more than any body needs at this edge length, so that only a runaway meets it.
-  // Without a target, a thin body takes what its thickness needs.
-  const double effective = options.nodes ? edge_m : std::min(edge_m, kEdgePerThickness * body.thickness_m);
-  const double most = 3000 + 5 * std::max(body.model.calc_nodes(effective), static_cast<double>(options.nodes.value_or(0)));
-  return {edge_m, distance, static_cast<std::size_t>(std::min(most, 3 * kMostNodes))};
-}
-
-/// The point of the body's nearest skin.
-Vec3 project(const Body& body, Vec3 p) {
-  if (!body.field) return body.nearest->find(p);
-  const DistanceField& field = *body.field;
-  const double level = field.calc_distance(p) < -0.5 * body.wall_m && body.wall_m > 0 ? -body.wall_m : 0;
-  for (int n = 0; n < 3; ++n) {
-    Vec3 gradient{};
-    for (int c = 0; c < 3; ++c) {
-      Vec3 low = p, high = p;
-      low[c] -= 0.5 * field.voxel_m;
-      high[c] += 0.5 * field.voxel_m;
-      gradient[c] = (field.calc_distance(high) - field.calc_distance(low)) / field.voxel_m;
-    }
-    const double square = dot(gradient, gradient);
-    if (square < 0.1) break;  // on the skeleton of the body, where no skin is nearest
-    p = p - ((field.calc_distance(p) - level) / square) * gradient;
-  }
-  return p;
-}
-
 /// Makes the body of a fresh mesh sound: no pinched edges or nodes, no crumbs, no element flatter than need be.
 void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   const auto project_here = [&](const Vec3& p) { return project(body, p); };
@@ -270,7 +173,7 @@ struct DelaunayError : InputError {
 };
 
 /// The linear mesh by Delaunay refinement.
-mesh::TetMesh make_delaunay_mesh(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases) {
+mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases) {
   const double first_edge = edge_m;
   std::optional<CountError> with_sharp;
   const auto make = [&](bool keep_sharp) {
@@ -353,6 +256,17 @@ void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& 
   report.wall_mean_m = sum / static_cast<double>(count);
 }
 
+/// Puts the mid nodes of the boundary on the skins.
+void curve(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
+  const CurvedEdges edges = curve_mesh(
+      mesh, body.curves, [&](const Vec3& middle, const Vec3& normal, double reach_m) { return find_skin(body, middle, normal, reach_m); });
+  report.curved_edges = edges.curved;
+  report.straight_edges = edges.left;
+  report.straightened_tets = edges.straightened;
+  report.volume_m3 = 0;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) report.volume_m3 += mesh::calc_curved_volume(mesh, e);
+}
+
 void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& report) {
   const double error = report.volume_m3 / report.expected_volume_m3 - 1;
   if (std::abs(error) > 0.03)
@@ -426,6 +340,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     report.method = Method::kStuffing;
     report.sharp_curves = 0;
     report.sharp_edges_m = 0;
+    body.curves.clear();
     edge = body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : body.model.calc_nodes(edge));
     linear = stuff_body();
   }
@@ -440,6 +355,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
                     options.surface.string(), edge, 100 * report.volume_m3 / report.expected_volume_m3));
   report.edge_m = edge;
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
+  if (options.order == 2 && !options.straight) phases.run("curving", [&] { return curve(out, body, report), 0; });
   report.nodes = static_cast<std::int64_t>(out.nodes.size());
   add_notes(options, body, report);
   return out;

@@ -1,6 +1,6 @@
 // Closed surfaces to tetrahedra: the solid, or the hollow shell between a surface and its inward offset.
 //
-// This is the one public header of the library; it is std only. CGAL (GPL-3) and OpenVDB (MPL-2) stay behind it, in
+// This is the one public header of the library; it is std only. CGAL (GPL-3) stays behind it, in
 // this library and in the program carillon-mesh alone.
 #pragma once
 
@@ -37,7 +37,8 @@ struct SurfaceOptions {
   std::optional<double> scale = std::nullopt;        // metres per unit of the file; without scale and height_m the file is in metres
   std::optional<double> edge_m = std::nullopt;       // length of the tetrahedra's edges
   std::optional<std::int64_t> nodes = std::nullopt;  // nodes of the final mesh (order 2: with the mid-side ones), met within 10 %
-  int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten (mid-side nodes at the middle of the edges)
+  int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten
+  bool straight = false;                             // order 2: all mid-side nodes in the middle, none on the true surface
   double sharp_angle_deg = 40;                       // an edge whose two faces turn by more than this, and not by noise, stays sharp
   Method method = Method::kAutomatic;
 };
@@ -64,11 +65,14 @@ struct SurfaceReport {
   std::int64_t nodes = 0;
   std::int64_t corner_nodes = 0;
   std::int64_t tets = 0;
-  double edge_m = 0;              // the edge length asked of the mesher
-  double mean_edge_m = 0;         // as it came out
-  std::int64_t removed_tets = 0;  // where the body only touched itself, or crumbs
-  std::int64_t parted_nodes = 0;  // at which two skins met
-  int attempts = 0;               // meshes made to meet the node count
+  double edge_m = 0;                   // the edge length asked of the mesher
+  double mean_edge_m = 0;              // as it came out
+  std::int64_t removed_tets = 0;       // where the body only touched itself, or crumbs
+  std::int64_t parted_nodes = 0;       // at which two skins met
+  int attempts = 0;                    // meshes made to meet the node count
+  std::int64_t curved_edges = 0;       // order 2: edges whose mid node lies on the true surface, off the middle,
+  std::int64_t straight_edges = 0;     // boundary edges with no skin near enough, left straight,
+  std::int64_t straightened_tets = 0;  // and elements that would have folded over and were made straight-sided
   double volume_m3 = 0;
   double expected_volume_m3 = 0;  // solid: input_volume_m3; with a wall: that of the shell by the distance field
   double min_dihedral_deg = 0;

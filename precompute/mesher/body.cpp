@@ -1,0 +1,127 @@
+// The body and the steps that read its distance field.
+#include "precompute/mesher/body.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/mesher/inset_curves.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+[[noreturn]] void throw_solid(const SurfaceOptions& options, double deepest_m) {
+  throw InputError(
+      fmt::format("{}: a wall of {:.4g} m leaves no hollow: no point of the body is deeper than {:.4g} m under its surface; "
+                  "give a thinner wall, or none for a solid",
+                  options.surface.string(), *options.wall_m, deepest_m));
+}
+
+}  // namespace
+
+DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m) {
+  const Vec3 extent = calc_box(body.mended.surface.points).extent();
+  const double diagonal = norm(extent);
+  // Three samples an edge and eight through the wall, as far as sixty million samples reach.
+  constexpr double kPleasantSamples = 6e7;
+  double voxel = std::min({edge_m / 3, diagonal / 80, body.wall_m > 0 ? body.wall_m / 8 : diagonal});
+  voxel = std::max(voxel, std::cbrt(extent[0] * extent[1] * extent[2] / kPleasantSamples));
+  if (body.wall_m > 0) voxel = std::min(voxel, body.wall_m / 4);
+  const double half = 0.5 * std::min({extent[0], extent[1], extent[2]});
+  if (body.wall_m >= half) throw_solid(options, half);
+  DistanceField field = [&] {
+    try {
+      // Outside, stuffing reads one edge away; the wrap's offset widens what is inside.
+      return calc_distance_field(body.mended.surface, voxel,
+                                 {std::max(4 * voxel, std::min(edge_m, diagonal / 20)), body.wall_m + 4 * voxel}, body.mended.offset_m);
+    } catch (const InputError& failure) {
+      throw InputError(fmt::format("{}: {}", options.surface.string(), failure.what()));
+    }
+  }();
+  const auto deepest = *std::min_element(field.samples.begin(), field.samples.end());
+  if (deepest >= 0)
+    throw InputError(
+        fmt::format("{}: the surface encloses nothing thicker than {:.3g} m, the resolution for edges of {:.3g} m; "
+                    "ask for shorter edges or more nodes",
+                    options.surface.string(), voxel, edge_m));
+  if (body.wall_m > 0 && deepest >= -body.wall_m) throw_solid(options, -static_cast<double>(deepest));
+  return field;
+}
+
+std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& options, double edge_m, bool keep_sharp,
+                                            SurfaceReport& report) {
+  std::vector<Polyline>& curves = body.curves;
+  curves.clear();
+  report.sharp_edges_m = 0;
+  report.sharp_curves = 0;
+  if (keep_sharp && !report.wrapped) {
+    const double diagonal = calc_box(body.mended.surface.points).diagonal();
+    curves = find_sharp_curves(body.mended.surface, options.sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m);
+    report.sharp_curves = static_cast<std::int64_t>(curves.size());
+    for (const Polyline& curve : curves)
+      for (std::size_t i = 1; i < curve.size(); ++i) report.sharp_edges_m += norm(curve[i] - curve[i - 1]);
+    if (body.wall_m > 0 && !curves.empty()) {
+      const auto inset = make_inset_curves(body.mended.surface, curves, *body.nearest, body.wall_m, 0.5 * edge_m);
+      curves.insert(curves.end(), inset.begin(), inset.end());
+    }
+  }
+  return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.mended.surface, curves);
+}
+
+DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m) {
+  const double distance = body.wall_m > 0 ? std::min(0.1 * edge_m, 0.15 * body.wall_m) : 0.1 * edge_m;
+  // Far more than any body needs at this edge length, so that only a runaway meets it.
+  // Without a target, a thin body takes what its thickness needs.
+  const double effective = options.nodes ? edge_m : std::min(edge_m, kEdgePerThickness * body.thickness_m);
+  const double most = 3000 + 5 * std::max(body.model.calc_nodes(effective), static_cast<double>(options.nodes.value_or(0)));
+  return {edge_m, distance, static_cast<std::size_t>(std::min(most, 3 * kMostNodes))};
+}
+
+Vec3 project(const Body& body, Vec3 p) {
+  if (!body.field) return body.nearest->find(p);
+  const DistanceField& field = *body.field;
+  const double level = field.calc_distance(p) < -0.5 * body.wall_m && body.wall_m > 0 ? -body.wall_m : 0;
+  for (int n = 0; n < 3; ++n) {
+    Vec3 gradient{};
+    for (int c = 0; c < 3; ++c) {
+      Vec3 low = p, high = p;
+      low[c] -= 0.5 * field.voxel_m;
+      high[c] += 0.5 * field.voxel_m;
+      gradient[c] = (field.calc_distance(high) - field.calc_distance(low)) / field.voxel_m;
+    }
+    const double square = dot(gradient, gradient);
+    if (square < 0.1) break;  // on the skeleton of the body, where no skin is nearest
+    p = p - ((field.calc_distance(p) - level) / square) * gradient;
+  }
+  return p;
+}
+
+std::optional<Vec3> find_skin(const Body& body, const Vec3& middle, const Vec3& normal, double reach_m) {
+  if (!body.field) {
+    const Vec3 p = body.nearest->find(middle);
+    return norm(p - middle) < reach_m ? std::optional(p) : std::nullopt;
+  }
+  // The body's function is about a distance, so its value is the first guess of the way; then regula falsi (Illinois).
+  const auto calc = [&](double t) { return calc_body(*body.field, body.wall_m, middle + t * normal); };
+  double low = 0, at_low = calc(0), high = 0, at_high = at_low;
+  for (double way = 1.5 * std::abs(at_low) + 0.01 * reach_m; (at_high > 0) == (at_low > 0); way *= 2) {
+    low = high, at_low = at_high;
+    high = at_low > 0 ? -std::min(way, reach_m) : std::min(way, reach_m);
+    if (high == low) return std::nullopt;
+    at_high = calc(high);
+  }
+  for (int n = 0; n < 40 && std::abs(high - low) > 1e-6 * reach_m; ++n) {
+    const double t = high - at_high * (high - low) / (at_high - at_low), at = calc(t);
+    if (at == 0) return middle + t * normal;
+    if ((at > 0) != (at_high > 0))
+      low = high, at_low = at_high;
+    else
+      at_low *= 0.5;
+    high = t, at_high = at;
+  }
+  return middle + high * normal;
+}
+
+}  // namespace carillon::mesher
