@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "precompute/io/interrupt.hpp"
 #include "precompute/io/run_job.hpp"
 #include "precompute/io/run_record.hpp"
 #include "precompute/petsc/session.hpp"
@@ -52,6 +53,7 @@ void print_start(const petsc::Session& session, bool quiet) {
 int main(int argc, char** argv) {
   try {
     const petsc::Session session(argc, argv);
+    io::end_on_signals(session.rank());
     petsc::pin_blas_threads();
     MPI_Comm failures = MPI_COMM_NULL;
     MPI_Comm_dup(MPI_COMM_WORLD, &failures);
@@ -69,10 +71,7 @@ int main(int argc, char** argv) {
       app.parse(argc, argv);
       print_start(session, quiet);
       const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, job, quiet);
-      if (session.rank() == 0 && !quiet)
-        fmt::print("{}: {} modes{}{}\n", summary.bank.string(), summary.modes,
-                   summary.modes > 0 ? fmt::format(", {:.2f} Hz to {:.2f} Hz", summary.first_hz, summary.last_hz) : "",
-                   summary.complete ? "" : " (cut by max_modes)");
+      if (session.rank() == 0 && !quiet) fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
     } catch (const CLI::ParseError& error) {
       code = error.get_exit_code() == 0 ? 0 : kExitInput;
       if (session.rank() == 0) app.exit(error);

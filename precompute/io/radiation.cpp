@@ -17,18 +17,6 @@
 namespace carillon::io {
 namespace {
 
-/// Twice the area times the unit normal.
-Vec3 calc_normal(const std::vector<Vec3>& x, const Triangle& t) {
-  Vec3 u, v;
-  for (int k = 0; k < 3; ++k) {
-    u[k] = x[t[1]][k] - x[t[0]][k];
-    v[k] = x[t[2]][k] - x[t[0]][k];
-  }
-  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-}
-
-double norm(const Vec3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
 /// Per triangle the smallest triangle that it is connected with through edges.
 std::vector<std::size_t> find_shells(const std::vector<Triangle>& triangles) {
   std::vector<std::size_t> parent(triangles.size());
@@ -61,6 +49,16 @@ std::vector<std::size_t> find_shells(const std::vector<Triangle>& triangles) {
 
 }  // namespace
 
+Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle) {
+  const Vec3 &a = vertices_m[triangle[0]], &b = vertices_m[triangle[1]], &c = vertices_m[triangle[2]];
+  Vec3 u, v;
+  for (int k = 0; k < 3; ++k) {
+    u[k] = b[k] - a[k];
+    v[k] = c[k] - a[k];
+  }
+  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+}
+
 std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles) {
   const std::vector<std::size_t> shell = find_shells(triangles);
   std::map<std::size_t, double> volume;  // six times the volume that a shell encloses, about its own first corner
@@ -75,30 +73,9 @@ std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, 
   return outer;
 }
 
-std::vector<double> calc_radiation_gain(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles,
-                                        std::span<const double> omega_rad_s, std::span<const double> shapes) {
-  const std::size_t modes = omega_rad_s.size();
-  std::vector<double> flow(modes, 0.0);  // sum of |phi . n| A
-  double area_sum = 0.0;
-  for (const Triangle& t : find_outer_triangles(vertices_m, triangles)) {
-    const Vec3 normal = calc_normal(vertices_m, t);
-    area_sum += norm(normal) / 2;
-    for (std::size_t m = 0; m < modes; ++m) {
-      double through = 0.0;  // 3 phi . n of the middle, times twice the area
-      for (int i = 0; i < 3; ++i) {
-        const double* phi = &shapes[(t[i] * modes + m) * 3];
-        through += phi[0] * normal[0] + phi[1] * normal[1] + phi[2] * normal[2];
-      }
-      flow[m] += std::abs(through) / 6;
-    }
-  }
-  const double radius = std::sqrt(area_sum / (4 * std::numbers::pi));
-  std::vector<double> gain(modes);
-  for (std::size_t m = 0; m < modes; ++m) {
-    const double ka = omega_rad_s[m] / bank::kSoundSpeedMs * radius;
-    gain[m] = bank::kAirDensityKgM3 * omega_rad_s[m] / (4 * std::numbers::pi * std::sqrt(1 + ka * ka)) * flow[m];
-  }
-  return gain;
+double calc_radiation_gain(double omega_rad_s, double flow, double area_m2) {
+  const double ka = omega_rad_s / bank::kSoundSpeedMs * std::sqrt(area_m2 / (4 * std::numbers::pi));
+  return bank::kAirDensityKgM3 * omega_rad_s / (4 * std::numbers::pi * std::sqrt(1 + ka * ka)) * flow;
 }
 
 }  // namespace carillon::io

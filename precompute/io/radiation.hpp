@@ -18,13 +18,14 @@ using Triangle = std::array<std::int32_t, 3>;
 /// Not collective.
 std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles);
 
-/// Calculates per mode the pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s):
-///   g = rho0 omega / (4 pi sqrt(1 + (k a)^2)) * sum over outer triangles of |integral phi . n dA|,   k = omega / c0,  a = sqrt(A / 4 pi),
-/// with A the area of the outer triangles. omega_rad_s: (m); shapes: (V, m, 3) [kg^-1/2] at the vertices, linear over each triangle.
+/// Twice the area times the unit normal of a triangle.
+Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle);
+
+/// Calculates the pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s):
+///   g = rho0 omega / (4 pi sqrt(1 + (k a)^2)) * flow,   k = omega / c0,  a = sqrt(A / 4 pi),
+/// flow: the sum over outer triangles of |integral phi . n dA| [m^2 kg^-1/2], phi linear over each triangle; A: their area [m^2].
 /// Exact for a pulsating sphere. OSG02 section 3.4 with absolute values, because the signed sum is zero for a bending mode of a symmetric
 /// body. Directions and interference are left out: too loud for modes whose lobes are short against the wavelength.
-/// Not collective.
-std::vector<double> calc_radiation_gain(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles,
-                                        std::span<const double> omega_rad_s, std::span<const double> shapes);
+double calc_radiation_gain(double omega_rad_s, double flow, double area_m2);
 
 }  // namespace carillon::io

@@ -4,8 +4,7 @@
 #include <mpi.h>
 
 #include <filesystem>
-
-#include "runtime/bank/bank.hpp"
+#include <string>
 
 namespace carillon::io {
 
@@ -13,15 +12,11 @@ namespace carillon::io {
 struct RunSummary {
   std::filesystem::path bank;
   std::filesystem::path resolved;
-  bank::Counts counts;
-  std::size_t modes = 0;
-  double first_hz = 0.0;
-  double last_hz = 0.0;
-  bool complete = true;
+  std::string result;  // "227 modes in 20 .. 20000 Hz ...": how many, why no more, how wrong
 };
 
-/// Reads the job on rank 0 and carries it out on all ranks: mesh, partition, assembly, modes, bank. Writes the bank and, beside it,
-/// <bank>.resolved.json, each whole or not at all; whether they can be written is found out before the solve.
+/// Reads the job on rank 0 and carries it out on all ranks: mesh, partition, assembly, modes, error bars, bank. Writes the bank and, beside
+/// it, <bank>.resolved.json, each whole or not at all; whether they can be written is found out before the solve.
 /// Progress goes to standard output and warnings to standard error, both on rank 0; quiet leaves the progress away.
 /// Collective. Throws the same on every rank: InputError, SolveError, SystemError.
 RunSummary run_job(MPI_Comm comm, const std::filesystem::path& job_file, bool quiet);

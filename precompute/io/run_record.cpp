@@ -2,10 +2,14 @@
 
 #include <fmt/core.h>
 #include <hdf5.h>
+#include <sys/resource.h>
 
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
+#include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "partition/partition.hpp"
@@ -24,14 +28,14 @@ std::string strip_name(const std::string& text) {
 }  // namespace
 
 Stations::Stations(MPI_Comm comm, bool quiet) : comm_(comm) {
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
-  speaks_ = rank == 0 && !quiet;
+  MPI_Comm_rank(comm, &rank_);
+  speaks_ = rank_ == 0 && !quiet;
 }
 
 void Stations::begin(const std::string& name, const std::string& what) {
   name_ = name;
   start_ = std::chrono::steady_clock::now();
+  start_cpu_s_ = find_cpu_seconds();
   if (!speaks_) return;
   fmt::print("{:<10} {}\n", name, what);
   std::fflush(stdout);
@@ -39,21 +43,56 @@ void Stations::begin(const std::string& name, const std::string& what) {
 
 void Stations::say(const std::string& text) const {
   if (!speaks_) return;
-  fmt::print("           {}\n", text);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) fmt::print("           {}\n", line);
   std::fflush(stdout);
+}
+
+void Stations::warn(const std::string& text) {
+  if (rank_ != 0) return;
+  warnings_.push_back(text);
+  std::fflush(stdout);
+  fmt::print(stderr, "carillon-precompute: warning: {}\n", text);
 }
 
 const Station& Stations::end() {
   Station station;
   station.name = name_;
   station.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  station.cpu_seconds = find_cpu_seconds() - start_cpu_s_;
+  station.peak_bytes = station.peak_sum_bytes = find_peak_bytes();
   MPI_Allreduce(MPI_IN_PLACE, &station.seconds, 1, MPI_DOUBLE, MPI_MAX, comm_);
-  const petsc::PeakMemory memory = petsc::find_peak_memory(comm_);
-  station.peak_bytes = memory.max_bytes;
-  station.peak_sum_bytes = memory.sum_bytes;
+  MPI_Allreduce(MPI_IN_PLACE, &station.cpu_seconds, 1, MPI_DOUBLE, MPI_SUM, comm_);
+  MPI_Allreduce(MPI_IN_PLACE, &station.peak_bytes, 1, MPI_INT64_T, MPI_MAX, comm_);
+  MPI_Allreduce(MPI_IN_PLACE, &station.peak_sum_bytes, 1, MPI_INT64_T, MPI_SUM, comm_);
   stations_.push_back(station);
   say(fmt::format("{:.2f} s, {:.0f} MB peak on the largest rank", station.seconds, station.peak_bytes / 1e6));
   return stations_.back();
+}
+
+double find_cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+std::int64_t find_peak_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) return std::strtoll(line.c_str() + 6, nullptr, 10) * 1024;  // "VmHWM:  123456 kB"
+  }
+  return petsc::get_peak_memory_bytes();
+}
+
+std::vector<std::int64_t> gather_peak_bytes(MPI_Comm comm) {
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  const std::int64_t mine = find_peak_bytes();
+  std::vector<std::int64_t> all(rank == 0 ? static_cast<std::size_t>(ranks) : 0);
+  MPI_Gather(&mine, 1, MPI_INT64_T, all.data(), 1, MPI_INT64_T, 0, comm);
+  return all;
 }
 
 std::string git_id() { return kGitId; }

@@ -10,12 +10,13 @@
 
 namespace carillon::io {
 
-/// One finished station of the run: the slowest rank's seconds, the largest rank's peak memory up to its end.
+/// One finished station of the run.
 struct Station {
   std::string name;
-  double seconds = 0.0;
-  std::int64_t peak_bytes = 0;      // of the rank that used most
-  std::int64_t peak_sum_bytes = 0;  // of all ranks together
+  double seconds = 0.0;             // wall clock of the slowest rank
+  double cpu_seconds = 0.0;         // user and system, all ranks together
+  std::int64_t peak_bytes = 0;      // so far, of the rank that used most
+  std::int64_t peak_sum_bytes = 0;  // so far, of all ranks together
 };
 
 /// Prints progress lines on rank 0 and times the stations.
@@ -26,20 +27,35 @@ class Stations {
 
   /// Starts a station; `what` says what it works on. Not collective.
   void begin(const std::string& name, const std::string& what);
-  /// Prints a line inside the station, on rank 0. Not collective.
+  /// Prints a line, or several, inside the station, on rank 0. Not collective.
   void say(const std::string& text) const;
+  /// Prints a warning to standard error, on rank 0, and keeps it for the record. Not collective.
+  void warn(const std::string& text);
   /// Ends the station and prints its seconds and memory. Collective.
   const Station& end();
 
   const std::vector<Station>& get_all() const { return stations_; }
+  const std::vector<std::string>& get_warnings() const { return warnings_; }
 
  private:
   MPI_Comm comm_;
+  int rank_ = 0;
   bool speaks_ = false;
   std::string name_;
   std::chrono::steady_clock::time_point start_;
+  double start_cpu_s_ = 0.0;
   std::vector<Station> stations_;
+  std::vector<std::string> warnings_;
 };
+
+/// User and system seconds of this process so far.
+double find_cpu_seconds();
+
+/// Highest resident memory of this process so far [byte]: VmHWM, which knows nothing of the process that started this one.
+std::int64_t find_peak_bytes();
+
+/// The same of every rank, on rank 0; empty on the others. Collective.
+std::vector<std::int64_t> gather_peak_bytes(MPI_Comm comm);
 
 /// The commit that this build was made from, "-dirty" appended when tracked files differ from it; "unknown" outside git.
 std::string git_id();

@@ -32,6 +32,11 @@ double calc_decay(const Damping& damping, const Material& material, double eigen
   return (material.alpha1_s * eigenvalue_rad2_s2 + material.alpha2_per_s) / 2.0;
 }
 
+double calc_shape_scale(double largest) {
+  // A step too small for a normal double would not hold the error bound; no real shape comes near.
+  return largest > 0.0 ? std::max(largest / 32767.0, std::numeric_limits<double>::min()) : 0.0;
+}
+
 void quantise_shapes(Bank& bank, std::span<const double> shapes) {
   const std::size_t modes = bank.mode_count();
   const std::size_t row = 3 * modes;
@@ -47,15 +52,9 @@ void quantise_shapes(Bank& bank, std::span<const double> shapes) {
     largest[mode] = std::max(largest[mode], std::abs(shapes[i]));
   }
   bank.shape_scale.resize(modes);
-  for (std::size_t mode = 0; mode < modes; ++mode) {
-    // A step too small for a normal double would not hold the error bound; no real shape comes near.
-    bank.shape_scale[mode] = largest[mode] > 0.0 ? std::max(largest[mode] / 32767.0, std::numeric_limits<double>::min()) : 0.0;
-  }
+  for (std::size_t mode = 0; mode < modes; ++mode) bank.shape_scale[mode] = calc_shape_scale(largest[mode]);
   bank.shape.resize(shapes.size());
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    const double scale = bank.shape_scale[i % row / 3];
-    bank.shape[i] = scale > 0.0 ? static_cast<std::int16_t>(std::lround(shapes[i] / scale)) : std::int16_t{0};
-  }
+  for (std::size_t i = 0; i < shapes.size(); ++i) bank.shape[i] = find_step(shapes[i], bank.shape_scale[i % row / 3]);
 }
 
 }  // namespace carillon::bank

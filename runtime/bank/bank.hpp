@@ -124,6 +124,15 @@ struct Bank {
   }
 };
 
+/// One integer step of a mode whose largest absolute component is `largest`: largest / 32767, 0 for a mode at rest.
+double calc_shape_scale(double largest);
+
+/// `value` in steps of `scale`, rounded to nearest. |value| <= 32767 scale.
+inline std::int16_t find_step(double value, double scale) {
+  const double steps = scale > 0.0 ? value / scale : 0.0;
+  return static_cast<std::int16_t>(static_cast<std::int32_t>(steps + (steps < 0.0 ? -0.5 : 0.5)));
+}
+
 /// Fills shape_scale and shape from shapes given as doubles: `row(v)` returns the (m, 3) values of vertex v.
 /// Rounds to nearest; the scale of a mode is its largest absolute component / 32767.
 void quantise_shapes(Bank& bank, std::span<const double> shapes /* (V, m, 3) */);
@@ -142,6 +151,11 @@ std::vector<Check> calc_checks(const Bank& bank);
 /// Sane: eigenvalues positive and ascending, decays >= 0 and equal to the damping law, residuals below 1e-4, triangles inside range and
 /// closed and outward, inertia positive definite and physically possible, scales >= 0.
 std::vector<std::string> find_faults(const Bank& bank);
+
+/// One line each, of a bank that has passed calc_checks(): how many modes its band holds and why that is sure, or that nothing makes it so;
+/// how wrong its frequencies can be, the worst of all modes.
+std::string describe_completeness(const Bank& bank);
+std::string describe_accuracy(const Bank& bank);
 
 /// Reads a bank. Throws InputError for anything that is not a whole bank of a version this reader knows: missing file, not a bank,
 /// newer major version, truncated or changed bytes (checksum), arrays that disagree, content that is not sane. Bytes are untrusted: no

@@ -231,4 +231,28 @@ std::vector<Check> check_proof(const Bank& bank) {
   return checks;
 }
 
+std::string describe_completeness(const Bank& bank) {
+  const auto modes = bank.mode_count();
+  const auto [low, high] = bank.band_hz;
+  if (!bank.proof) return fmt::format("none: nothing shows that the band holds no more than these {} modes", modes);
+  const Proof& proof = *bank.proof;
+  const std::int64_t counted = proof.below.back() - proof.below.front();
+  std::string text = bank.complete ? fmt::format("{} modes in {:g} .. {:g} Hz and no more", modes, low, high)
+                                   : fmt::format("the lowest {} of {} modes in {:g} .. {:g} Hz", modes, counted, low, high);
+  std::int64_t rigid = 0;
+  for (const std::int64_t count : proof.rigid_per_component) rigid += count;
+  text += fmt::format(": {} below {:.6g} Hz and {} below {:.6g} Hz by inertia, {} rigid", proof.below.front(), proof.cut_hz.front(),
+                      proof.below.back(), proof.cut_hz.back(), rigid);
+  return text;
+}
+
+std::string describe_accuracy(const Bank& bank) {
+  const auto find_worst = [](const std::vector<double>& cents) { return *std::max_element(cents.begin(), cents.end()); };
+  const auto tell = [&](const std::vector<double>& cents, const char* known, const char* unknown) {
+    return cents.empty() ? std::string(unknown) : fmt::format("{} {:.2g} cent", known, find_worst(cents));
+  };
+  return tell(bank.algebraic_error_cents, "frequencies are those of the mesh to", "no bounds against the mesh") +
+         tell(bank.discretisation_error_cents, " (a bound) and those of the body to about", ", no estimates against the body");
+}
+
 }  // namespace carillon::bank

@@ -29,7 +29,7 @@ void check(const std::string& file) {
   }
   std::fflush(stdout);
   if (faults > 0) throw InputError(fmt::format("{}: {} fault{}; compute the bank again", file, faults, faults == 1 ? "" : "s"));
-  fmt::print("{}\n{}\n{}: whole and sane\n", bank::format_completeness(bank), bank::format_accuracy(bank), file);
+  fmt::print("{}\n{}\n{}: whole and sane\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), file);
 }
 
 int run(int argc, char** argv) {

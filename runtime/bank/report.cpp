@@ -194,30 +194,6 @@ Json::Value make_proof(const Proof& proof) {
 
 }  // namespace
 
-std::string format_completeness(const Bank& bank) {
-  const auto modes = bank.mode_count();
-  const auto [low, high] = bank.band_hz;
-  if (!bank.proof) return fmt::format("none: nothing shows that the band holds no more than these {} modes", modes);
-  const Proof& proof = *bank.proof;
-  const std::int64_t counted = proof.below.back() - proof.below.front();
-  std::string text = bank.complete ? fmt::format("{} modes in {:g} .. {:g} Hz and no more", modes, low, high)
-                                   : fmt::format("the lowest {} of {} modes in {:g} .. {:g} Hz", modes, counted, low, high);
-  std::int64_t rigid = 0;
-  for (const std::int64_t count : proof.rigid_per_component) rigid += count;
-  text += fmt::format(": {} below {:.6g} Hz and {} below {:.6g} Hz by inertia, {} rigid", proof.below.front(), proof.cut_hz.front(),
-                      proof.below.back(), proof.cut_hz.back(), rigid);
-  return text;
-}
-
-std::string format_accuracy(const Bank& bank) {
-  const auto find_worst = [](const std::vector<double>& cents) { return *std::max_element(cents.begin(), cents.end()); };
-  const auto tell = [&](const std::vector<double>& cents, const char* known, const char* unknown) {
-    return cents.empty() ? std::string(unknown) : fmt::format("{} {:.2g} cent", known, find_worst(cents));
-  };
-  return tell(bank.algebraic_error_cents, "frequencies are those of the mesh to", "no bounds against the mesh") +
-         tell(bank.discretisation_error_cents, " (a bound) and those of the body to about", ", no estimates against the body");
-}
-
 std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit) {
   const auto [major, minor] = read_version(file);
   const RigidBody& rigid = bank.rigid;
@@ -233,7 +209,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,
                       bank.mass, bank.counts.nodes, bank.counts.tets, bank.counts.components, bank.counts.components == 1 ? "" : "s",
                       bank.counts.rigid_modes);
-  text += fmt::format("proof     {}\naccuracy  {}\n", format_completeness(bank), format_accuracy(bank));
+  text += fmt::format("proof     {}\naccuracy  {}\n", describe_completeness(bank), describe_accuracy(bank));
   text += fmt::format("material  E {:.5g} Pa, nu {:.4g}, rho {:.5g} kg/m^3{}\n", m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3,
                       bank.regions.empty() ? "" : " (of the whole; several materials: --json)");
   text += fmt::format("damping   {}\n", format_damping(bank));

@@ -14,12 +14,6 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
 /// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
 std::string format_info_json(const Bank& bank, const std::filesystem::path& file);
 
-/// How many modes the band holds, and why that is sure; or that nothing makes it so. The bank's proof has passed calc_checks().
-std::string format_completeness(const Bank& bank);
-
-/// How wrong its frequencies can be, the worst of all modes.
-std::string format_accuracy(const Bank& bank);
-
 /// The two properties that the library, which knows no JSON, does not look at.
 Check calc_regions_check(const Bank& bank);
 Check calc_provenance_check(const Bank& bank);

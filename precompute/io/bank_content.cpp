@@ -1,0 +1,116 @@
+#include "precompute/io/bank_content.hpp"
+
+#include <json/json.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "precompute/io/describe_run.hpp"
+
+namespace carillon::io {
+namespace {
+
+bank::Damping make_damping(const fem::Materials& materials) {
+  bank::Damping damping;
+  if (materials.list.size() > 1) {
+    damping.law = "mixed";
+    return damping;
+  }
+  const spec::Material& material = materials.list[0];
+  switch (material.law) {
+    case spec::DampingLaw::rayleigh:
+      damping.law = "rayleigh";
+      break;
+    case spec::DampingLaw::internal_friction:
+      damping.law = "internal_friction";
+      damping.coefficient = {material.tan_phi};
+      break;
+    case spec::DampingLaw::caughey:
+      damping.law = "caughey";
+      for (const spec::CaugheyTerm& term : material.caughey) {
+        damping.coefficient.push_back(term.coefficient);
+        damping.power.push_back(term.power);
+      }
+      break;
+    case spec::DampingLaw::loss_table:
+      damping.law = "loss_table";
+      for (const spec::LossRow& row : material.loss_table) {
+        damping.freq_hz.push_back(row.freq_hz);
+        damping.loss_factor.push_back(row.loss_factor);
+      }
+      break;
+  }
+  return damping;
+}
+
+/// One material as it is, several or an orthotropic one as their isotropic equivalent. The density is that of the whole.
+bank::Material make_material(const SolvedBody& solved) {
+  const auto& list = solved.materials.list;
+  bank::Material material;
+  if (list.size() == 1) {
+    material = {list[0].young_modulus_pa, list[0].poisson_ratio, list[0].density_kg_m3, 0.0, 0.0};
+    if (list[0].law == spec::DampingLaw::rayleigh) {
+      material.alpha1_s = list[0].alpha1_s;
+      material.alpha2_per_s = list[0].alpha2_per_s;
+    }
+  } else {
+    const spec::Equivalent equivalent = spec::calc_equivalent(list, solved.volume_m3);
+    material = {equivalent.young_modulus_pa, equivalent.poisson_ratio, equivalent.density_kg_m3, 0.0, 0.0};
+  }
+  return material;
+}
+
+std::string make_regions(const SolvedBody& solved) {
+  const auto& materials = solved.materials;
+  const bool is_plain = materials.list.size() == 1 && !materials.list[0].orthotropic;
+  return is_plain ? std::string() : write_json(describe_materials(materials, solved.volume_m3));
+}
+
+bank::Proof make_proof(const eigen::Modes& modes) {
+  bank::Proof proof;
+  for (const eigen::Count& count : modes.proof.counts) {
+    proof.cut_hz.push_back(count.freq_hz);
+    proof.below.push_back(count.below);
+    proof.margin.push_back(std::min(count.margin, 1.0));
+  }
+  proof.rigid_per_component = modes.proof.rigid_per_component;
+  proof.found = modes.proof.found;
+  proof.orthonormality = modes.orthonormality_error;
+  proof.backward_error = modes.proof.factor_backward_error;
+  for (const eigen::Cluster& cluster : modes.proof.clusters) {
+    proof.cluster_first.push_back(cluster.first);
+    proof.cluster_count.push_back(cluster.count);
+  }
+  proof.method = modes.proof.method;
+  return proof;
+}
+
+}  // namespace
+
+bank::Bank make_bank(const spec::JobSpec& job, const Setting& setting, Body& body, const SolvedBody& solved, SurfaceModes& surface_modes) {
+  const eigen::Modes& modes = solved.modes;
+  bank::Bank bank;
+  bank.vertices_m = std::move(body.surface.vertices_m);
+  bank.triangles = std::move(body.surface.triangles);
+  bank.eigenvalue_rad2_s2 = modes.lambda;
+  bank.residual = modes.residual;
+  bank.decay_per_s = solved.decay_per_s;
+  bank.radiation_gain = std::move(surface_modes.radiation_gain);
+  bank.shape_scale = std::move(surface_modes.shape_scale);
+  bank.shape = std::move(surface_modes.shape);
+  bank.algebraic_error_cents = solved.bars.algebraic_cents;
+  bank.discretisation_error_cents = solved.bars.discretisation_cents;
+  bank.rigid = {solved.rigid.mass_kg, solved.rigid.centre_m, solved.rigid.inertia_kg_m2, solved.rigid.volume_m3};
+  bank.material = make_material(solved);
+  bank.damping = make_damping(solved.materials);
+  bank.regions = make_regions(solved);
+  bank.proof = make_proof(modes);
+  bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
+  bank.band_hz = job.band_hz;
+  bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
+  bank.element = spec::to_text(setting.element);
+  bank.mass = spec::to_text(job.mass);
+  return bank;
+}
+
+}  // namespace carillon::io

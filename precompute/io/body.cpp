@@ -1,0 +1,95 @@
+#include "precompute/io/body.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "precompute/io/meshing.hpp"
+#include "precompute/io/refine_mesh.hpp"
+#include "precompute/mesh/read.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::io {
+namespace {
+
+/// The nodes of all sets and boxes that the job holds, each once.
+std::vector<std::int32_t> find_held_nodes(const mesh::TetMesh& mesh, const spec::JobSpec& job) {
+  std::vector<std::int32_t> held;
+  for (const spec::Fixed& fixed : job.fixed) {
+    try {
+      const auto nodes = fixed.node_set ? mesh::find_fixed_nodes(mesh, *fixed.node_set)
+                                        : mesh::find_fixed_nodes(mesh, (*fixed.box_m)[0], (*fixed.box_m)[1]);
+      held.insert(held.end(), nodes.begin(), nodes.end());
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: key 'fixed': {}", fixed.place.empty() ? job.file.string() : fixed.place, error.what()));
+    }
+  }
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
+  return held;
+}
+
+/// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
+mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
+  const bool quadratic = setting.element == spec::Element::T10;
+  const spec::JobSpec& job = run.job;
+  mesh::TetMesh mesh = job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}) : mesh::read_mesh(job.mesh);
+  body.check = mesh::check_mesh(mesh, body.source);
+  for (const std::string& line : body.check.warnings) run.stations.warn(line);
+  for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
+  if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
+  if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);
+  mesh::Surface boundary = mesh::extract_boundary(mesh);
+  body.surface.vertices_m.reserve(boundary.nodes.size());
+  for (const std::int32_t node : boundary.nodes) body.surface.vertices_m.push_back(mesh.nodes[node]);
+  body.surface.triangles = std::move(boundary.triangles);
+  body.surface.row = std::move(boundary.nodes);  // nodes here; make_body() turns them into rows
+  return mesh;
+}
+
+/// CHOLMOD and MUMPS want the elimination order of the whole graph; the factorisation of this project orders by itself.
+bool wants_elimination_order(const spec::JobSpec& job) { return job.factorisation != spec::Factorisation::ldlt; }
+
+}  // namespace
+
+Setting get_setting(const spec::JobSpec& job) {
+  Setting setting;
+  setting.element = job.element;
+  setting.tolerance = job.tolerance;
+  if (job.body) {
+    if (job.body->nodes) setting.nodes = *job.body->nodes;
+    setting.edge_m = job.body->edge_m;
+  }
+  return setting;
+}
+
+Body make_body(Run& run, const Setting& setting) {
+  Body body;
+  body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m}) : run.job.mesh.string();
+  run.stations.begin("read", body.source);
+  mesh::TetMesh mesh;
+  std::vector<std::int32_t> held;
+  petsc::run_agreed(run.comm, [&] {
+    if (run.rank != 0) return;
+    mesh = read_checked_mesh(run, setting, body);
+    held = find_held_nodes(mesh, run.job);
+    body.held_nodes = static_cast<std::int64_t>(held.size());
+    run.stations.say(fmt::format("{} nodes, {} tetrahedra, {} component{}, {} nodes held", mesh.nodes.size(), mesh.tet_count(),
+                                 body.check.components, body.check.components == 1 ? "" : "s", held.size()));
+  });
+  run.stations.end();
+
+  run.stations.begin("partition", "METIS k-way on the dual graph");
+  body.pieces = name_errors(body.source, run,
+                            [&] { return fem::distribute(run.comm, mesh, held, {.elimination_order = wants_elimination_order(run.job)}); });
+  mesh = {};
+  for (std::int32_t& row : body.surface.row) row = body.pieces.row_of_node[row];
+  body.pieces.row_of_node = {};
+  run.stations.say(fem::describe(body.pieces.report));
+  run.stations.end();
+  return body;
+}
+
+}  // namespace carillon::io

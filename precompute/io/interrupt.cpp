@@ -1,0 +1,71 @@
+// Method: the handler only calls what POSIX allows in one (signal-safety(7)): kill, unlink, rmdir, write, _exit.
+// Source: POSIX.1-2008, 2.4.3. Deviations: none.
+#include "precompute/io/interrupt.hpp"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cstring>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::io {
+namespace {
+
+std::array<char, 4096> cleanup_file{}, cleanup_folder{};
+volatile sig_atomic_t has_cleanup = 0;
+volatile sig_atomic_t own_rank = 0;
+std::atomic<pid_t> child_process{0};
+static_assert(std::atomic<pid_t>::is_always_lock_free, "A handler may only touch lock-free atomics.");
+
+void say(const char* text) { (void)!write(STDERR_FILENO, text, std::strlen(text)); }
+
+void handle(int signal) {
+  if (has_cleanup != 0) {
+    const pid_t child = child_process.load();
+    if (child > 0) kill(child, SIGKILL);
+    unlink(cleanup_file.data());
+    rmdir(cleanup_folder.data());
+  }
+  if (own_rank == 0) {
+    say("carillon-precompute: stopped by ");
+    say(signal == SIGTERM ? "SIGTERM" : signal == SIGINT ? "SIGINT" : "SIGHUP");
+    say("; the bank was not touched, or it is whole\n");
+  }
+  _exit(128 + signal);
+}
+
+}  // namespace
+
+void end_on_signals(int rank) {
+  own_rank = rank;
+  struct sigaction action {};
+  action.sa_handler = handle;
+  sigfillset(&action.sa_mask);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+    struct sigaction before {};
+    // nohup and shells without job control have a process ignore some of them: that stays.
+    if (sigaction(signal, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
+  }
+}
+
+Cleanup::Cleanup(const std::string& file) {
+  const std::string folder = file.substr(0, file.rfind('/'));
+  if (file.size() >= cleanup_file.size()) throw InputError(file + ": this path is too long for a temporary file");
+  std::memcpy(cleanup_file.data(), file.c_str(), file.size() + 1);
+  std::memcpy(cleanup_folder.data(), folder.c_str(), folder.size() + 1);
+  child_process = 0;
+  has_cleanup = 1;
+}
+
+Cleanup::~Cleanup() {
+  has_cleanup = 0;
+  unlink(cleanup_file.data());
+  rmdir(cleanup_folder.data());
+}
+
+void Cleanup::set_child(pid_t child) { child_process = child; }
+
+}  // namespace carillon::io

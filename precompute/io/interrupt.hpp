@@ -1,0 +1,25 @@
+// What happens when a run is stopped from outside by SIGTERM, SIGINT or SIGHUP.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+
+namespace carillon::io {
+
+/// From now on such a signal ends this process at once with exit code 128 + signal: rank 0 says so in one line, and what keep_for_cleanup()
+/// was told of is removed. Nothing else needs to be undone: outputs have no name before they are whole (config::write_file). mpirun ends
+/// the other ranks when one of them is ended like this. Call once, before the work.
+void end_on_signals(int rank);
+
+/// While it lives, a signal also ends the process `child` and removes `file` and the empty folder it is in.
+class Cleanup {
+ public:
+  explicit Cleanup(const std::string& file);
+  ~Cleanup();
+  Cleanup(const Cleanup&) = delete;
+  Cleanup& operator=(const Cleanup&) = delete;
+  void set_child(pid_t child);
+};
+
+}  // namespace carillon::io

@@ -1,0 +1,39 @@
+// One run of carillon-precompute as its steps see it.
+#pragma once
+
+#include <mpi.h>
+
+#include <string>
+
+#include "jobs/spec/job_spec.hpp"
+#include "precompute/io/run_record.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::io {
+
+struct Run {
+  Run(MPI_Comm communicator, bool quiet) : comm(communicator), stations(communicator, quiet) {
+    MPI_Comm_rank(comm, &rank);
+    MPI_Comm_size(comm, &ranks);
+  }
+
+  MPI_Comm comm;
+  int rank = 0;
+  int ranks = 1;
+  spec::JobSpec job;  // the same on every rank
+  Stations stations;
+};
+
+/// Runs a collective step whose errors cannot know what it works on, and names it in them. All ranks throw alike.
+template <class Step>
+auto name_errors(const std::string& source, const Run& run, Step&& step) {
+  try {
+    return step();
+  } catch (const InputError& error) {
+    throw InputError(source + ": " + error.what());
+  } catch (const SolveError& error) {
+    throw SolveError(source + " (job " + run.job.file.string() + "): " + error.what());
+  }
+}
+
+}  // namespace carillon::io

@@ -1,0 +1,159 @@
+#include "precompute/io/solve_body.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::io {
+namespace {
+
+eigen::NodeLayout make_layout(fem::Distribution& pieces) {
+  eigen::NodeLayout layout;
+  const auto free_nodes = pieces.local.free_nodes;
+  layout.position.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + free_nodes);
+  layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + free_nodes);
+  layout.component_count = pieces.components;
+  layout.held = pieces.held_m;
+  layout.elimination_position = std::move(pieces.elimination_position);
+  return layout;
+}
+
+/// A line whenever the phase changes or another tenth of the modes is done.
+class ProgressLines {
+ public:
+  explicit ProgressLines(const Stations& stations) : stations_(stations) {}
+  void operator()(const eigen::Progress& progress) {
+    const std::int64_t tenth = progress.modes_wanted > 0 ? 10 * progress.modes_done / progress.modes_wanted : 0;
+    if (progress.phase == phase_ && tenth == tenth_) return;
+    phase_ = progress.phase;
+    tenth_ = tenth;
+    stations_.say(describe(progress));
+  }
+
+ private:
+  static std::string describe(const eigen::Progress& progress) {
+    switch (progress.phase) {
+      case eigen::Phase::kRigid:
+        return "rigid motions in closed form";
+      case eigen::Phase::kAnalyse:
+        return "elimination order";
+      case eigen::Phase::kCount:
+        return "counting the modes of the band";
+      case eigen::Phase::kFactor:
+        return "factorising K - sigma M";
+      case eigen::Phase::kIterate:
+        return fmt::format("{} of {} modes", std::min(progress.modes_done, progress.modes_wanted), progress.modes_wanted);
+      case eigen::Phase::kCheck:
+        return "residuals and orthogonality";
+    }
+    return {};
+  }
+
+  const Stations& stations_;
+  std::optional<eigen::Phase> phase_;
+  std::int64_t tenth_ = 0;
+};
+
+eigen::Factorisation find_factorisation(spec::Factorisation wanted) {
+  switch (wanted) {
+    case spec::Factorisation::mumps:
+      return eigen::Factorisation::kMumps;
+    case spec::Factorisation::cholmod:
+      return eigen::Factorisation::kCholmod;
+    default:
+      return eigen::Factorisation::kAutomatic;
+  }
+}
+
+eigen::Method find_method(spec::Method wanted) {
+  switch (wanted) {
+    case spec::Method::block_lanczos:
+      return eigen::Method::kBlockLanczos;
+    case spec::Method::krylov_schur:
+      return eigen::Method::kKrylovSchur;
+    default:
+      return eigen::Method::kAutomatic;
+  }
+}
+
+eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, eigen::NodeLayout layout) {
+  eigen::Options options;
+  options.low_hz = run.job.band_hz[0];
+  options.high_hz = run.job.band_hz[1];
+  if (run.job.max_modes) options.max_modes = *run.job.max_modes;
+  options.tolerance = setting.tolerance;
+  options.factorisation = find_factorisation(run.job.factorisation);
+  options.method = find_method(run.job.method);
+  ProgressLines lines(run.stations);
+  options.progress = [&lines](const eigen::Progress& progress) { lines(progress); };
+  run.stations.begin("modes", fmt::format("{:g} Hz to {:g} Hz", options.low_hz, options.high_hz));
+  eigen::Modes modes = eigen::solve_modes({system.stiffness, system.mass, std::move(layout)}, options);
+  const double worst = modes.residual.empty() ? 0.0 : *std::max_element(modes.residual.begin(), modes.residual.end());
+  run.stations.say(fmt::format("{} modes, {} rigid ones deflated, worst residual {:.1e}, {}", modes.lambda.size(), modes.rigid_count, worst,
+                               modes.factor.solver));
+  run.stations.end();
+  return modes;
+}
+
+estimate::ErrorBars calc_bars(Run& run, const Body& body, const fem::System& system, const SolvedBody& solved) {
+  const eigen::Modes& modes = solved.modes;
+  std::vector<estimate::Solid> solids;
+  for (const spec::Material& material : solved.materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
+  const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
+  estimate::Solution solution{modes.lambda, modes.residual, modes.shapes, run.job.band_hz[0], is_cut ? last_hz : run.job.band_hz[1]};
+  return estimate::calc_error_bars(run.comm, body.pieces.local, system.stiffness, system.mass, solids, solved.materials.of_tet,
+                                   run.job.mass, solution);
+}
+
+std::vector<double> calc_decays(const SolvedBody& solved) {
+  std::vector<double> decays;
+  for (const double lambda : solved.modes.lambda) decays.push_back(solved.materials.list[0].calc_decay_per_s(lambda));
+  return decays;
+}
+
+void warn_of_oddities(Run& run, const eigen::Modes& modes) {
+  if (modes.mechanism_count > 0)
+    run.stations.warn(fmt::format(
+        "the body has {} motions without stiffness besides the rigid ones (parts that hang on a point or an edge)", modes.mechanism_count));
+  if (modes.lambda.empty()) run.stations.warn("no mode lies in the band: the bank will be silent");
+}
+
+}  // namespace
+
+SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
+  SolvedBody solved;
+  const bool is_linear = setting.element == spec::Element::T4;
+  run.stations.begin("assemble", fmt::format("{} unknowns, {}, {} mass", 3 * body.pieces.free_nodes, spec::to_text(setting.element),
+                                             spec::to_text(run.job.mass)));
+  // Errors of the materials name the job's line by themselves.
+  solved.materials = fem::find_materials(run.comm, body.pieces.local, run.job, body.region_names);
+  fem::System system =
+      name_errors(body.source, run, [&] { return fem::assemble(run.comm, body.pieces.local, solved.materials, run.job.mass); });
+  solved.volume_m3 = fem::calc_volumes(run.comm, body.pieces.local, solved.materials);
+  solved.rigid = fem::calc_rigid_body(run.comm, body.pieces.local, solved.materials);
+  for (const spec::Material& material : solved.materials.list) {
+    if (is_linear && material.poisson_ratio > 0.45)
+      run.stations.warn(
+          fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
+                      material.poisson_ratio));
+  }
+  run.stations.end();
+
+  solved.modes = name_errors(body.source, run, [&] { return solve(run, setting, system, make_layout(body.pieces)); });
+  warn_of_oddities(run, solved.modes);
+
+  run.stations.begin("errors", "error bars and decays");
+  solved.decay_per_s = calc_decays(solved);
+  solved.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, solved); });
+  run.stations.end();
+  return solved;
+}
+
+}  // namespace carillon::io

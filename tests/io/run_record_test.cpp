@@ -1,0 +1,56 @@
+#include "precompute/io/run_record.hpp"
+
+#include <gtest/gtest.h>
+
+namespace carillon::io {
+namespace {
+
+int get_rank() {
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  return rank;
+}
+
+TEST(Stations, take_the_seconds_of_the_slowest_rank_and_the_memory_of_all) {
+  Stations stations(MPI_COMM_WORLD, true);
+  stations.begin("sleep", "the last rank is slow");
+  int ranks = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  if (get_rank() == ranks - 1) {
+    const double start = MPI_Wtime();
+    while (MPI_Wtime() < start + 0.05) {
+    }
+  }
+  const Station& station = stations.end();
+  EXPECT_GE(station.seconds, 0.05);
+  EXPECT_GT(station.cpu_seconds, 0.005);  // the loop turned, on whatever share of a core there was
+  EXPECT_GT(station.peak_bytes, 1 << 20);
+  EXPECT_GE(station.peak_sum_bytes, station.peak_bytes);
+  EXPECT_LE(station.peak_sum_bytes, ranks * station.peak_bytes);
+}
+
+TEST(PeakMemory, is_told_of_every_rank_and_counts_what_was_touched) {
+  const std::int64_t before = find_peak_bytes();
+  {
+    std::vector<char> touched(std::size_t{64} << 20, 1);
+    EXPECT_EQ(touched.back(), 1);
+  }
+  EXPECT_GE(find_peak_bytes(), before);
+  EXPECT_GE(find_peak_bytes(), std::int64_t{64} << 20);
+  const auto all = gather_peak_bytes(MPI_COMM_WORLD);
+  int ranks = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  ASSERT_EQ(all.size(), get_rank() == 0 ? static_cast<std::size_t>(ranks) : 0u);
+  for (const std::int64_t bytes : all) EXPECT_GE(bytes, std::int64_t{64} << 20);
+}
+
+TEST(Record, names_every_library_with_a_version) {
+  for (const auto& [name, version] : find_versions())
+    EXPECT_NE(version.find_first_of("0123456789"), std::string::npos) << name << ": " << version;
+  EXPECT_EQ(find_versions().size(), 6u);
+  const std::string id = git_id();
+  EXPECT_TRUE(id == "unknown" || id.find_first_not_of("0123456789abcdef") == std::string::npos || id.ends_with("-dirty")) << id;
+}
+
+}  // namespace
+}  // namespace carillon::io
