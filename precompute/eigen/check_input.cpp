@@ -27,7 +27,7 @@ void check_input(const Problem& problem, const Options& options) {
   int size = 1;
   MPI_Comm_size(comm, &size);
   if (size > 1 && options.factorisation == Factorisation::kCholmod) {
-    throw InputError(fmt::format("CHOLMOD factorises on one rank and there are {}: take MUMPS.", size));
+    throw InputError(fmt::format("CHOLMOD factorises on one rank and there are {}: leave the choice to the program, or take MUMPS.", size));
   }
   petsc::run_agreed(comm, [&] {
     PetscInt rows = 0;

@@ -5,9 +5,21 @@
 
 #include <vector>
 
+#include "precompute/eigen/node_matrix.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 
 namespace carillon::eigen {
+
+/// K and M once more, for products with many columns.
+struct Operators {
+  Operators(Mat stiffness_mat, Mat mass_mat);
+
+  NodeMatrix stiffness;
+  NodeMatrix mass;
+  std::vector<double> stiffness_diagonal;  // (own rows)
+  std::vector<double> mass_diagonal;       // (own rows)
+  MPI_Comm comm = MPI_COMM_NULL;
+};
 
 struct ModeErrors {
   std::vector<double> residual;  // (modes) ||K phi - lambda M phi||_2 / (lambda ||M phi||_2)
@@ -18,7 +30,7 @@ struct ModeErrors {
 
 /// Normalises each column to phi^T M phi = 1, sets lambda to the Rayleigh quotients phi^T K phi, whose errors are of second order, and
 /// measures residuals and orthonormality. lambda: (modes); shapes: (3n, modes) dense. Collective.
-ModeErrors normalise_and_measure(Mat stiffness, Mat mass, std::vector<double>& lambda, Mat shapes);
+ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>& lambda, Mat shapes);
 
 /// Sorts modes by ascending lambda, their shapes and errors with them. Collective.
 void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
@@ -26,9 +38,9 @@ void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
 /// Gram-Schmidt in the M inner product from the first column on: Phi <- Phi R^-1 with Phi^T M Phi = R^T R. Columns must ascend in lambda:
 /// an error of a high mode, small beside its own lambda, would be large beside a low one's, so the low modes must take none from above.
 /// Collective. Throws SolveError when columns are linearly dependent.
-void orthonormalise_shapes(Mat mass, Mat shapes);
+void orthonormalise_shapes(const Operators& operators, Mat shapes);
 
-/// Turns each column so that its entry of largest magnitude is positive; among entries as large to 1e-6 the one whose node comes first by
+/// Turns each column so that its entry of largest magnitude is positive; among entries as large to 1e-4 the one whose node comes first by
 /// x, y, z decides, so that the partition has no say. Collective.
 void orient_shapes(Mat shapes, const std::vector<Vec3>& positions);
 

@@ -54,7 +54,19 @@ class CholmodFactor final : public ShiftedFactor {
     return true;
   }
 
-  void solve(Vec b, Vec x) override { check(MatSolve(factor_, b, x)); }
+  void solve(double* x, std::ptrdiff_t stride, int columns) override {
+    PetscInt n = 0;
+    check(MatGetSize(stiffness_, &n, nullptr));
+    petsc::MatHandle solution;
+    petsc::MatHandle right;
+    check(MatCreateSeqDense(PETSC_COMM_SELF, n, columns, x, solution.out()));
+    check(MatDenseSetLDA(solution, petsc::to_petsc_int(stride)));
+    check(MatDuplicate(solution, MAT_COPY_VALUES, right.out()));
+    check(MatMatSolve(factor_, right, solution));
+  }
+  std::int64_t get_negative_pivots() const override { return 0; }  // K - sigma M is positive definite.
+  double get_backward_error() const override { return 0; }
+  std::int64_t get_peak_bytes() const override { return 0; }
 
   std::string get_solver() const override { return "CHOLMOD L L^T"; }
   std::string get_ordering() const override { return is_given_ ? "METIS nested dissection (given)" : "CHOLMOD's choice"; }

@@ -1,15 +1,17 @@
-// Method:     Krylov-Schur (thick-restart Lanczos) on (K - sigma M)^-1 M in the M inner product; eigenvalues theta of the operator give
-//             lambda = sigma + 1 / theta.
-// Source:     Stewart, A Krylov-Schur algorithm for large eigenproblems, SIAM J. Matrix Anal. Appl. 23(3), 2001; Hernandez, Roman, Vidal,
-//             SLEPc, ACM TOMS 31(3), 2005. Ericsson, Ruhe, Math. Comp. 35, 1980 (shift and invert).
-// Deviations: none. Gram-Schmidt repeats as SLEPc decides: sparing its second pass lost orthogonality now and then.
+// Method:     Block Lanczos or Krylov-Schur on (K - sigma M)^-1 M in the M inner product; eigenvalues theta of the operator give
+//             lambda = sigma + 1 / theta. The starting block is a fixed function of the nodes' positions, so that the partition has no say.
+// Source:     Ericsson, Ruhe, Math. Comp. 35, 1980 (shift and invert); Hernandez, Roman, Vidal, SLEPc, ACM TOMS 31(3), 2005; Stewart,
+//             A Krylov-Schur algorithm for large eigenproblems, SIAM J. Matrix Anal. Appl. 23(3), 2001. Block Lanczos: block_lanczos.cpp.
+// Deviations: none. Gram-Schmidt of Krylov-Schur repeats as SLEPc decides: sparing its second pass lost orthogonality now and then.
 #include "precompute/eigen/krylov.hpp"
 
-#include <slepceps.h>
-
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <string>
 
+#include "precompute/eigen/block_lanczos.hpp"
+#include "precompute/eigen/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::eigen {
@@ -17,26 +19,85 @@ namespace {
 
 using petsc::check;
 
+constexpr PetscInt kBlock = 16;
+
 struct ShellContext {
-  ShiftedFactor* factor = nullptr;
-  std::int64_t solves = 0;
-  double seconds = 0;
+  const KrylovRequest* request = nullptr;
+  KrylovStatistics statistics;
 };
 
 // C callbacks must not let exceptions through: they come back as PETSc errors with the same words.
-PetscErrorCode apply_inverse(PC pc, Vec b, Vec x) {
-  ShellContext* context = nullptr;
-  PetscErrorCode code = PCShellGetContext(pc, &context);
-  if (code != 0) return code;
-  const double start = MPI_Wtime();
+template <typename Work>
+PetscErrorCode guard(Work&& work) {
   try {
-    context->factor->solve(b, x);
+    work();
   } catch (const std::exception& error) {
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_LIB, "%s", error.what());
   }
-  context->seconds += MPI_Wtime() - start;
-  ++context->solves;
   return 0;
+}
+
+void solve_columns(ShellContext& context, const Columns& x) {
+  const double start = MPI_Wtime();
+  context.request->factor->solve(x.values, x.stride, x.count);
+  context.statistics.solve_seconds += MPI_Wtime() - start;
+  context.statistics.solves += x.count;
+}
+
+PetscErrorCode apply_inverse(PC pc, Vec b, Vec x) {
+  return guard([&] {
+    ShellContext* context = nullptr;
+    check(PCShellGetContext(pc, &context));
+    check(VecCopy(b, x));
+    PetscInt rows = 0;
+    PetscScalar* values = nullptr;
+    check(VecGetLocalSize(x, &rows));
+    check(VecGetArray(x, &values));
+    solve_columns(*context, {values, rows, rows, 1});
+    check(VecRestoreArray(x, &values));
+  });
+}
+
+PetscErrorCode apply_inverse_to_block(PC pc, Mat b, Mat x) {
+  return guard([&] {
+    ShellContext* context = nullptr;
+    check(PCShellGetContext(pc, &context));
+    check(MatCopy(b, x, SAME_NONZERO_PATTERN));
+    const LocalColumns columns(x);
+    solve_columns(*context, columns.view());
+  });
+}
+
+// M as SLEPc sees it: single vectors through PETSc's matrix, blocks through ours.
+PetscErrorCode multiply_mass(Mat shell, Vec x, Vec y) {
+  const KrylovRequest* request = nullptr;
+  PetscCall(MatShellGetContext(shell, &request));
+  return MatMult(request->mass, x, y);
+}
+
+PetscErrorCode multiply_mass_block(Mat shell, Mat x, Mat y, void*) {
+  return guard([&] {
+    const KrylovRequest* request = nullptr;
+    check(MatShellGetContext(shell, &request));
+    const LocalColumns from(x);
+    const LocalColumns to(y);
+    request->mass_blocks->multiply(from.view(), to.view());
+  });
+}
+
+petsc::MatHandle make_mass_shell(const KrylovRequest& request) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  PetscInt rows = 0;
+  PetscInt n = 0;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(request.mass), &comm));
+  check(MatGetLocalSize(request.mass, &rows, nullptr));
+  check(MatGetSize(request.mass, &n, nullptr));
+  petsc::MatHandle shell;
+  check(MatCreateShell(comm, rows, rows, n, n, const_cast<KrylovRequest*>(&request), shell.out()));
+  check(MatShellSetOperation(shell, MATOP_MULT, reinterpret_cast<void (*)()>(multiply_mass)));
+  check(MatShellSetOperation(shell, MATOP_MULT_TRANSPOSE, reinterpret_cast<void (*)()>(multiply_mass)));
+  check(MatShellSetMatProductOperation(shell, MATPRODUCT_AB, nullptr, multiply_mass_block, nullptr, MATDENSE, MATDENSE));
+  return shell;
 }
 
 PetscErrorCode report_progress(EPS, PetscInt, PetscInt converged, PetscScalar*, PetscScalar*, PetscReal*, PetscInt, void* context) {
@@ -55,25 +116,43 @@ PetscErrorCode calc_error(EPS, PetscScalar theta, PetscScalar, PetscReal residua
   return 0;
 }
 
-}  // namespace
+// A number in (-1/2, 1/2) from a position and two more numbers.
+double make_noise(const Vec3& x, std::uint64_t a, std::uint64_t b) {
+  std::uint64_t state = a * 0x9E3779B97F4A7C15ull + b * 0xD1B54A32D192ED03ull;
+  for (const double coordinate : x) {
+    state ^= std::bit_cast<std::uint64_t>(coordinate + 0.0);  // + 0.0: minus zero is zero
+    state = (state ^ (state >> 30)) * 0xBF58476D1CE4E5B9ull;
+    state = (state ^ (state >> 27)) * 0x94D049BB133111EBull;
+    state ^= state >> 31;
+  }
+  return static_cast<double>(state >> 11) * 0x1.0p-53 - 0.5;
+}
 
-KrylovResult run_krylov_schur(const KrylovRequest& request) {
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(request.stiffness), &comm));
-  PetscInt n = 0;
-  check(MatGetSize(request.stiffness, &n, nullptr));
-  petsc::EpsHandle eps;
-  check(EPSCreate(comm, eps.out()));
-  check(EPSSetOperators(eps, request.stiffness, request.mass));
-  check(EPSSetProblemType(eps, EPS_GHEP));
-  check(EPSSetType(eps, EPSKRYLOVSCHUR));
-  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  check(EPSSetTarget(eps, request.sigma));
+void set_starting_block(EPS eps, const KrylovRequest& request) {
+  std::vector<petsc::VecHandle> vectors(kBlock);
+  std::vector<Vec> plain;
+  for (std::size_t j = 0; j < vectors.size(); ++j) {
+    check(MatCreateVecs(request.stiffness, vectors[j].out(), nullptr));
+    PetscScalar* values = nullptr;
+    check(VecGetArray(vectors[j], &values));
+    for (std::size_t node = 0; node < request.position->size(); ++node) {
+      for (std::size_t d = 0; d < 3; ++d)
+        values[3 * node + d] = make_noise((*request.position)[node], 3 * j + d + 1, static_cast<std::uint64_t>(request.round));
+    }
+    check(VecRestoreArray(vectors[j], &values));
+    plain.push_back(vectors[j]);
+  }
+  check(EPSSetInitialSpace(eps, static_cast<PetscInt>(plain.size()), plain.data()));
+}
 
+// The shift-invert operator around the factor at hand.
+void set_operator(EPS eps, const KrylovRequest& request, ShellContext& shell, Mat mass) {
   ST st = nullptr;
   KSP ksp = nullptr;
   PC pc = nullptr;
-  ShellContext shell{request.factor, 0, 0};
+  check(EPSSetOperators(eps, request.stiffness, mass));
+  check(EPSSetProblemType(eps, EPS_GHEP));
+  check(EPSSetTarget(eps, request.sigma));
   check(EPSGetST(eps, &st));
   check(STSetType(st, STSINVERT));
   check(STSetShift(st, request.sigma));
@@ -84,36 +163,163 @@ KrylovResult run_krylov_schur(const KrylovRequest& request) {
   check(PCSetType(pc, PCSHELL));
   check(PCShellSetContext(pc, &shell));
   check(PCShellSetApply(pc, apply_inverse));
+  check(PCShellSetMatApply(pc, apply_inverse_to_block));
+}
 
-  const auto deflated = static_cast<PetscInt>(request.deflated.size());
-  const PetscInt room = n - deflated;
-  const PetscInt wanted = std::min(request.wanted, room);
+// Sizes for the type that the options left: the block method seeks the interval, the others what is nearest.
+void set_goal(EPS eps, const KrylovRequest& request) {
+  PetscInt n = 0;
+  PetscInt locked = 0;
+  check(MatGetSize(request.stiffness, &n, nullptr));
+  if (request.locked != nullptr) check(MatGetSize(request.locked, nullptr, &locked));
+  const PetscInt room = n - static_cast<PetscInt>(request.deflated.size()) - locked;
+  PetscBool is_block = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_block));
+  if (is_block == PETSC_TRUE) {
+    const PetscInt wanted = std::min(request.count, room);
+    check(EPSSetWhichEigenpairs(eps, EPS_ALL));
+    check(EPSSetInterval(eps, request.low, request.high));
+    check(EPSSetDimensions(eps, wanted, std::min(n, 3 * wanted + 12 * kBlock), PETSC_DEFAULT));
+    return;
+  }
   // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the
   // modes on both sides of it and needs less.
+  const PetscInt wanted = std::min(request.nearest, room);
   const PetscInt ncv = std::min(room, wanted + (request.sigma > 0 ? wanted / 2 : wanted) + 30);
+  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
   check(EPSSetDimensions(eps, wanted, ncv, ncv));
-  check(EPSSetTolerances(eps, request.tolerance, 200));
-  check(EPSSetConvergenceTestFunction(eps, calc_error, const_cast<KrylovRequest*>(&request), nullptr));
+}
+
+}  // namespace
+
+petsc::MatHandle FoundModes::make_columns(PetscInt count) const {
+  MPI_Comm comm = MPI_COMM_NULL;
+  PetscInt rows = 0;
+  PetscInt n = 0;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness_), &comm));
+  check(MatGetLocalSize(stiffness_, &rows, nullptr));
+  check(MatGetSize(stiffness_, &n, nullptr));
+  petsc::MatHandle columns;
+  check(MatCreateDense(comm, rows, PETSC_DECIDE, n, count, nullptr, columns.out()));
+  check(MatAssemblyBegin(columns, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(columns, MAT_FINAL_ASSEMBLY));
+  return columns;
+}
+
+void FoundModes::reset(Mat stiffness, PetscInt capacity) {
+  stiffness_ = stiffness;
+  lambda.clear();
+  capacity_ = capacity;
+  columns_ = make_columns(capacity);
+}
+
+void FoundModes::add(EPS eps, PetscInt i, double eigenvalue) {
+  const auto count = static_cast<PetscInt>(lambda.size());
+  if (count == capacity_) {
+    capacity_ = capacity_ + capacity_ / 8 + 8;
+    petsc::MatHandle larger = make_columns(capacity_);
+    {
+      const LocalColumns from(columns_);
+      const LocalColumns to(larger);
+      for (PetscInt j = 0; j < count; ++j) std::copy_n(from.column(j), from.rows, to.column(j));
+    }
+    columns_ = std::move(larger);
+  }
+  Vec column = nullptr;
+  check(MatDenseGetColumnVecWrite(columns_, count, &column));
+  check(EPSGetEigenvector(eps, i, column, nullptr));
+  check(MatDenseRestoreColumnVecWrite(columns_, count, &column));
+  lambda.push_back(eigenvalue);
+}
+
+petsc::MatHandle FoundModes::copy_between(double low, double high) const {
+  std::vector<PetscInt> wanted;
+  for (std::size_t j = 0; j < lambda.size(); ++j) {
+    if (lambda[j] > low && lambda[j] < high) wanted.push_back(static_cast<PetscInt>(j));
+  }
+  if (wanted.empty()) return {};
+  petsc::MatHandle copy = make_columns(static_cast<PetscInt>(wanted.size()));
+  const LocalColumns from(columns_);
+  const LocalColumns to(copy);
+  for (std::size_t j = 0; j < wanted.size(); ++j) std::copy_n(from.column(wanted[j]), from.rows, to.column(static_cast<PetscInt>(j)));
+  return copy;
+}
+
+petsc::MatHandle FoundModes::take(const std::vector<std::size_t>& order) {
+  petsc::MatHandle result;
+  if (!order.empty()) {
+    if (order.size() == static_cast<std::size_t>(capacity_)) {
+      const LocalColumns columns(columns_);
+      permute_columns(columns.view(), order);
+      result = std::move(columns_);
+    } else {
+      result = make_columns(static_cast<PetscInt>(order.size()));
+      const LocalColumns from(columns_);
+      const LocalColumns to(result);
+      for (std::size_t j = 0; j < order.size(); ++j)
+        std::copy_n(from.column(static_cast<PetscInt>(order[j])), from.rows, to.column(static_cast<PetscInt>(j)));
+    }
+  }
+  columns_.reset();
+  lambda.clear();
+  capacity_ = 0;
+  return result;
+}
+
+KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(request.stiffness), &comm));
+  check(register_block_lanczos());
+  ShellContext shell{&request, {}};
+  const petsc::MatHandle mass = make_mass_shell(request);
+  petsc::EpsHandle eps;
+  check(EPSCreate(comm, eps.out()));
+  set_operator(eps, request, shell, mass);
+  check(EPSSetType(eps, request.method == Method::kKrylovSchur ? EPSKRYLOVSCHUR : kBlockLanczosType));
+  check(set_block_size(eps, kBlock));
+  check(EPSSetTolerances(eps, request.tolerance, PETSC_DEFAULT));
   check(EPSSetPurify(eps, PETSC_FALSE));
-  if (deflated > 0) check(EPSSetDeflationSpace(eps, deflated, const_cast<Vec*>(request.deflated.data())));
+  check(EPSSetConvergenceTestFunction(eps, calc_error, const_cast<KrylovRequest*>(&request), nullptr));
+  std::string type(128, '\0');
+  PetscBool is_chosen = PETSC_FALSE;  // The goal depends on the type, and options may change either.
+  check(PetscOptionsGetString(nullptr, nullptr, "-eps_type", type.data(), type.size(), &is_chosen));
+  if (is_chosen == PETSC_TRUE) check(EPSSetType(eps, type.c_str()));
+  set_goal(eps, request);
+  check(EPSSetFromOptions(eps));
+  PetscBool is_block = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps.get()), kBlockLanczosType, &is_block));
+  if (is_block == PETSC_TRUE) {
+    check(set_locked(eps, request.locked));
+    set_starting_block(eps, request);
+  }
+  std::vector<Vec> deflated = request.deflated;
+  std::vector<petsc::VecHandle> locked_vectors;
+  if (is_block == PETSC_FALSE && request.locked != nullptr) {
+    PetscInt count = 0;
+    check(MatGetSize(request.locked, nullptr, &count));
+    for (PetscInt j = 0; j < count; ++j) {
+      Vec column = nullptr;
+      locked_vectors.emplace_back();
+      check(MatCreateVecs(request.stiffness, locked_vectors.back().out(), nullptr));
+      check(MatDenseGetColumnVecRead(request.locked, j, &column));
+      check(VecCopy(column, locked_vectors.back()));
+      check(MatDenseRestoreColumnVecRead(request.locked, j, &column));
+      deflated.push_back(locked_vectors.back());
+    }
+  }
+  if (!deflated.empty()) check(EPSSetDeflationSpace(eps, static_cast<PetscInt>(deflated.size()), deflated.data()));
   if (request.progress) check(EPSMonitorSet(eps, report_progress, const_cast<KrylovRequest*>(&request), nullptr));
 
   check(EPSSolve(eps));
 
-  KrylovResult result;
-  result.solves = shell.solves;
-  result.solve_seconds = shell.seconds;
   PetscInt converged = 0;
   check(EPSGetConverged(eps, &converged));
   for (PetscInt i = 0; i < converged; ++i) {
-    petsc::VecHandle vector;
     PetscScalar lambda = 0;
-    check(MatCreateVecs(request.stiffness, vector.out(), nullptr));
-    check(EPSGetEigenpair(eps, i, &lambda, nullptr, vector, nullptr));
-    result.pairs.lambda.push_back(lambda);
-    result.pairs.vectors.push_back(std::move(vector));
+    check(EPSGetEigenvalue(eps, i, &lambda, nullptr));
+    if (lambda >= request.low && lambda <= request.high) found.add(eps, i, lambda);
   }
-  return result;
+  return shell.statistics;
 }
 
 }  // namespace carillon::eigen

@@ -1,38 +1,65 @@
-// One shift-invert Krylov-Schur run.
+// One shift-invert Krylov run through SLEPc's eigensolver object.
 #pragma once
+
+#include <slepceps.h>
 
 #include <functional>
 #include <vector>
 
+#include "precompute/eigen/node_matrix.hpp"
 #include "precompute/eigen/shifted_factor.hpp"
+#include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::eigen {
 
-/// Eigenpairs found so far: lambda unordered, vectors M-orthonormal.
-struct Pairs {
+/// Modes found so far, in the order they came: M-orthonormal columns of one dense matrix with room for more.
+class FoundModes {
+ public:
+  /// Forgets all modes and makes room for `capacity` with K's rows. Collective.
+  void reset(Mat stiffness, PetscInt capacity);
+  /// Copies pair i of a solved eigensolver. Collective.
+  void add(EPS eps, PetscInt i, double eigenvalue);
+  /// The modes with low < lambda < high in a matrix of their own; null if there are none. Collective.
+  petsc::MatHandle copy_between(double low, double high) const;
+  /// The columns by the order given, and nothing else; this object is empty afterwards. Collective.
+  petsc::MatHandle take(const std::vector<std::size_t>& order);
+
   std::vector<double> lambda;
-  std::vector<petsc::VecHandle> vectors;
+
+ private:
+  petsc::MatHandle make_columns(PetscInt count) const;
+  Mat stiffness_ = nullptr;
+  petsc::MatHandle columns_;
+  PetscInt capacity_ = 0;
 };
 
 struct KrylovRequest {
   Mat stiffness = nullptr;
   Mat mass = nullptr;
-  ShiftedFactor* factor = nullptr;  // already factorised at sigma
+  const NodeMatrix* mass_blocks = nullptr;  // M again, for many columns at a time
+  ShiftedFactor* factor = nullptr;          // already factorised at sigma
   double sigma = 0;
-  PetscInt wanted = 0;                                   // the eigenvalues nearest sigma, those of the deflated space not counted
+  double low = 0;  // the interval whose eigenvalues are sought,
+  double high = 0;
+  PetscInt count = 0;                                    // how many it is known to hold beside the locked ones,
+  PetscInt nearest = 0;                                  // and so many nearest sigma cover them (for what can only seek the nearest)
+  Method method = Method::kAutomatic;                    // unless SLEPc's options say otherwise
   double tolerance = 1e-10;                              // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
   std::vector<Vec> deflated;                             // M-orthonormal, the run stays M-orthogonal to them
+  Mat locked = nullptr;                                  // more of these, as columns
+  const std::vector<Vec3>* position = nullptr;           // of the nodes: what the starting block is made of
+  int round = 0;                                         // starting blocks of different rounds differ
   std::function<void(std::int64_t converged)> progress;  // may be empty
 };
 
-struct KrylovResult {
-  Pairs pairs;  // at least `wanted` if it converged; nearest sigma first
+struct KrylovStatistics {
   std::int64_t solves = 0;
   double solve_seconds = 0;
 };
 
-/// Finds eigenpairs of K x = lambda M x nearest sigma. Fewer than wanted come back when the iteration stagnates. Collective.
-KrylovResult run_krylov_schur(const KrylovRequest& request);
+/// Adds the eigenpairs of K x = lambda M x that it finds in the interval to `found`; fewer than there are when some did not converge, or
+/// copies of repeated eigenvalues stayed hidden. Collective.
+KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found);
 
 }  // namespace carillon::eigen

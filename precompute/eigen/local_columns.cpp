@@ -1,7 +1,5 @@
 #include "precompute/eigen/local_columns.hpp"
 
-#include <petscblaslapack.h>
-
 #include <algorithm>
 
 #include "precompute/petsc/session.hpp"
@@ -22,29 +20,20 @@ LocalColumns::LocalColumns(Mat dense) : mat(dense) {
 
 LocalColumns::~LocalColumns() { (void)MatDenseRestoreArray(mat, &values); }
 
-std::vector<double> calc_gram(MPI_Comm comm, const LocalColumns& a, const LocalColumns& b) {
-  std::vector<double> gram(static_cast<std::size_t>(a.columns) * static_cast<std::size_t>(b.columns), 0.0);
-  PetscBLASInt m = a.columns;
-  PetscBLASInt n = b.columns;
-  PetscBLASInt k = a.rows;
-  PetscBLASInt lda = std::max(a.stride, 1);
-  PetscBLASInt ldb = std::max(b.stride, 1);
-  double one = 1;
-  double zero = 0;
-  if (k > 0) BLASgemm_("T", "N", &m, &n, &k, &one, a.values, &lda, b.values, &ldb, &zero, gram.data(), &m);
-  MPI_Allreduce(MPI_IN_PLACE, gram.data(), static_cast<int>(gram.size()), MPI_DOUBLE, MPI_SUM, comm);
-  return gram;
-}
-
-void multiply_columns(const LocalColumns& a, const std::vector<double>& small, const LocalColumns& out) {
-  PetscBLASInt m = a.rows;
-  PetscBLASInt n = out.columns;
-  PetscBLASInt k = a.columns;
-  PetscBLASInt lda = std::max(a.stride, 1);
-  PetscBLASInt ldc = std::max(out.stride, 1);
-  double one = 1;
-  double zero = 0;
-  if (m > 0) BLASgemm_("N", "N", &m, &n, &k, &one, a.values, &lda, small.data(), &k, &zero, out.values, &ldc);
+void permute_columns(const Columns& columns, const std::vector<std::size_t>& order) {
+  std::vector<double> first(static_cast<std::size_t>(columns.rows));
+  std::vector<bool> is_done(order.size(), false);
+  for (std::size_t start = 0; start < order.size(); ++start) {
+    if (is_done[start] || order[start] == start) continue;
+    std::copy_n(columns.column(static_cast<int>(start)), columns.rows, first.data());
+    std::size_t to = start;
+    for (; order[to] != start; to = order[to]) {  // along the cycle
+      std::copy_n(columns.column(static_cast<int>(order[to])), columns.rows, columns.column(static_cast<int>(to)));
+      is_done[to] = true;
+    }
+    std::copy_n(first.data(), columns.rows, columns.column(static_cast<int>(to)));
+    is_done[to] = true;
+  }
 }
 
 }  // namespace carillon::eigen

@@ -1,10 +1,12 @@
-// A distributed dense matrix as the columns of this rank's rows, and the products of such columns.
+// A distributed dense matrix as the columns of this rank's rows.
 #pragma once
 
 #include <petscmat.h>
 
 #include <cstddef>
 #include <vector>
+
+#include "precompute/eigen/block_kernels.hpp"
 
 namespace carillon::eigen {
 
@@ -14,6 +16,7 @@ struct LocalColumns {
   ~LocalColumns();
   LocalColumns(const LocalColumns&) = delete;
   LocalColumns& operator=(const LocalColumns&) = delete;
+  Columns view() const { return {values, rows, stride, static_cast<int>(columns)}; }
   double* column(PetscInt j) const { return values + static_cast<std::size_t>(j) * static_cast<std::size_t>(stride); }
 
   Mat mat = nullptr;
@@ -23,10 +26,7 @@ struct LocalColumns {
   PetscInt stride = 0;
 };
 
-/// A^T B over all ranks, (a.columns, b.columns) column-major. Collective.
-std::vector<double> calc_gram(MPI_Comm comm, const LocalColumns& a, const LocalColumns& b);
-
-/// out = a * small, small: (a.columns, out.columns) column-major. Local.
-void multiply_columns(const LocalColumns& a, const std::vector<double>& small, const LocalColumns& out);
+/// Puts column order[j] at place j, for all j; order: a permutation of the columns. Local.
+void permute_columns(const Columns& columns, const std::vector<std::size_t>& order);
 
 }  // namespace carillon::eigen

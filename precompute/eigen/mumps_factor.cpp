@@ -78,10 +78,28 @@ const char* find_ordering_name(int infog7) {
   }
 }
 
+class MumpsFactor final : public ShiftedFactor {
+ public:
+  MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
+  ~MumpsFactor() override;
+
+  bool factorise(double sigma) override;
+  void solve(double* x, std::ptrdiff_t stride, int columns) override;
+  std::int64_t get_negative_pivots() const override;
+  double get_backward_error() const override { return 0; }
+  std::int64_t get_peak_bytes() const override;
+  std::string get_solver() const override;
+  std::string get_ordering() const override;
+  std::int64_t get_entries() const override;
+  double get_flops() const override;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
 bool lacks_workspace(int code) { return code == -8 || code == -9 || code == -14 || code == -15 || code == -17 || code == -20; }
 bool lacks_memory(int code) { return code == -5 || code == -7 || code == -13 || code == -19; }
-
-}  // namespace
 
 struct MumpsFactor::State {
   Mat stiffness = nullptr;
@@ -90,16 +108,17 @@ struct MumpsFactor::State {
   int rank = 0;
   int size = 1;
   bool is_alive = false;
+  int analysis_megabytes = 0;
   DMUMPS_STRUC_C mumps{};
   std::vector<MUMPS_INT> rows;
   std::vector<MUMPS_INT> columns;
   std::vector<double> values;
   std::vector<MUMPS_INT> permutation;
   std::vector<MUMPS_INT> own_rows;
-  // The solution comes back where the pivots live; the scatter brings it to the rows' owners.
   std::vector<MUMPS_INT> solution_rows;
   std::vector<double> solution;
   petsc::VecHandle solution_vec;
+  petsc::VecHandle result_vec;
   petsc::ScatterHandle scatter;
 
   int& icntl(int i) { return mumps.icntl[i - 1]; }
@@ -110,20 +129,22 @@ struct MumpsFactor::State {
     return infog(1);
   }
   void set_controls();
-  void prepare_solution();
+  void prepare_solution(int columns);
+  void make_scatter();
 };
 
 void MumpsFactor::State::set_controls() {
   icntl(1) = icntl(2) = icntl(3) = -1;  // Silent: errors come back as codes.
   icntl(4) = 0;
-  icntl(5) = 0;    // Assembled entries ...
-  icntl(18) = 3;   // ... distributed over the ranks.
-  icntl(6) = 0;    // No column permutation: the diagonal is good.
-  icntl(12) = 1;   // The order is used as it is given, not compressed around 2x2 pivots.
-  icntl(13) = 1;   // No ScaLAPACK at the root: it would not count negative pivots.
-  icntl(14) = 30;  // Per cent of workspace beyond the estimate, for delayed pivots.
-  icntl(28) = 1;   // Sequential analysis.
-  icntl(10) = 0;   // No iterative refinement.
+  icntl(5) = 0;     // Assembled entries ...
+  icntl(18) = 3;    // ... distributed over the ranks.
+  icntl(6) = 0;     // No column permutation: the diagonal is good.
+  icntl(12) = 1;    // The order is used as it is given, not compressed around 2x2 pivots.
+  icntl(13) = 1;    // No ScaLAPACK at the root: it would not count negative pivots.
+  icntl(14) = 30;   // Per cent of workspace beyond the estimate, for delayed pivots.
+  icntl(28) = 1;    // Sequential analysis.
+  icntl(10) = 0;    // No iterative refinement.
+  icntl(27) = -32;  // Right-hand sides go through the factor by so many.
   icntl(20) = size > 1 ? 10 : 0;
   icntl(21) = size > 1 ? 1 : 0;
 }
@@ -171,6 +192,7 @@ MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t
   if (lacks_memory(code))
     throw SystemError("Out of memory in the analysis of K - sigma M. Take a coarser mesh or more ranks on more machines.");
   if (code < 0) throw SolveError(fmt::format("MUMPS cannot analyse K - sigma M: code {}, {}.", code, s.infog(2)));
+  s.analysis_megabytes = s.mumps.info[14];  // INFO(15): what this rank's factorisation is estimated to take.
 
   PetscInt first = 0;
   PetscInt last = 0;
@@ -192,7 +214,7 @@ bool MumpsFactor::factorise(double sigma) {
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const int code = s.call(kJobFactorise);
     if (code >= 0) {
-      if (s.size > 1) s.prepare_solution();
+      s.scatter.reset();  // Where the solution comes out is known after the first solve.
       return true;
     }
     if (code == -10) return false;
@@ -209,56 +231,57 @@ bool MumpsFactor::factorise(double sigma) {
       fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: its workspace never sufficed (code {}).", sigma, s.infog(1)));
 }
 
-void MumpsFactor::State::prepare_solution() {
-  const int local = mumps.info[22];  // INFO(23): the pivots on this rank.
-  solution.assign(static_cast<std::size_t>(std::max(local, 1)), 0.0);
-  solution_rows.assign(static_cast<std::size_t>(std::max(local, 1)), 0);
+// The solution comes back where the pivots live: room for it, and later the way to the rows' owners.
+void MumpsFactor::State::prepare_solution(int columns) {
+  const int local = std::max(mumps.info[22], 1);  // INFO(23): the pivots on this rank.
+  solution.assign(static_cast<std::size_t>(local) * static_cast<std::size_t>(columns), 0.0);
+  solution_rows.assign(static_cast<std::size_t>(local), 0);
   mumps.sol_loc = solution.data();
   mumps.isol_loc = solution_rows.data();
-  mumps.lsol_loc = std::max(local, 1);
-  check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, local, solution.data(), solution_vec.out()));
-  scatter.reset();  // The rows are known only after the first solve.
+  mumps.lsol_loc = local;
 }
 
-void MumpsFactor::solve(Vec b, Vec x) {
+void MumpsFactor::State::make_scatter() {
+  const int local = mumps.info[22];
+  check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, local, nullptr, solution_vec.out()));
+  check(MatCreateVecs(stiffness, result_vec.out(), nullptr));
+  std::vector<PetscInt> rows(static_cast<std::size_t>(local));
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = solution_rows[i] - 1;
+  petsc::IsHandle to;
+  petsc::IsHandle from;
+  check(ISCreateGeneral(comm, local, rows.data(), PETSC_COPY_VALUES, to.out()));
+  check(ISCreateStride(PETSC_COMM_SELF, local, 0, 1, from.out()));
+  check(VecScatterCreate(solution_vec, from, result_vec, to, scatter.out()));
+}
+
+void MumpsFactor::solve(double* x, std::ptrdiff_t stride, int columns) {
   State& s = *state_;
-  s.mumps.nrhs = 1;
+  s.mumps.nrhs = columns;
+  const auto leading = static_cast<MUMPS_INT>(std::max<std::ptrdiff_t>(stride, 1));
   if (s.size == 1) {
-    check(VecCopy(b, x));
-    PetscScalar* array = nullptr;
-    check(VecGetArray(x, &array));
-    s.mumps.rhs = array;
-    s.mumps.lrhs = s.mumps.n;
-    const int code = s.call(kJobSolve);
-    check(VecRestoreArray(x, &array));
-    if (code < 0) throw SolveError(fmt::format("MUMPS cannot solve with its factor: code {}, {}.", code, s.infog(2)));
-    return;
+    s.mumps.rhs = x;
+    s.mumps.lrhs = leading;
+  } else {
+    s.mumps.rhs_loc = x;
+    s.mumps.irhs_loc = s.own_rows.data();
+    s.mumps.nloc_rhs = static_cast<MUMPS_INT>(s.own_rows.size());
+    s.mumps.lrhs_loc = std::max(leading, std::max(s.mumps.nloc_rhs, 1));
+    s.prepare_solution(columns);
   }
-  const PetscScalar* right = nullptr;
-  check(VecGetArrayRead(b, &right));
-  s.mumps.rhs_loc = const_cast<PetscScalar*>(right);  // MUMPS only reads it.
-  s.mumps.irhs_loc = s.own_rows.data();
-  s.mumps.nloc_rhs = static_cast<MUMPS_INT>(s.own_rows.size());
-  s.mumps.lrhs_loc = std::max(s.mumps.nloc_rhs, 1);
   const int code = s.call(kJobSolve);
-  check(VecRestoreArrayRead(b, &right));
+  if (lacks_memory(code))
+    throw SystemError("Out of memory in a solve with the factor. Take a coarser mesh or more ranks on more machines.");
   if (code < 0) throw SolveError(fmt::format("MUMPS cannot solve with its factor: code {}, {}.", code, s.infog(2)));
-  if (s.scatter.get() == nullptr) {
-    PetscInt local = 0;
-    check(VecGetLocalSize(s.solution_vec, &local));
-    std::vector<PetscInt> rows(static_cast<std::size_t>(local));
-    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = s.solution_rows[i] - 1;
-    petsc::IsHandle to;
-    check(ISCreateGeneral(s.comm, local, rows.data(), PETSC_COPY_VALUES, to.out()));
-    petsc::IsHandle from;
-    check(ISCreateStride(PETSC_COMM_SELF, local, 0, 1, from.out()));
-    check(VecScatterCreate(s.solution_vec, from, x, to, s.scatter.out()));
+  if (s.size == 1) return;
+  if (s.scatter.get() == nullptr) s.make_scatter();
+  for (int j = 0; j < columns; ++j) {
+    check(VecPlaceArray(s.solution_vec, s.solution.data() + static_cast<std::ptrdiff_t>(j) * s.mumps.lsol_loc));
+    check(VecPlaceArray(s.result_vec, x + j * stride));
+    check(VecScatterBegin(s.scatter, s.solution_vec, s.result_vec, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecScatterEnd(s.scatter, s.solution_vec, s.result_vec, INSERT_VALUES, SCATTER_FORWARD));
+    check(VecResetArray(s.result_vec));
+    check(VecResetArray(s.solution_vec));
   }
-  PetscScalar* written = nullptr;  // MUMPS wrote behind the vector's back; this tells it.
-  check(VecGetArray(s.solution_vec, &written));
-  check(VecRestoreArray(s.solution_vec, &written));
-  check(VecScatterBegin(s.scatter, s.solution_vec, x, INSERT_VALUES, SCATTER_FORWARD));
-  check(VecScatterEnd(s.scatter, s.solution_vec, x, INSERT_VALUES, SCATTER_FORWARD));
 }
 
 std::int64_t MumpsFactor::get_negative_pivots() const { return state_->infog(12); }
@@ -270,6 +293,13 @@ std::int64_t MumpsFactor::get_entries() const {
   return entries < 0 ? -entries * 1'000'000 : entries;  // Large counts come in millions, negated.
 }
 
+std::int64_t MumpsFactor::get_peak_bytes() const { return std::int64_t{1'000'000} * state_->analysis_megabytes; }
 double MumpsFactor::get_flops() const { return state_->mumps.rinfog[2]; }
+
+}  // namespace
+
+std::unique_ptr<ShiftedFactor> make_mumps_factor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position) {
+  return std::make_unique<MumpsFactor>(stiffness, mass, elimination_position);
+}
 
 }  // namespace carillon::eigen

@@ -11,6 +11,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numeric>
 
 #include "precompute/eigen/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
@@ -37,55 +39,52 @@ std::vector<Group> group_neighbours(const std::vector<std::size_t>& bad, const s
   return groups;
 }
 
-// Rayleigh-Ritz in the span of the columns: they become M-orthonormal Ritz vectors, their ascending Ritz values are returned.
-std::vector<double> calc_ritz(Mat stiffness, Mat mass, Mat columns) {
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
-  petsc::MatHandle product;
-  check(MatMatMult(mass, columns, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
-  std::vector<double> m;
-  {
-    const LocalColumns x(columns);
-    const LocalColumns m_x(product);
-    m = calc_gram(comm, x, m_x);
-  }
-  check(MatMatMult(stiffness, columns, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
-  const LocalColumns x(columns);
-  const LocalColumns work(product);
-  std::vector<double> k = calc_gram(comm, x, work);
-  std::vector<double> values(static_cast<std::size_t>(x.columns));
+// Rayleigh-Ritz in the span of the columns: they become M-orthonormal Ritz vectors, their ascending Ritz values are returned. work: as many
+// columns.
+std::vector<double> calc_ritz(const Operators& operators, const Columns& x, const Columns& work) {
+  const auto count = static_cast<std::size_t>(x.count);
+  std::vector<double> m(count * count);
+  std::vector<double> k(count * count);
+  operators.mass.multiply(x, work);
+  multiply_transposed(x, work, m.data(), x.count);
+  operators.stiffness.multiply(x, work);
+  multiply_transposed(x, work, k.data(), x.count);
+  for (std::vector<double>* sums : {&m, &k})
+    MPI_Allreduce(MPI_IN_PLACE, sums->data(), static_cast<int>(sums->size()), MPI_DOUBLE, MPI_SUM, operators.comm);
+  std::vector<double> values(count);
   PetscBLASInt type = 1;
-  PetscBLASInt size = x.columns;
+  PetscBLASInt size = x.count;
   PetscBLASInt info = 0;
   PetscBLASInt room = 64 * size + 3 * size;
   std::vector<double> space(static_cast<std::size_t>(room));
   LAPACKsygv_(&type, "V", "L", &size, k.data(), &size, m.data(), &size, values.data(), space.data(), &room, &info);
   if (info != 0) throw SolveError(fmt::format("The modes to be refined are linearly dependent (LAPACK dsygv: {}).", info));
-  for (PetscInt j = 0; j < x.columns; ++j) std::copy_n(x.column(j), x.rows, work.column(j));
-  multiply_columns(work, k, x);
+  combine_columns(x, k.data(), x.count);
   return values;
 }
 
-void copy_column(Mat from, std::size_t from_column, Mat to, std::size_t to_column) {
-  const LocalColumns source(from);
-  const LocalColumns target(to);
-  std::copy_n(source.column(static_cast<PetscInt>(from_column)), source.rows, target.column(static_cast<PetscInt>(to_column)));
-}
-
-// x <- (K - sigma M)^-1 M x, M-normalised.
-void iterate_inversely(Mat mass, ShiftedFactor& factor, Mat columns, PetscInt j, Vec right) {
-  Vec x = nullptr;
-  check(MatDenseGetColumnVec(columns, j, &x));
-  check(MatMult(mass, x, right));
-  factor.solve(right, x);
-  PetscReal largest = 0;  // Near an eigenvalue the solution is huge: first to an ordinary size, then to the M-norm.
-  check(VecNorm(x, NORM_INFINITY, &largest));
-  check(VecScale(x, 1 / largest));
-  PetscScalar square = 0;
-  check(MatMult(mass, x, right));
-  check(VecDot(x, right, &square));
-  check(VecScale(x, 1 / std::sqrt(square)));
-  check(MatDenseRestoreColumnVec(columns, j, &x));
+// The columns to M-norm one; first to an ordinary size, for near an eigenvalue a solution is huge.
+void normalise(const Operators& operators, const Columns& x, const Columns& work) {
+  const auto count = static_cast<std::size_t>(x.count);
+  const auto scale_all = [&](const std::vector<double>& by) {
+    for (int j = 0; j < x.count; ++j) {
+      for (std::ptrdiff_t i = 0; i < x.rows; ++i) x.column(j)[i] /= by[static_cast<std::size_t>(j)];
+    }
+  };
+  std::vector<double> largest(count, 0.0);
+  for (int j = 0; j < x.count; ++j) {
+    for (std::ptrdiff_t i = 0; i < x.rows; ++i)
+      largest[static_cast<std::size_t>(j)] = std::max(largest[static_cast<std::size_t>(j)], std::abs(x.column(j)[i]));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, largest.data(), x.count, MPI_DOUBLE, MPI_MAX, operators.comm);
+  scale_all(largest);
+  operators.mass.multiply(x, work);
+  std::vector<double> norm(count);
+  for (int j = 0; j < x.count; ++j)
+    norm[static_cast<std::size_t>(j)] = std::inner_product(x.column(j), x.column(j) + x.rows, work.column(j), 0.0);
+  MPI_Allreduce(MPI_IN_PLACE, norm.data(), x.count, MPI_DOUBLE, MPI_SUM, operators.comm);
+  for (double& square : norm) square = std::sqrt(square);
+  scale_all(norm);
 }
 
 // Replaces the group's modes by better ones. `nearness` is the distance of the shift below the group, relative to lambda.
@@ -100,34 +99,32 @@ void improve_group(const RefineRequest& request, const Group& group, double near
   }
   ++cost.factorisations;
   cost.solves += static_cast<std::int64_t>(group.size());
-  MPI_Comm comm = MPI_COMM_NULL;
-  PetscInt rows = 0;
-  PetscInt n = 0;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(shapes), &comm));
-  check(MatGetLocalSize(shapes, &rows, nullptr));
-  check(MatGetSize(shapes, &n, nullptr));
-  petsc::MatHandle columns;
-  petsc::VecHandle right;
-  check(MatCreateDense(comm, rows, PETSC_DECIDE, n, static_cast<PetscInt>(group.size()), nullptr, columns.out()));
-  check(MatCreateVecs(request.stiffness, right.out(), nullptr));
-  for (std::size_t j = 0; j < group.size(); ++j) copy_column(shapes, group[j], columns, j);
-  check(MatAssemblyBegin(columns, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(columns, MAT_FINAL_ASSEMBLY));
-  for (std::size_t j = 0; j < group.size(); ++j) iterate_inversely(request.mass, factor, columns, static_cast<PetscInt>(j), right);
-  const std::vector<double> ritz = calc_ritz(request.stiffness, request.mass, columns);
+  const LocalColumns access(shapes);
+  const Columns all = access.view();
+  const auto rows = static_cast<std::size_t>(all.rows);
+  std::vector<double> space(2 * rows * group.size());
+  const Columns x{space.data(), all.rows, all.rows, static_cast<int>(group.size())};
+  const Columns work{space.data() + rows * group.size(), all.rows, all.rows, x.count};
+  for (std::size_t j = 0; j < group.size(); ++j) {
+    const Columns phi = all.part(static_cast<int>(group[j]), 1);
+    request.operators->mass.multiply(phi, x.part(static_cast<int>(j), 1));
+  }
+  factor.solve(x.values, x.stride, x.count);
+  normalise(*request.operators, x, work);
+  const std::vector<double> ritz = calc_ritz(*request.operators, x, work);
   for (std::size_t j = 0; j < group.size(); ++j) {
     lambda[group[j]] = ritz[j];
-    copy_column(columns, j, shapes, group[j]);
+    std::copy_n(x.column(static_cast<int>(j)), rows, all.column(static_cast<int>(group[j])));
   }
 }
 
 // Gram-Schmidt must go upwards in lambda, and refined values may have passed their neighbours.
 ModeErrors measure_orthonormal(const RefineRequest& request, std::vector<double>& lambda, Mat shapes) {
-  ModeErrors errors = normalise_and_measure(request.stiffness, request.mass, lambda, shapes);
+  ModeErrors errors = normalise_and_measure(*request.operators, lambda, shapes);
   sort_modes(lambda, shapes, errors);
   if (errors.orthonormality > kOrthonormal) {
-    orthonormalise_shapes(request.mass, shapes);
-    errors = normalise_and_measure(request.stiffness, request.mass, lambda, shapes);
+    orthonormalise_shapes(*request.operators, shapes);
+    errors = normalise_and_measure(*request.operators, lambda, shapes);
     sort_modes(lambda, shapes, errors);
   }
   return errors;

@@ -13,8 +13,7 @@
 namespace carillon::eigen {
 
 struct RefineRequest {
-  Mat stiffness = nullptr;
-  Mat mass = nullptr;
+  const Operators* operators = nullptr;
   double tolerance = 1e-8;                     // of the relative residual
   std::function<ShiftedFactor&()> get_factor;  // L D L^T of any shift; asked for only when a mode needs it
 };

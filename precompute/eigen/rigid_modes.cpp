@@ -161,7 +161,7 @@ void check_stress_free(Mat stiffness, Vec motion, Vec work, Vec diagonal, std::i
 
 }  // namespace
 
-std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const NodeLayout& nodes) {
+std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const NodeLayout& nodes, std::vector<std::int64_t>& per_component) {
   MPI_Comm comm = MPI_COMM_NULL;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
   std::vector<Body> bodies = calc_bodies(comm, nodes);
@@ -173,6 +173,7 @@ std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const No
   check(MatGetDiagonal(stiffness, diagonal));
   std::vector<petsc::VecHandle> modes;
   static const std::vector<Vec3> none;
+  per_component.clear();
   for (std::int32_t c = 0; c < nodes.component_count; ++c) {
     Body& body = bodies[static_cast<std::size_t>(c)];
     const auto& held = static_cast<std::size_t>(c) < nodes.held.size() ? nodes.held[static_cast<std::size_t>(c)] : none;
@@ -190,6 +191,7 @@ std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const No
       of_component.push_back(kept);
       modes.push_back(std::move(kept));
     }
+    per_component.push_back(static_cast<std::int64_t>(of_component.size()));
   }
   return modes;
 }

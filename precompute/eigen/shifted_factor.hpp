@@ -3,6 +3,7 @@
 
 #include <petscmat.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -10,8 +11,8 @@
 
 namespace carillon::eigen {
 
-/// A direct solver for K - sigma M with a fixed pattern and changing sigma. All members are collective and fail on all ranks alike.
-/// K and M must outlive it.
+/// A direct solver for K - sigma M with a fixed pattern and changing sigma. All members but the get_ ones are collective and fail on all
+/// ranks alike. K and M must outlive it.
 class ShiftedFactor {
  public:
   virtual ~ShiftedFactor() = default;
@@ -19,8 +20,14 @@ class ShiftedFactor {
   /// Factorises K - sigma M. False if a pivot vanished: sigma hits an eigenvalue, take another. Throws SolveError when the factorisation
   /// breaks down otherwise, SystemError when memory runs out.
   virtual bool factorise(double sigma) = 0;
-  /// x = (K - sigma M)^-1 b.
-  virtual void solve(Vec b, Vec x) = 0;
+  /// X <- (K - sigma M)^-1 X: this rank's rows, column-major.
+  virtual void solve(double* x, std::ptrdiff_t stride, int columns) = 0;
+  /// Number of eigenvalues below the sigma of the last factorise (Sylvester's law of inertia).
+  virtual std::int64_t get_negative_pivots() const = 0;
+  /// Relative residual of a solve with the last factorisation; 0 if it is not measured.
+  virtual double get_backward_error() const = 0;
+  /// Memory a factorisation will take at its worst moment on this rank [byte], known from the analysis; 0 if unknown.
+  virtual std::int64_t get_peak_bytes() const = 0;
 
   virtual std::string get_solver() const = 0;
   virtual std::string get_ordering() const = 0;
@@ -28,30 +35,15 @@ class ShiftedFactor {
   virtual double get_flops() const = 0;          // of a factorisation; 0 if unknown
 };
 
-/// L D L^T with pivoting for any sigma. It also counts: the negative pivots of the last factorise are the eigenvalues below sigma.
-class MumpsFactor final : public ShiftedFactor {
- public:
-  /// Analyses the union of both patterns. elimination_position: on rank 0, per node the place in the elimination order; empty: MUMPS
-  /// orders.
-  MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
-  ~MumpsFactor() override;
+/// carillon::ldlt: supernodal L D L^T over the ranks, made for many right-hand sides. factorise is also false when its measured backward
+/// error is too large.
+std::unique_ptr<ShiftedFactor> make_ldlt_factor(Mat stiffness, Mat mass);
 
-  bool factorise(double sigma) override;
-  void solve(Vec b, Vec x) override;
-  /// Number of eigenvalues below the sigma of the last factorise (Sylvester's law of inertia).
-  std::int64_t get_negative_pivots() const;
+/// MUMPS: L D L^T with pivoting across fronts. elimination_position: on rank 0, per node the place in the elimination order; empty: MUMPS
+/// orders.
+std::unique_ptr<ShiftedFactor> make_mumps_factor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
 
-  std::string get_solver() const override;
-  std::string get_ordering() const override;
-  std::int64_t get_entries() const override;
-  double get_flops() const override;
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
-
-/// Supernodal L L^T on one rank, faster than MUMPS in single solves; sigma must be negative.
+/// CHOLMOD: supernodal L L^T on one rank; sigma must be negative, so it cannot count.
 std::unique_ptr<ShiftedFactor> make_cholmod_factor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
 
 }  // namespace carillon::eigen

@@ -1,10 +1,11 @@
 // Method:     1. The rigid modes are built in closed form and deflated. 2. The inertia of K - lambda M at both ends of the band says how
-// many
-//             modes it holds. 3. Krylov-Schur with shift-invert finds them, in slices when they are many; what a run leaves out is sought
-//             again with everything found deflated, until the count is met. 4. Residuals and orthonormality are measured from K and M.
+//             many modes it holds; many are cut into slices by further counts. 3. Block Lanczos with a shift inside the slice finds them;
+//             copies of repeated eigenvalues that a run leaves out are sought again with everything found deflated. 4. Every count, those
+//             at the shifts too, must agree with the modes found below it. 5. Clusters get a canonical basis; residuals and
+//             orthonormality are measured from K and M.
 // Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994 (counts and slices);
-//             Parlett, The symmetric eigenvalue problem, 1998, section 3.3 (inertia). Krylov-Schur: krylov.cpp.
-// Deviations: single vectors instead of blocks: SLEPc's Krylov-Schur has no block form.
+//             Parlett, The symmetric eigenvalue problem, 1998, section 3.3 (inertia). Block Lanczos: block_lanczos.cpp.
+// Deviations: none.
 #include "precompute/eigen/solve_modes.hpp"
 
 #include <fmt/core.h>
@@ -16,14 +17,17 @@
 #include <numbers>
 #include <numeric>
 
+#include "precompute/eigen/canonical.hpp"
 #include "precompute/eigen/check_input.hpp"
 #include "precompute/eigen/check_modes.hpp"
 #include "precompute/eigen/dense_modes.hpp"
+#include "precompute/eigen/inertia.hpp"
 #include "precompute/eigen/krylov.hpp"
+#include "precompute/eigen/local_columns.hpp"
+#include "precompute/eigen/memory.hpp"
 #include "precompute/eigen/refine.hpp"
 #include "precompute/eigen/rigid_modes.hpp"
 #include "precompute/eigen/scaling.hpp"
-#include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/eigen/slices.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
@@ -36,13 +40,15 @@ using petsc::check;
 
 constexpr PetscInt kDenseRows = 300;       // Smaller problems are solved densely straight away,
 constexpr PetscInt kDenseRowsFull = 3000;  // and up to here when the band holds more than a quarter of the spectrum.
-constexpr std::int64_t kSliceModes = 320;  // Beyond, Gram-Schmidt costs more than another factorisation.
+constexpr std::int64_t kSliceModes = 320;  // Beyond, orthogonalisation costs more than another factorisation.
 constexpr double kEdgeNudge = 1e-6;        // Counts are taken this far outside the band, relative to lambda.
 constexpr double kEdgeTolerance = 1e-9;    // A mode this close to an end of the band (relative to lambda) is in it.
+constexpr double kSafeMargin = 1e-7;       // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
-constexpr int kRounds = 60;                // Krylov runs per slice at most until its count is met,
+constexpr int kRounds = 60;                // Krylov runs per interval at most until its count is met,
 constexpr int kIdleRounds = 2;             // and so many without a new mode.
 constexpr double kKrylovTolerance = 1e-2;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
+constexpr double kShiftBottom = 0.4;       // Where in a slice that starts at the bottom of the spectrum the shift is.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -57,14 +63,21 @@ class BandSolver {
  private:
   void solve_dense_band();
   void solve_sparse_band();
-  std::int64_t count_below(double lambda);
   Slice count_band();
   std::vector<Slice> cut(const Slice& band);
-  void solve_slice(const Slice& slice, bool is_only);
-  std::int64_t run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t wanted, double tolerance);
-  void collect(const DensePairs* dense);
+  void solve_slice(const Slice& slice);
+  void find_missing(const Slice& slice, double sigma);
+  void run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round);
+  std::int64_t count_found(double low, double high) const;
+  double find_margin(double lambda) const;
+  void move_doubtful_counts();
+  void prove();
+  void describe_proof();
+  void take_found();
+  void collect(const DensePairs& dense);
+  void check_range(std::vector<std::size_t>& order, const std::vector<double>& lambda);
   void finish();
-  ModeErrors refine();
+  void refine(ModeErrors& errors);
   void report(Phase phase, std::int64_t done) const;
   double to_hz(double scaled_lambda) const {
     return std::sqrt(std::max(scaling_.from_scaled(scaled_lambda), 0.0)) / (2 * std::numbers::pi);
@@ -74,14 +87,14 @@ class BandSolver {
   const Options& options_;
   MPI_Comm comm_ = MPI_COMM_NULL;
   int rank_ = 0;
-  int size_ = 1;
   PetscInt n_ = 0;
   Scaling scaling_;
   double low_ = 0;  // scaled lambda, the band's ends
   double high_ = 0;
   std::vector<petsc::VecHandle> rigid_;
-  std::unique_ptr<MumpsFactor> counter_;
-  Pairs found_;
+  std::unique_ptr<Operators> operators_;
+  std::unique_ptr<InertiaCounter> counter_;
+  FoundModes found_;
   Modes modes_;
 };
 
@@ -89,7 +102,6 @@ BandSolver::BandSolver(const Problem& problem, const Options& options)
     : problem_(problem), options_(options), scaling_(problem.stiffness, problem.mass, calc_lambda(options.high_hz)) {
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm_));
   MPI_Comm_rank(comm_, &rank_);
-  MPI_Comm_size(comm_, &size_);
   check(MatGetSize(problem.stiffness, &n_, nullptr));
   low_ = scaling_.to_scaled(calc_lambda(std::max(options.low_hz, kZeroFraction * options.high_hz)));
   high_ = scaling_.to_scaled(calc_lambda(options.high_hz));
@@ -106,8 +118,9 @@ Modes BandSolver::solve() {
     {
       const Timer timer(modes_.seconds.rigid);
       report(Phase::kRigid, 0);
-      rigid_ = make_rigid_modes(problem_.stiffness, problem_.mass, problem_.nodes);
+      rigid_ = make_rigid_modes(problem_.stiffness, problem_.mass, problem_.nodes, modes_.proof.rigid_per_component);
       modes_.rigid_count = static_cast<std::int64_t>(rigid_.size());
+      operators_ = std::make_unique<Operators>(problem_.stiffness, problem_.mass);
     }
     if (n_ <= kDenseRows) {
       solve_dense_band();
@@ -135,34 +148,27 @@ void BandSolver::solve_dense_band() {
   const auto count_under = [&](double lambda) {
     return std::lower_bound(pairs.lambda.begin(), pairs.lambda.end(), lambda) - pairs.lambda.begin();
   };
-  modes_.count_below_low = count_under(low_ * (1 - kEdgeTolerance));
-  modes_.band_count = count_under(high_ * (1 + kEdgeTolerance)) - modes_.count_below_low;
+  const double low = low_ * (1 - kEdgeNudge);
+  const double high = high_ * (1 + kEdgeNudge);
+  modes_.count_below_low = count_under(low);
+  modes_.band_count = count_under(high) - modes_.count_below_low;
   modes_.mechanism_count = count_under(low_ * 1e-4) - modes_.rigid_count;
-  collect(&pairs);
-}
-
-// Eigenvalues below lambda, by the negative pivots of K - lambda M.
-std::int64_t BandSolver::count_below(double lambda) {
-  const Timer timer(modes_.seconds.factor);
-  constexpr int kNudges = 5;
-  for (int i = 0; i < kNudges; ++i) {
-    ++modes_.factor.factorisations;
-    if (counter_->factorise(lambda)) return counter_->get_negative_pivots();
-    lambda *= 1 + kEdgeNudge * 0.1;
+  Proof& proof = modes_.proof;
+  proof.found = modes_.band_count;
+  proof.method = fmt::format("all {} eigenvalues of the dense problem (LAPACK dsygv), counted", n_);
+  for (const double end : {low, high}) {
+    double margin = std::numeric_limits<double>::infinity();
+    for (const double lambda : pairs.lambda) margin = std::min(margin, std::abs(lambda - end) / end);
+    proof.counts.push_back({to_hz(end), count_under(end), margin});
   }
-  throw SolveError(
-      fmt::format("K - sigma M is singular all around {:.6g} Hz: the mesh has nodes without mass or stiffness, or the mass matrix is "
-                  "not positive definite.",
-                  to_hz(lambda)));
+  collect(pairs);
 }
 
 Slice BandSolver::count_band() {
   report(Phase::kCount, 0);
-  Slice band;
-  band.low = low_ * (1 - kEdgeNudge);
-  band.high = high_ * (1 + kEdgeNudge);
-  band.below_high = count_below(band.high);
-  band.below_low = count_below(band.low);
+  const Inertia high = counter_->take(high_ * (1 + kEdgeNudge), kEdgeNudge);
+  const Inertia low = counter_->take(low_ * (1 - 2 * kEdgeNudge), kEdgeNudge);
+  const Slice band{low.lambda, low.below, high.lambda, high.below};
   modes_.count_below_low = band.below_low;
   if (band.below_low < modes_.rigid_count || band.count() < 0) {
     throw SolveError(
@@ -170,175 +176,242 @@ Slice BandSolver::count_band() {
                     "what a body has. Look for inverted elements.",
                     band.below_low, to_hz(band.low), band.below_high, to_hz(band.high), modes_.rigid_count));
   }
-  if (band.below_low > modes_.rigid_count) modes_.mechanism_count = count_below(low_ * 1e-4) - modes_.rigid_count;
+  if (band.below_low > modes_.rigid_count) {
+    const Inertia still = counter_->take(low_ * 1e-4);
+    modes_.mechanism_count = still.below - modes_.rigid_count;
+    counter_->forget(still.lambda);
+  }
   modes_.band_count = band.count();
   return band;
 }
 
 std::vector<Slice> BandSolver::cut(const Slice& band) {
-  const CountBelow count = [this](double lambda) { return count_below(lambda); };
+  const CountBelow count = [this](double lambda) { return counter_->take(lambda).below; };
   const Slice wanted = options_.max_modes ? cut_to_lowest(band, *options_.max_modes, count) : band;
   if (options_.factorisation == Factorisation::kCholmod) return {wanted};  // It cannot shift into the band.
   return cut_into_slices(wanted, kSliceModes, count);
 }
 
 void BandSolver::solve_sparse_band() {
-  {
-    const Timer timer(modes_.seconds.analyse);
-    report(Phase::kAnalyse, 0);
-    counter_ = std::make_unique<MumpsFactor>(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
-  }
+  report(Phase::kAnalyse, 0);
+  counter_ = std::make_unique<InertiaCounter>(problem_, options_, modes_.seconds, modes_.factor, [this](double x) { return to_hz(x); });
   const Slice band = count_band();
-  modes_.factor.solver = counter_->get_solver();
-  modes_.factor.ordering = counter_->get_ordering();
-  modes_.factor.entries = counter_->get_entries();
-  modes_.factor.flops = counter_->get_flops();
-  if (band.count() == 0) return;
-  if (n_ <= kDenseRowsFull && 4 * band.below_high > n_) return solve_dense_band();
+  if (band.count() == 0) return describe_proof();
+  if (n_ <= kDenseRowsFull && 4 * band.below_high > n_) {
+    counter_.reset();
+    return solve_dense_band();
+  }
   const std::vector<Slice> slices = cut(band);
-  for (const Slice& slice : slices) solve_slice(slice, slices.size() == 1);
-  counter_.reset();
-  collect(nullptr);
+  const std::int64_t wanted = slices.back().below_high - slices.front().below_low;
+  std::int64_t widest = 0;
+  for (const Slice& slice : slices) widest = std::max(widest, slice.count());
+  PetscInt rows = 0;
+  check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
+  check_memory(comm_, static_cast<std::int64_t>(rows) * 8 * (wanted + 5 * widest / 2 + 100), options_.memory_limit_bytes,
+               fmt::format("The search for {} modes", wanted));
+  found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted));
+  for (const Slice& slice : slices) solve_slice(slice);
+  prove();
+  describe_proof();
+  counter_->release();
+  take_found();
 }
 
-// One Krylov run; adds what lies in the slice and is new to found_, and returns how many that are.
-std::int64_t BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t wanted, double tolerance) {
+std::int64_t BandSolver::count_found(double low, double high) const {
+  return std::count_if(found_.lambda.begin(), found_.lambda.end(), [&](double lambda) { return lambda >= low && lambda < high; });
+}
+
+// One Krylov run; adds to found_ what lies in the slice and was not there.
+void BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round) {
+  const Timer timer(modes_.seconds.iterate);
   KrylovRequest request;
   request.stiffness = problem_.stiffness;
   request.mass = problem_.mass;
+  request.mass_blocks = &operators_->mass;
   request.factor = &factor;
   request.sigma = sigma;
-  request.wanted = petsc::to_petsc_int(wanted);
-  request.tolerance = tolerance;
+  request.low = slice.low * (1 - kEdgeTolerance);
+  request.high = slice.high * (1 + kEdgeTolerance);
+  request.count = petsc::to_petsc_int(missing);
+  // Those below the slice are nearer the shift than its upper end when it starts at the bottom. Copies that rounding alone brings in come
+  // late: later runs ask for some more, beyond the slice.
+  const bool is_below = sigma - slice.low * 0.5 > slice.high - sigma || sigma < slice.low;
+  const std::int64_t below = slice.below_low - modes_.rigid_count;
+  request.nearest = petsc::to_petsc_int(missing + (is_below || 5 * below <= slice.count() ? below : 0) + std::min(round, 4) * 10);
+  request.method = options_.method;
+  request.tolerance = kKrylovTolerance * options_.tolerance;
+  request.position = &problem_.nodes.position;
+  request.round = round;
   for (const auto& vector : rigid_) request.deflated.push_back(vector);
   // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be held away.
-  const double margin = 0.25 * (slice.high - slice.low);
-  for (std::size_t i = 0; i < found_.lambda.size(); ++i) {
-    if (found_.lambda[i] > slice.low - margin && found_.lambda[i] < slice.high + margin) request.deflated.push_back(found_.vectors[i]);
-  }
+  const double margin = 0.02 * (slice.high - slice.low);
+  const petsc::MatHandle locked = found_.copy_between(slice.low - margin, slice.high + margin);
+  request.locked = locked;
   const auto before = static_cast<std::int64_t>(found_.lambda.size());
   request.progress = [&](std::int64_t converged) { report(Phase::kIterate, before + converged); };
-  KrylovResult result = run_krylov_schur(request);
-  modes_.factor.solves += result.solves;
-  modes_.seconds.solve += result.solve_seconds;
-  std::int64_t added = 0;
-  for (std::size_t i = 0; i < result.pairs.lambda.size(); ++i) {
-    const double lambda = result.pairs.lambda[i];
-    if (lambda < slice.low * (1 - kEdgeTolerance) || lambda > slice.high * (1 + kEdgeTolerance)) continue;
-    found_.lambda.push_back(lambda);
-    found_.vectors.push_back(std::move(result.pairs.vectors[i]));
-    ++added;
-  }
-  return added;
+  const KrylovStatistics statistics = run_krylov(request, found_);
+  modes_.factor.solves += statistics.solves;
+  modes_.seconds.solve += statistics.solve_seconds;
 }
 
-void BandSolver::solve_slice(const Slice& slice, bool is_only) {
+// Runs around sigma, where the factor stands or will be put, until the slice holds what it was counted to hold.
+void BandSolver::find_missing(const Slice& slice, double sigma) {
+  std::unique_ptr<ShiftedFactor> cholmod;
+  if (options_.factorisation == Factorisation::kCholmod) {
+    counter_->release();  // Two factors at a time would double the memory.
+    const Timer timer(modes_.seconds.factor);
+    sigma = -2.5e-3 * slice.high;
+    cholmod = make_cholmod_factor(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
+    ++modes_.factor.factorisations;
+    (void)cholmod->factorise(sigma);
+    modes_.factor.solver = cholmod->get_solver();
+    modes_.factor.ordering = cholmod->get_ordering();
+    modes_.factor.entries = cholmod->get_entries();
+  } else {
+    report(Phase::kFactor, static_cast<std::int64_t>(found_.lambda.size()));
+    sigma = counter_->take(sigma, 1e-5).lambda;
+  }
+  ShiftedFactor& factor = cholmod != nullptr ? *cholmod : counter_->get_factor();
+  int idle = 0;
+  for (int round = 0; round < kRounds && idle < kIdleRounds; ++round) {
+    const std::int64_t missing = slice.count() - count_found(slice.low * (1 - kEdgeTolerance), slice.high * (1 + kEdgeTolerance));
+    if (missing <= 0) break;
+    const std::size_t before = found_.lambda.size();
+    run_round(slice, factor, sigma, missing, round);
+    idle = found_.lambda.size() > before ? 0 : idle + 1;
+  }
+}
+
+void BandSolver::solve_slice(const Slice& slice) {
   if (slice.count() == 0) return;
   // From the bottom of the spectrum nothing needs to be skipped but what is deflated; a slice high up is found from its middle.
   const std::int64_t from_bottom = slice.below_high - modes_.rigid_count;
   const bool starts_at_bottom = slice.low < 0.05 * slice.high && 5 * (from_bottom - slice.count()) <= slice.count();
-  const bool is_cholmod = options_.factorisation == Factorisation::kCholmod ||
-                          (options_.factorisation == Factorisation::kAutomatic && size_ == 1 && is_only && starts_at_bottom);
-  double sigma = std::midpoint(slice.low, slice.high);
-  std::int64_t wanted = slice.count();
-  if (is_cholmod) {
-    sigma = -2.5e-3 * slice.high;
-    wanted = from_bottom;
-  } else if (starts_at_bottom) {
-    sigma = std::lerp(slice.low, slice.high, 0.5);
-    wanted = from_bottom;
-  }
-  std::unique_ptr<ShiftedFactor> cholmod;
-  ShiftedFactor* factor = counter_.get();
-  if (is_cholmod) {
-    const Timer timer(modes_.seconds.analyse);
-    counter_.reset();  // Two factors at a time would double the memory.
-    cholmod = make_cholmod_factor(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
-    factor = cholmod.get();
-  }
-  {
-    const Timer timer(modes_.seconds.factor);
-    report(Phase::kFactor, static_cast<std::int64_t>(found_.lambda.size()));
-    for (int i = 0; !factor->factorise(sigma); ++i) {
-      if (i == 5) throw SolveError(fmt::format("K - sigma M is singular all around sigma = {:.9g}.", scaling_.from_scaled(sigma)));
-      sigma += 1e-5 * (slice.high - slice.low);
+  find_missing(slice, std::lerp(slice.low, slice.high, starts_at_bottom ? kShiftBottom : 0.5));
+}
+
+// Distance of the nearest mode found, relative to lambda.
+double BandSolver::find_margin(double lambda) const {
+  double margin = std::numeric_limits<double>::infinity();
+  for (const double found : found_.lambda) margin = std::min(margin, std::abs(found - lambda) / lambda);
+  return margin;
+}
+
+// A count whose shift came to lie on a mode is worth nothing: it is taken again in the widest gap nearby.
+void BandSolver::move_doubtful_counts() {
+  std::vector<double> sorted = found_.lambda;
+  std::sort(sorted.begin(), sorted.end());
+  const std::vector<Inertia> taken = counter_->get_taken();
+  for (const Inertia& old : taken) {
+    if (find_margin(old.lambda) >= kSafeMargin) continue;
+    double best = 0;
+    double place = 0;
+    for (std::size_t j = 1; j < sorted.size(); ++j) {
+      const double middle = std::midpoint(sorted[j - 1], sorted[j]);
+      const double gap = sorted[j] - sorted[j - 1];
+      const double distance = std::abs(middle - old.lambda);
+      if (gap / (gap + distance) > best) {
+        best = gap / (gap + distance);
+        place = middle;
+      }
     }
-    ++modes_.factor.factorisations;
-    modes_.factor.solver = factor->get_solver();
-    modes_.factor.ordering = factor->get_ordering();
-  }
-  const Timer timer(modes_.seconds.iterate);
-  // A run finds one copy of a repeated eigenvalue for certain; rounding brings the others, or the next runs.
-  std::int64_t missing = slice.count();
-  int idle = 0;
-  for (int round = 0; round < kRounds && idle < kIdleRounds && missing > 0; ++round) {
-    // A copy that rounding alone brings in comes late: later runs ask for some more, beyond the slice.
-    const std::int64_t extra = std::min(round, 4) * 10;
-    const std::int64_t added =
-        run_round(slice, *factor, sigma, wanted - slice.count() + missing + extra, kKrylovTolerance * options_.tolerance);
-    missing -= added;
-    idle = added > 0 ? 0 : idle + 1;
+    const bool is_end = old.lambda >= high_ || old.lambda <= low_;  // An end may only move outwards.
+    if (is_end) place = old.lambda * (old.lambda >= high_ ? 1 + 10 * kSafeMargin : 1 - 10 * kSafeMargin);
+    if (place == 0) continue;
+    counter_->forget(old.lambda);
+    (void)counter_->take(place);
   }
 }
 
-void BandSolver::collect(const DensePairs* dense) {
-  const std::vector<double>& lambda = dense != nullptr ? dense->lambda : found_.lambda;
-  std::vector<std::size_t> order(lambda.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
-  const std::int64_t expected = std::min(modes_.band_count, options_.max_modes.value_or(modes_.band_count));
-  const auto converged = static_cast<std::int64_t>(order.size());
-  if (dense == nullptr && (converged < expected || (!options_.max_modes && converged > expected))) {
-    throw SolveError(
-        fmt::format("The band {:.6g} .. {:.6g} Hz holds {} modes by the inertia of K - lambda M, and {} converged. Take a looser "
-                    "tolerance, or solve the band in parts.",
-                    options_.low_hz, options_.high_hz, modes_.band_count, converged));
+std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
+  std::sort(counts.begin(), counts.end(), [](const Inertia& a, const Inertia& b) { return a.lambda < b.lambda; });
+  return counts;
+}
+
+// Compares every count with the modes found; what is missing between two of them is sought there once more.
+void BandSolver::prove() {
+  move_doubtful_counts();
+  const double top = *std::max_element(found_.lambda.begin(), found_.lambda.end());
+  for (int attempt = 0;; ++attempt) {
+    const std::vector<Inertia> counts = sort_counts(counter_->get_taken());
+    bool is_complete = true;
+    for (std::size_t i = 1; i < counts.size(); ++i) {
+      const Slice part{counts[i - 1].lambda, counts[i - 1].below, counts[i].lambda, counts[i].below};
+      if (options_.max_modes && part.low > top) break;  // beyond what was sought
+      const std::int64_t found = count_found(part.low, part.high);
+      if (found == part.count()) continue;
+      is_complete = false;
+      if (attempt > 0 || found > part.count()) {
+        throw SolveError(
+            fmt::format("Between {:.6g} and {:.6g} Hz the inertia of K - lambda M counts {} modes, and {} were found. Take a tighter "
+                        "tolerance, solve the band in parts, or let MUMPS factorise.",
+                        to_hz(part.low), to_hz(part.high), part.count(), found));
+      }
+      find_missing(part, std::midpoint(part.low, part.high));
+    }
+    if (is_complete) return;
   }
+}
+
+void BandSolver::describe_proof() {
+  Proof& proof = modes_.proof;
+  const double top = found_.lambda.empty() ? high_ : *std::max_element(found_.lambda.begin(), found_.lambda.end());
+  for (const Inertia& taken : sort_counts(counter_->get_taken())) {
+    proof.counts.push_back({to_hz(taken.lambda), taken.below, find_margin(taken.lambda)});
+    if (options_.max_modes && taken.lambda > top) break;
+  }
+  proof.found = proof.counts.back().below - proof.counts.front().below;
+  proof.factor_backward_error = counter_->get_worst_backward_error();
+  proof.method = fmt::format("signs of the pivots of K - lambda M = L D L^T ({})", modes_.factor.solver);
+}
+
+// What of the modes, ascending, is in the band and wanted.
+void BandSolver::check_range(std::vector<std::size_t>& order, const std::vector<double>& lambda) {
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
   std::erase_if(order, [&](std::size_t i) { return lambda[i] < low_ * (1 - kEdgeTolerance) || lambda[i] > high_ * (1 + kEdgeTolerance); });
   // The counts were taken a little outside the band.
   const auto within = static_cast<std::int64_t>(order.size());
-  if (dense == nullptr && (within < expected || !options_.max_modes)) modes_.band_count = within;
+  if (!options_.max_modes || within < std::min(modes_.band_count, *options_.max_modes)) modes_.band_count = within;
   if (options_.max_modes && within > *options_.max_modes) order.resize(static_cast<std::size_t>(*options_.max_modes));
-  if (order.empty()) return;
+  for (const std::size_t i : order) modes_.lambda.push_back(lambda[i]);
+}
 
+void BandSolver::take_found() {
+  std::vector<std::size_t> order(found_.lambda.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  check_range(order, found_.lambda);
+  modes_.shapes = found_.take(order);
+}
+
+void BandSolver::collect(const DensePairs& dense) {
+  std::vector<std::size_t> order(dense.lambda.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  check_range(order, dense.lambda);
+  if (order.empty()) return;
   PetscInt rows = 0;
   check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
-  const auto count = petsc::to_petsc_int(static_cast<std::int64_t>(order.size()));
-  check(MatCreateDense(comm_, rows, PETSC_DECIDE, n_, count, nullptr, modes_.shapes.out()));
-  for (PetscInt j = 0; j < count; ++j) {
-    const std::size_t from = order[static_cast<std::size_t>(j)];
-    modes_.lambda.push_back(lambda[from]);
-    Vec column = nullptr;
-    check(MatDenseGetColumnVecWrite(modes_.shapes, j, &column));
-    if (dense != nullptr) {
-      Vec source = nullptr;
-      check(MatDenseGetColumnVecRead(dense->vectors, static_cast<PetscInt>(from), &source));
-      check(VecCopy(source, column));
-      check(MatDenseRestoreColumnVecRead(dense->vectors, static_cast<PetscInt>(from), &source));
-    } else {
-      check(VecCopy(found_.vectors[from], column));
-      found_.vectors[from].reset();
-    }
-    check(MatDenseRestoreColumnVecWrite(modes_.shapes, j, &column));
+  check(MatCreateDense(comm_, rows, PETSC_DECIDE, n_, petsc::to_petsc_int(static_cast<std::int64_t>(order.size())), nullptr,
+                       modes_.shapes.out()));
+  {
+    const LocalColumns from(dense.vectors);
+    const LocalColumns to(modes_.shapes);
+    for (std::size_t j = 0; j < order.size(); ++j)
+      std::copy_n(from.column(static_cast<PetscInt>(order[j])), from.rows, to.column(static_cast<PetscInt>(j)));
   }
   check(MatAssemblyBegin(modes_.shapes, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(modes_.shapes, MAT_FINAL_ASSEMBLY));
-  found_ = {};
 }
 
-ModeErrors BandSolver::refine() {
+void BandSolver::refine(ModeErrors& errors) {
   RefineRequest request;
-  request.stiffness = problem_.stiffness;
-  request.mass = problem_.mass;
+  request.operators = operators_.get();
   request.tolerance = options_.tolerance;
+  std::unique_ptr<ShiftedFactor> factor;
   request.get_factor = [&]() -> ShiftedFactor& {
-    if (counter_ == nullptr)
-      counter_ = std::make_unique<MumpsFactor>(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
-    return *counter_;
+    if (factor == nullptr) factor = make_mumps_factor(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
+    return *factor;
   };
-  ModeErrors errors;
   const RefineCost cost = refine_modes(request, modes_.lambda, modes_.shapes, errors);
-  counter_.reset();
   modes_.factor.factorisations += cost.factorisations;
   modes_.factor.solves += cost.solves;
   for (std::size_t j = 0; j < errors.residual.size(); ++j) {
@@ -348,12 +421,18 @@ ModeErrors BandSolver::refine() {
                     "explains ({:.2g}). Take a looser tolerance, or mend the thinnest elements of the mesh.",
                     j, to_hz(modes_.lambda[j]), errors.residual[j], options_.tolerance, errors.floor[j]));
   }
-  return errors;
 }
 
 void BandSolver::finish() {
   if (modes_.lambda.empty()) return;
-  const ModeErrors errors = refine();
+  ModeErrors errors;
+  refine(errors);
+  modes_.proof.clusters = find_clusters(modes_.lambda, errors, options_.tolerance);
+  if (!modes_.proof.clusters.empty()) {
+    make_canonical(*operators_, problem_.nodes, modes_.proof.clusters, modes_.lambda, modes_.shapes);
+    std::vector<double> quotients = modes_.lambda;
+    errors = normalise_and_measure(*operators_, quotients, modes_.shapes);
+  }
   modes_.residual = errors.residual;
   modes_.above_tolerance_count =
       std::count_if(errors.residual.begin(), errors.residual.end(), [&](double residual) { return residual > options_.tolerance; });

@@ -111,7 +111,7 @@ TEST(SolveModes, orients_every_shape_by_its_largest_entry) {
     check(VecMax(phi, nullptr, &largest));
     check(VecMin(phi, nullptr, &smallest));
     check(MatDenseRestoreColumnVecRead(modes.shapes, static_cast<PetscInt>(j), &phi));
-    EXPECT_GE(largest, -smallest * (1 - 1e-5)) << j;
+    EXPECT_GE(largest, -smallest * (1 - 1e-3)) << j;
   }
 }
 
@@ -222,21 +222,35 @@ TEST(SolveModes, finds_most_of_the_spectrum_of_a_larger_body) {
   expect_eigenvalues(solve_modes(system.problem, options), pick(get_block_eigenvalues(), 1, options.high_hz));
 }
 
-TEST(SolveModes, takes_an_elimination_order_and_agrees_between_factorisations) {
+TEST(SolveModes, agrees_between_factorisations_and_takes_an_elimination_order) {
   test::System system = test::make_system(get_block());
   const auto nodes = static_cast<std::int32_t>(get_block().nodes.size());
   for (std::int32_t i = 0; i < nodes; ++i) system.problem.nodes.elimination_position.push_back((i * 7) % nodes);  // 7 and 250 are coprime.
   const Options options = make_options();
-  Options mumps = options;
-  mumps.factorisation = Factorisation::kMumps;
   const Modes automatic = solve_modes(system.problem, options);
-  const Modes by_mumps = solve_modes(system.problem, mumps);
-  expect_eigenvalues(automatic, by_mumps.lambda);
+  EXPECT_NE(automatic.factor.solver.find("carillon"), std::string::npos) << automatic.factor.solver;
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  EXPECT_EQ(automatic.factor.solver.find("CHOLMOD") != std::string::npos, size == 1) << automatic.factor.solver;
-  EXPECT_NE(by_mumps.factor.solver.find("MUMPS"), std::string::npos);
-  EXPECT_EQ(by_mumps.factor.ordering, "METIS nested dissection (given)");
+  for (const auto how : {Factorisation::kMumps, Factorisation::kCholmod}) {
+    if (how == Factorisation::kCholmod && size > 1) continue;
+    Options other = options;
+    other.factorisation = how;
+    const Modes modes = solve_modes(system.problem, other);
+    expect_eigenvalues(modes, automatic.lambda);
+    EXPECT_NE(modes.factor.solver.find(how == Factorisation::kMumps ? "MUMPS" : "CHOLMOD"), std::string::npos) << modes.factor.solver;
+    EXPECT_EQ(modes.factor.ordering, "METIS nested dissection (given)");
+  }
+}
+
+TEST(SolveModes, agrees_between_block_lanczos_and_krylov_schur) {
+  const test::System system = test::make_system(get_block());
+  Options options = make_options();
+  options.method = Method::kBlockLanczos;
+  const Modes block = solve_modes(system.problem, options);
+  options.method = Method::kKrylovSchur;
+  const Modes single = solve_modes(system.problem, options);
+  expect_eigenvalues(single, block.lambda);
+  expect_eigenvalues(single, pick(get_block_eigenvalues(), options.low_hz, options.high_hz));
 }
 
 TEST(SolveModes, reports_progress_on_the_first_rank) {

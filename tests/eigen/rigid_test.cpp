@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "precompute/eigen/rigid_modes.hpp"
 #include "precompute/petsc/session.hpp"
@@ -16,7 +17,10 @@ using test::Network;
 
 // Rigid modes must be M-orthonormal and free of force; returns how many there are.
 std::size_t count_and_check(const test::System& system) {
-  const auto modes = make_rigid_modes(system.stiffness, system.mass, system.problem.nodes);
+  std::vector<std::int64_t> per_component;
+  const auto modes = make_rigid_modes(system.stiffness, system.mass, system.problem.nodes, per_component);
+  EXPECT_EQ(std::accumulate(per_component.begin(), per_component.end(), std::int64_t{0}), static_cast<std::int64_t>(modes.size()));
+  EXPECT_EQ(per_component.size(), static_cast<std::size_t>(system.problem.nodes.component_count));
   petsc::VecHandle force;
   check(MatCreateVecs(system.stiffness, force.out(), nullptr));
   for (std::size_t i = 0; i < modes.size(); ++i) {
@@ -81,16 +85,14 @@ TEST(RigidModes, refuse_a_layout_that_forgets_the_held_nodes) {
   network.held = {0, 2, 35};
   test::System system = test::make_system(network);
   system.problem.nodes.held.clear();
-  EXPECT_THROW(make_rigid_modes(system.stiffness, system.mass, system.problem.nodes), SolveError);
+  std::vector<std::int64_t> per_component;
+  EXPECT_THROW(make_rigid_modes(system.stiffness, system.mass, system.problem.nodes, per_component), SolveError);
 }
 
 TEST(RigidModes, survive_a_wire_ten_thousand_times_longer_than_thick) {
   Network network = make_block(2, 2, 30);
   for (Vec3& x : network.nodes) x = {1e-4 * x[0], 1e-4 * x[1], x[2] / 29};
-  EXPECT_EQ(
-      make_rigid_modes(test::make_system(network).stiffness, test::make_system(network).mass, test::make_system(network).problem.nodes)
-          .size(),
-      6u);
+  EXPECT_EQ(count_and_check(test::make_system(network)), 6u);
 }
 
 }  // namespace

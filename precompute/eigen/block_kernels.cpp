@@ -1,0 +1,227 @@
+// Method:     The rows are taken in panels that stay in the cache. A panel of the narrow block is packed once; the wide block streams past
+//             it and is read from memory once per call. Sums and coefficients live in registers (6 x 4 and 4 x 4 tiles).
+// Source:     Goto, van de Geijn, Anatomy of high-performance matrix multiplication, ACM TOMS 34(3), 2008 (panels, register tiles).
+// Deviations: the wide block is not packed: it is used once, and packing it costs BLAS half its speed for 16 columns (figures:
+//             docs/decisions/block-lanczos.md). Processors without AVX-512 use BLAS on the same panels.
+#include "precompute/eigen/block_kernels.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+extern "C" void dgemm_(const char* transpose_a, const char* transpose_b, const int* m, const int* n, const int* k, const double* alpha,
+                       const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c, const int* ldc);
+
+namespace carillon::eigen {
+namespace {
+
+constexpr std::ptrdiff_t kRowsTransposed = 1024;  // of a panel for A^T B: 16 columns of B take an eighth of the second-level cache
+constexpr std::ptrdiff_t kRowsProduct = 512;      // of a panel for B - A S
+constexpr std::ptrdiff_t kRowsCombined = 256;     // of a panel for A S
+constexpr int kTile = 4;                          // columns of the narrow block in registers
+
+int round_up(int n, int to) { return (n + to - 1) / to * to; }
+
+void call_gemm(const char* transposed, std::ptrdiff_t m, int n, std::ptrdiff_t k, double alpha, const double* a, std::ptrdiff_t lda,
+               const double* b, std::ptrdiff_t ldb, double beta, double* c, std::ptrdiff_t ldc) {
+  if (m == 0 || n == 0) return;
+  const auto stride = [](std::ptrdiff_t n) { return static_cast<int>(std::max<std::ptrdiff_t>(n, 1)); };
+  const int mm = static_cast<int>(m), kk = static_cast<int>(k), sa = stride(lda), sb = stride(ldb), sc = stride(ldc);
+  dgemm_(transposed, "N", &mm, &n, &kk, &alpha, a, &sa, b, &sb, &beta, c, &sc);
+}
+
+#if defined(__x86_64__)
+#define CARILLON_AVX512 __attribute__((target("avx512f")))
+
+bool has_avx512() {
+  static const bool has = __builtin_cpu_supports("avx512f") != 0;
+  return has;
+}
+
+// c (kCount x 4) += a^T b over `rows`, any number; b is packed: aligned, zero beyond the rows.
+template <int kCount>
+CARILLON_AVX512 void add_transposed_tile(const double* a, std::ptrdiff_t lda, const double* b, std::ptrdiff_t ldb, std::ptrdiff_t rows,
+                                         double* c, std::ptrdiff_t ldc) {
+  __m512d sum[kCount][kTile];
+  for (auto& row : sum) {
+    for (__m512d& s : row) s = _mm512_setzero_pd();
+  }
+  for (std::ptrdiff_t r = 0; r < rows; r += 8) {
+    const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
+    const __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
+    const __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
+#pragma GCC unroll 6
+    for (int i = 0; i < kCount; ++i) {
+      const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
+      sum[i][0] = _mm512_fmadd_pd(x, b0, sum[i][0]);
+      sum[i][1] = _mm512_fmadd_pd(x, b1, sum[i][1]);
+      sum[i][2] = _mm512_fmadd_pd(x, b2, sum[i][2]);
+      sum[i][3] = _mm512_fmadd_pd(x, b3, sum[i][3]);
+    }
+  }
+  for (int j = 0; j < kTile; ++j) {
+    for (int i = 0; i < kCount; ++i) {
+      alignas(64) double lanes[8];
+      _mm512_store_pd(lanes, sum[i][j]);
+      c[j * ldc + i] += ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]));
+    }
+  }
+}
+
+// b (rows x 4, packed) -= a (rows x kCount) s (kCount x 4).
+template <int kCount>
+CARILLON_AVX512 void subtract_tile(const double* a, std::ptrdiff_t lda, const double* s, std::ptrdiff_t lds, double* b, std::ptrdiff_t ldb,
+                                   std::ptrdiff_t rows) {
+  __m512d c[kCount][kTile];
+  for (int j = 0; j < kTile; ++j) {
+    for (int i = 0; i < kCount; ++i) c[i][j] = _mm512_set1_pd(s[j * lds + i]);
+  }
+  for (std::ptrdiff_t r = 0; r < rows; r += 8) {
+    const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
+    __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
+    __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
+#pragma GCC unroll 4
+    for (int i = 0; i < kCount; ++i) {
+      const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
+      b0 = _mm512_fnmadd_pd(x, c[i][0], b0);
+      b1 = _mm512_fnmadd_pd(x, c[i][1], b1);
+      b2 = _mm512_fnmadd_pd(x, c[i][2], b2);
+      b3 = _mm512_fnmadd_pd(x, c[i][3], b3);
+    }
+    _mm512_store_pd(b + r, b0);
+    _mm512_store_pd(b + ldb + r, b1);
+    _mm512_store_pd(b + 2 * ldb + r, b2);
+    _mm512_store_pd(b + 3 * ldb + r, b3);
+  }
+}
+
+using TransposedTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, std::ptrdiff_t, double*, std::ptrdiff_t);
+using SubtractTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, double*, std::ptrdiff_t, std::ptrdiff_t);
+constexpr TransposedTile kTransposedTile[] = {nullptr,
+                                              add_transposed_tile<1>,
+                                              add_transposed_tile<2>,
+                                              add_transposed_tile<3>,
+                                              add_transposed_tile<4>,
+                                              add_transposed_tile<5>,
+                                              add_transposed_tile<6>};
+constexpr SubtractTile kSubtractTile[] = {nullptr, subtract_tile<1>, subtract_tile<2>, subtract_tile<3>, subtract_tile<4>};
+
+// Panels of columns, on cache lines, zero beyond the rows and columns that are filled.
+class PackedPanel {
+ public:
+  PackedPanel(std::ptrdiff_t rows, int columns)
+      : stride_(rows), space_(static_cast<std::size_t>(rows) * round_up(columns, kTile) + 8, 0.0) {
+    const auto misfit = reinterpret_cast<std::uintptr_t>(space_.data()) % 64;
+    values_ = space_.data() + (misfit == 0 ? 0 : (64 - misfit) / sizeof(double));
+  }
+  double* get() { return values_; }
+  std::ptrdiff_t stride() const { return stride_; }
+  void load(const Columns& from, std::ptrdiff_t first, std::ptrdiff_t rows) {
+    const std::ptrdiff_t rounded = std::min((rows + 7) / 8 * 8, stride_);
+    for (int j = 0; j < from.count; ++j) {
+      double* to = values_ + j * stride_;
+      std::memcpy(to, from.column(j) + first, static_cast<std::size_t>(rows) * sizeof(double));
+      std::fill(to + rows, to + rounded, 0.0);
+    }
+  }
+  void store(const Columns& to, std::ptrdiff_t first, std::ptrdiff_t rows) const {
+    for (int j = 0; j < to.count; ++j)
+      std::memcpy(to.column(j) + first, values_ + j * stride_, static_cast<std::size_t>(rows) * sizeof(double));
+  }
+
+ private:
+  std::ptrdiff_t stride_;
+  std::vector<double> space_;
+  double* values_ = nullptr;
+};
+
+void multiply_transposed_avx512(const Columns& a, const Columns& b, double* small, int small_stride) {
+  const int padded_columns = round_up(b.count, kTile);
+  std::vector<double> sums(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(padded_columns), 0.0);
+  PackedPanel panel(kRowsTransposed, b.count);
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsTransposed) {
+    const std::ptrdiff_t rows = std::min(kRowsTransposed, a.rows - first);
+    panel.load(b, first, rows);
+    for (int i = 0; i < a.count; i += 6) {
+      const TransposedTile tile = kTransposedTile[std::min(6, a.count - i)];
+      for (int j = 0; j < padded_columns; j += kTile) {
+        tile(a.column(i) + first, a.stride, panel.get() + j * panel.stride(), panel.stride(), rows,
+             sums.data() + static_cast<std::ptrdiff_t>(j) * a.count + i, a.count);
+      }
+    }
+  }
+  for (int j = 0; j < b.count; ++j)
+    std::copy_n(sums.data() + static_cast<std::ptrdiff_t>(j) * a.count, a.count, small + static_cast<std::ptrdiff_t>(j) * small_stride);
+}
+
+void subtract_product_avx512(const Columns& a, const double* small, int small_stride, const Columns& b) {
+  const int padded_columns = round_up(b.count, kTile);
+  std::vector<double> coefficients(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(padded_columns), 0.0);
+  for (int j = 0; j < b.count; ++j)
+    std::copy_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count,
+                coefficients.data() + static_cast<std::ptrdiff_t>(j) * a.count);
+  PackedPanel panel(kRowsProduct, b.count);
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsProduct) {
+    const std::ptrdiff_t rows = std::min(kRowsProduct, a.rows - first);
+    panel.load(b, first, rows);
+    for (int i = 0; i < a.count; i += 4) {
+      const SubtractTile tile = kSubtractTile[std::min(4, a.count - i)];
+      for (int j = 0; j < padded_columns; j += kTile) {
+        tile(a.column(i) + first, a.stride, coefficients.data() + static_cast<std::ptrdiff_t>(j) * a.count + i, a.count,
+             panel.get() + j * panel.stride(), panel.stride(), rows);
+      }
+    }
+    panel.store(b, first, rows);
+  }
+}
+#else
+bool has_avx512() { return false; }
+void multiply_transposed_avx512(const Columns&, const Columns&, double*, int) {}
+void subtract_product_avx512(const Columns&, const double*, int, const Columns&) {}
+#endif
+
+constexpr int kNarrow = 32;  // Wider blocks are BLAS's own ground.
+
+}  // namespace
+
+void multiply_transposed(const Columns& a, const Columns& b, double* small, int small_stride) {
+  if (a.count == 0 || b.count == 0) return;
+  if (b.count <= kNarrow && has_avx512()) return multiply_transposed_avx512(a, b, small, small_stride);
+  call_gemm("T", a.count, b.count, a.rows, 1.0, a.values, a.stride, b.values, b.stride, 0.0, small, small_stride);
+}
+
+void subtract_product(const Columns& a, const double* small, int small_stride, const Columns& b) {
+  if (a.count == 0 || b.count == 0) return;
+  if (b.count <= kNarrow && has_avx512()) return subtract_product_avx512(a, small, small_stride, b);
+  call_gemm("N", a.rows, b.count, a.count, -1.0, a.values, a.stride, small, small_stride, 1.0, b.values, b.stride);
+}
+
+void combine_columns(const Columns& a, const double* small, int kept) {
+  if (a.count == 0 || kept == 0) return;
+  std::vector<double> panel(static_cast<std::size_t>(kRowsCombined) * static_cast<std::size_t>(a.count));
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsCombined) {
+    const std::ptrdiff_t rows = std::min(kRowsCombined, a.rows - first);
+    for (int j = 0; j < a.count; ++j) std::copy_n(a.column(j) + first, rows, panel.data() + j * kRowsCombined);
+    call_gemm("N", rows, kept, a.count, 1.0, panel.data(), kRowsCombined, small, a.count, 0.0, a.values + first, a.stride);
+  }
+}
+
+void multiply_symmetric(const Columns& a, const Columns& b, double* small) {
+  constexpr int kStrip = 64;
+  const int n = a.count;
+  for (int first = 0; first < n; first += kStrip) {
+    const int width = std::min(kStrip, n - first);
+    double* strip = small + static_cast<std::ptrdiff_t>(first) * n;
+    multiply_transposed(a.part(0, first + width), b.part(first, width), strip, n);
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = j + 1; i < n; ++i) small[static_cast<std::ptrdiff_t>(j) * n + i] = small[static_cast<std::ptrdiff_t>(i) * n + j];
+  }
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,752 @@
+// Method:     V_{j+1} R_j = A^-1 M V_j - V_j alpha_j - V_{j-1} R_{j-1}^T in the M inner product, A = K - sigma M, blocks of b columns. The
+//             recurrence is followed by one projection against the whole basis; the block is orthonormalised by Cholesky QR, twice if it
+//             is badly conditioned, and column by column, with random columns for dependent ones, if it is singular. The projected matrix
+//             is block tridiagonal; ||R_j s_i||, s_i the last block row of its eigenvector, is the residual of a Ritz pair. A full basis
+//             is restarted with its best Ritz vectors.
+// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994. Wu, Simon, Thick-restart
+//             Lanczos, SIAM J. Matrix Anal. Appl. 22(2), 2000. Yamamoto et al., Roundoff error analysis of the CholeskyQR2 algorithm, ETNA
+//             44, 2015.
+// Deviations: the whole basis is projected out at every step, as its kernels make that cheap, where Grimes et al. watch orthogonality and
+//             project now and then.
+#include "precompute/eigen/block_lanczos.hpp"
+
+#include <petscblaslapack.h>
+#include <slepc/private/epsimpl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <vector>
+
+#include "precompute/eigen/block_kernels.hpp"
+#include "precompute/eigen/local_columns.hpp"
+#include "precompute/petsc/handle.hpp"
+#include "precompute/petsc/session.hpp"
+
+// What petscblaslapack.h leaves out.
+extern "C" {
+void dtrtri_(const char* half, const char* diagonal, const int* n, double* a, const int* lda, int* info);
+void dsyevd_(const char* job, const char* half, const int* n, double* a, const int* lda, double* w, double* work, const int* lwork,
+             int* iwork, const int* liwork, int* info);
+}
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+
+constexpr PetscInt kDefaultBlock = 16;
+constexpr double kWellConditioned = 1e-2;  // Smallest pivot of the scaled Gram matrix that needs no second Cholesky QR,
+constexpr double kDependent = 1e-11;       // and smallest that Cholesky QR is trusted with.
+constexpr double kTaken = 1e-2;            // A projection that takes more of a column's square is done once more.
+constexpr double kAngle = 1e-8;            // Ritz vectors must be told apart from their neighbours to this angle,
+constexpr double kSmallest = 1e-14;        // as far as residuals, relative to theta, can say.
+constexpr double kSame = 1e-9;             // Closer Ritz values are one.
+constexpr double kSeen = 1e-3;             // A Ritz value with this error is no phantom.
+
+// What the type keeps in eps->data.
+struct Settings {
+  PetscInt block = PETSC_DEFAULT;
+  Mat locked = nullptr;
+};
+
+Settings& get_settings(EPS eps) { return *static_cast<Settings*>(eps->data); }
+
+using Small = std::vector<double>;  // column-major
+
+// Numbers in (-1/2, 1/2) that depend on the arguments alone.
+double make_noise(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t x = a * 0x9E3779B97F4A7C15ull + b * 0xD1B54A32D192ED03ull + 0x8CB92BA72F3D8DD7ull;
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
+  return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1.0p-53 - 0.5;
+}
+
+class Iteration {
+ public:
+  explicit Iteration(EPS eps);
+  void run();
+
+ private:
+  struct Ritz {
+    Small theta;                // (basis), ascending
+    Small vectors;              // (basis, basis); on other ranks than the first only after share_vectors
+    std::vector<double> error;  // (basis) what the convergence test says, <= tol: converged
+    std::vector<int> order;     // the wanted ones first
+    std::size_t converged = 0;  // leading ones of order
+    bool done = false;
+  };
+
+  void start();
+  bool step();
+  void multiply_mass();
+  void invert();
+  void project(bool is_first, Small& alpha);
+  int orthonormalise(Small& r);
+  bool orthonormalise_by_cholesky(Small& r);
+  int orthonormalise_by_columns(Small& r);
+  Small sum_products(const Columns& a, const Columns& b) const;
+  std::vector<double> sum_squares(const Columns& a, const Columns& b) const;
+  double orthogonalise_column(int i, double* coefficients);
+  Ritz calc_ritz();
+  void calc_errors(Ritz& ritz) const;
+  void choose_wanted(Ritz& ritz, const Small& lambda) const;
+  void share_vectors(Ritz& ritz) const;
+  Small pick_vectors(const Ritz& ritz, std::size_t count) const;
+  bool is_due() const;
+  void plan_check(const Ritz& ritz);
+  bool report(const Ritz& ritz);
+  void restart(Ritz& ritz);
+  void finish(Ritz& ritz);
+  double& t(int i, int j) { return t_[static_cast<std::size_t>(j) * static_cast<std::size_t>(room_) + static_cast<std::size_t>(i)]; }
+
+  EPS eps_;
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  int block_ = 1;
+  int room_ = 0;          // columns the basis may have
+  bool inverts_ = false;  // the operator is A^-1 M, and M times the block is at hand
+  Columns fixed_;         // deflation space; the basis follows it in memory
+  Columns basis_;         // the first `size_` columns are in use
+  Columns everything_;    // both
+  Columns locked_;
+  int size_ = 0;
+  int width_ = 0;     // of the current block, the last columns of the basis
+  int previous_ = 0;  // first column of what the current block is coupled to
+  int next_width_ = 0;
+  Small t_;         // projected operator, (room, room)
+  Small coupling_;  // R of the next block, (next_width, width)
+  petsc::MatHandle w_mat_, z_mat_, mass_;
+  std::unique_ptr<LocalColumns> locked_access_;
+  Columns w_, z_;  // the next block and M times it; after a step they are the current block's
+  int next_check_ = 0;
+  int last_size_ = 0;
+  std::size_t last_converged_ = 0;
+  std::uint64_t noise_ = 0;
+};
+
+Columns view(Mat dense) {
+  const LocalColumns access(dense);
+  return access.view();
+}
+
+Iteration::Iteration(EPS eps) : eps_(eps) {
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(eps), &comm_));
+  const Settings& settings = get_settings(eps);
+  PetscInt fixed = 0;
+  check(BVGetNumConstraints(eps->V, &fixed));
+  PetscInt locked = 0;
+  if (settings.locked != nullptr) {
+    check(MatGetSize(settings.locked, nullptr, &locked));
+    locked_access_ = std::make_unique<LocalColumns>(settings.locked);
+    locked_ = locked_access_->view();
+  }
+  room_ = static_cast<int>(std::min(eps->ncv, eps->n - fixed - locked));
+  block_ = static_cast<int>(std::min<PetscInt>(settings.block, std::max<PetscInt>(room_, 1)));
+  t_.assign(static_cast<std::size_t>(room_) * static_cast<std::size_t>(room_), 0.0);
+
+  PetscBool inverts = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps->st), STSINVERT, &inverts));
+  inverts_ = inverts == PETSC_TRUE;
+  Mat mass = nullptr;
+  check(BVGetMatrix(eps->V, &mass, nullptr));
+  check(MatCreateDense(comm_, eps->nloc, PETSC_DECIDE, eps->n, block_, nullptr, w_mat_.out()));
+  check(MatAssemblyBegin(w_mat_, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(w_mat_, MAT_FINAL_ASSEMBLY));
+  if (mass != nullptr) {
+    check(PetscObjectReference(reinterpret_cast<PetscObject>(mass)));
+    mass_ = petsc::MatHandle(mass);
+    check(MatMatMult(mass, w_mat_, MAT_INITIAL_MATRIX, PETSC_DEFAULT, z_mat_.out()));
+  } else {
+    check(MatDuplicate(w_mat_, MAT_COPY_VALUES, z_mat_.out()));
+  }
+  w_ = view(w_mat_);
+  z_ = view(z_mat_);
+}
+
+Small Iteration::sum_products(const Columns& a, const Columns& b) const {
+  Small products(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(b.count), 0.0);
+  multiply_transposed(a, b, products.data(), a.count);
+  MPI_Allreduce(MPI_IN_PLACE, products.data(), static_cast<int>(products.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  return products;
+}
+
+// a_j^T b_j
+std::vector<double> Iteration::sum_squares(const Columns& a, const Columns& b) const {
+  std::vector<double> squares(static_cast<std::size_t>(a.count));
+  for (int j = 0; j < a.count; ++j)
+    squares[static_cast<std::size_t>(j)] = std::inner_product(a.column(j), a.column(j) + a.rows, b.column(j), 0.0);
+  MPI_Allreduce(MPI_IN_PLACE, squares.data(), a.count, MPI_DOUBLE, MPI_SUM, comm_);
+  return squares;
+}
+
+// z = M w.
+void Iteration::multiply_mass() {
+  if (mass_.get() != nullptr) {
+    check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(w_mat_.get())));
+    Mat z = z_mat_;
+    check(MatMatMult(mass_, w_mat_, MAT_REUSE_MATRIX, PETSC_DEFAULT, &z));
+  } else {
+    for (int j = 0; j < w_.count; ++j) std::copy_n(w_.column(j), w_.rows, z_.column(j));
+  }
+}
+
+// w = operator times the current block, whose M multiple is in z.
+void Iteration::invert() {
+  check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(w_mat_.get())));
+  check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(z_mat_.get())));
+  if (inverts_) {
+    check(STMatMatSolve(eps_->st, z_mat_, w_mat_));
+    return;
+  }
+  petsc::MatHandle block;
+  check(MatDuplicate(w_mat_, MAT_COPY_VALUES, block.out()));
+  check(STApplyMat(eps_->st, block, w_mat_));
+}
+
+// The first block: the initial space and random vectors, once through the operator, which damps what is far from the shift.
+void Iteration::start() {
+  for (PetscInt j = eps_->nini; j < block_; ++j) check(BVSetRandomColumn(eps_->V, j));
+  PetscScalar* array = nullptr;
+  PetscInt fixed = 0;
+  check(BVGetNumConstraints(eps_->V, &fixed));
+  check(BVGetArray(eps_->V, &array));
+  const auto rows = static_cast<std::ptrdiff_t>(eps_->nloc);
+  fixed_ = {array, rows, rows, static_cast<int>(fixed)};
+  basis_ = {array + fixed * rows, rows, rows, room_};
+  everything_ = {array, rows, rows, static_cast<int>(fixed) + room_};
+  for (int j = 0; j < block_; ++j) std::copy_n(basis_.column(j), rows, w_.column(j));
+  multiply_mass();
+  invert();
+  size_ = width_ = previous_ = 0;
+  Small alpha;
+  project(true, alpha);
+  Small r;
+  next_width_ = orthonormalise(r);
+  for (int j = 0; j < next_width_; ++j) std::copy_n(w_.column(j), rows, basis_.column(j));
+  size_ = width_ = next_width_;
+  previous_ = 0;
+}
+
+// w -= (everything so far) (everything so far)^T M w, after the recurrence has taken the bulk away. alpha: (width, width) the diagonal
+// block.
+void Iteration::project(bool is_first, Small& alpha) {
+  const Columns next = w_.part(0, is_first ? block_ : width_);
+  const Columns next_mass = z_.part(0, next.count);
+  if (!is_first) {
+    // z still is M times the current block.
+    alpha = sum_products(next_mass, next);
+    const int coupled = size_ - previous_;
+    Small local(static_cast<std::size_t>(coupled) * static_cast<std::size_t>(width_));
+    for (int j = 0; j < width_; ++j) {
+      double* column = local.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(coupled);
+      for (int i = 0; i < coupled - width_; ++i) column[i] = t(previous_ + i, size_ - width_ + j);
+      std::copy_n(alpha.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(width_), width_, column + coupled - width_);
+    }
+    subtract_product(basis_.part(previous_, coupled), local.data(), coupled, next);
+  }
+  const Columns all = everything_.part(0, fixed_.count + size_);
+  for (int pass = 0; pass < 3; ++pass) {
+    multiply_mass();
+    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, next_mass).data(), locked_.count, next);
+    const Small c = sum_products(all, next_mass);
+    const std::vector<double> square = sum_squares(next, next_mass);
+    subtract_product(all, c.data(), all.count, next);
+    double taken = 0;  // largest part of a column that this pass took away; its rounding is what it leaves behind
+    for (int j = 0; j < next.count; ++j) {
+      const double* column = c.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(all.count);
+      if (!is_first) {
+        for (int i = 0; i < width_; ++i) alpha[static_cast<std::size_t>(j * width_ + i)] += column[all.count - width_ + i];
+      }
+      taken = std::max(taken, std::inner_product(column, column + all.count, column, 0.0) / square[static_cast<std::size_t>(j)]);
+    }
+    if (taken < kTaken) break;
+  }
+}
+
+// Makes the columns of w M-orthonormal: w <- w R^-1, z <- M w. Returns how many are left; fewer than there were when the space is
+// exhausted. r: (returned, as many as there were).
+int Iteration::orthonormalise(Small& r) {
+  const int count = size_ == 0 ? block_ : width_;
+  multiply_mass();
+  r.assign(static_cast<std::size_t>(count) * static_cast<std::size_t>(count), 0.0);
+  for (int i = 0; i < count; ++i) r[static_cast<std::size_t>(i * count + i)] = 1;
+  if (size_ + count <= eps_->n - fixed_.count - locked_.count && orthonormalise_by_cholesky(r)) return count;
+  return orthonormalise_by_columns(r);
+}
+
+bool Iteration::orthonormalise_by_cholesky(Small& r) {
+  const int count = size_ == 0 ? block_ : width_;
+  const auto n = static_cast<std::size_t>(count);
+  const Columns w = w_.part(0, count);
+  const Columns z = z_.part(0, count);
+  Small total = r;
+  for (int pass = 0; pass < 3; ++pass) {
+    Small gram = sum_products(w, z);
+    std::vector<double> scale(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      scale[i] = std::sqrt(gram[i * n + i]);
+      if (!(scale[i] > 0) || !std::isfinite(scale[i])) return false;
+    }
+    for (std::size_t j = 0; j < n; ++j) {
+      for (std::size_t i = 0; i < n; ++i) gram[j * n + i] /= scale[i] * scale[j];
+    }
+    PetscBLASInt size = count;
+    PetscBLASInt info = 0;
+    LAPACKpotrf_("U", &size, gram.data(), &size, &info);
+    if (info != 0) return false;
+    double smallest = 1;
+    for (std::size_t i = 0; i < n; ++i) smallest = std::min(smallest, gram[i * n + i] * gram[i * n + i]);
+    if (pass == 0 && smallest < kDependent) return false;
+    Small inverse(n * n, 0.0);
+    for (std::size_t j = 0; j < n; ++j) {
+      for (std::size_t i = 0; i <= j; ++i) inverse[j * n + i] = gram[j * n + i] *= scale[j];
+      for (std::size_t i = j + 1; i < n; ++i) gram[j * n + i] = 0;
+    }
+    dtrtri_("U", "N", &size, inverse.data(), &size, &info);
+    if (info != 0) return false;
+    combine_columns(w, inverse.data(), count);
+    combine_columns(z, inverse.data(), count);
+    Small product(n * n, 0.0);
+    double one = 1;
+    double zero = 0;
+    BLASgemm_("N", "N", &size, &size, &size, &one, gram.data(), &size, total.data(), &size, &zero, product.data(), &size);
+    total = product;
+    if (smallest > kWellConditioned) break;
+  }
+  r = total;
+  return true;
+}
+
+// Column i of w against the basis, the deflated vectors and the columns before it, twice; coefficients (i) of the last. Its M-norm, zero if
+// next to nothing is left.
+double Iteration::orthogonalise_column(int i, double* coefficients) {
+  const Columns all = everything_.part(0, fixed_.count + size_);
+  const Columns column = w_.part(i, 1);
+  const Columns image = z_.part(i, 1);
+  multiply_mass();
+  const double before = std::sqrt(sum_products(column, image)[0]);
+  for (int pass = 0; pass < 2; ++pass) {
+    if (pass > 0) multiply_mass();
+    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, image).data(), locked_.count, column);
+    subtract_product(all, sum_products(all, image).data(), all.count, column);
+    if (i > 0) {
+      const Small c = sum_products(w_.part(0, i), image);
+      subtract_product(w_.part(0, i), c.data(), i, column);
+      for (int k = 0; k < i; ++k) coefficients[k] += c[static_cast<std::size_t>(k)];
+    }
+  }
+  multiply_mass();
+  const double after = std::sqrt(std::max(sum_products(column, image)[0], 0.0));
+  if (!(after > kDependent * before)) return 0;
+  for (std::ptrdiff_t row = 0; row < column.rows; ++row) column.values[row] /= after;
+  return after;
+}
+
+int Iteration::orthonormalise_by_columns(Small& r) {
+  const int count = size_ == 0 ? block_ : width_;
+  const auto left = static_cast<int>(std::min<PetscInt>(count, eps_->n - fixed_.count - locked_.count - size_));
+  PetscInt first_row = 0;
+  check(MatGetOwnershipRange(w_mat_, &first_row, nullptr));
+  double scale = 0;  // of the operator on the block: what is small beside it is rounding
+  for (int j = 0; j < count; ++j) scale = std::max(scale, std::sqrt(std::max(sum_products(w_.part(j, 1), z_.part(j, 1))[0], 0.0)));
+  Small full(static_cast<std::size_t>(count) * static_cast<std::size_t>(count), 0.0);
+  int kept = 0;
+  for (int j = 0; j < count && kept < left; ++j) {
+    if (kept != j) std::copy_n(w_.column(j), w_.rows, w_.column(kept));
+    double* column = full.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(count);
+    const double norm = orthogonalise_column(kept, column);
+    if (norm > kDependent * scale) {
+      column[kept++] = norm;
+      continue;
+    }
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      ++noise_;
+      for (std::ptrdiff_t row = 0; row < w_.rows; ++row)
+        w_.column(kept)[row] = make_noise(noise_, static_cast<std::uint64_t>(first_row + row));
+      Small ignored(static_cast<std::size_t>(count), 0.0);
+      if (orthogonalise_column(kept, ignored.data()) > 0) {
+        ++kept;
+        break;
+      }
+    }
+  }
+  multiply_mass();
+  r.assign(static_cast<std::size_t>(kept) * static_cast<std::size_t>(count), 0.0);
+  for (int j = 0; j < count; ++j) {
+    for (int i = 0; i < kept; ++i) r[static_cast<std::size_t>(j * kept + i)] = full[static_cast<std::size_t>(j * count + i)];
+  }
+  return kept;
+}
+
+// One block more. False when the space is exhausted.
+bool Iteration::step() {
+  invert();
+  Small alpha;
+  project(false, alpha);
+  for (int j = 0; j < width_; ++j) {
+    for (int i = 0; i < width_; ++i) {
+      t(size_ - width_ + i, size_ - width_ + j) =
+          0.5 * (alpha[static_cast<std::size_t>(j * width_ + i)] + alpha[static_cast<std::size_t>(i * width_ + j)]);
+    }
+  }
+  next_width_ = orthonormalise(coupling_);
+  for (int j = next_width_; j < block_; ++j) {
+    std::fill_n(w_.column(j), w_.rows, 0.0);
+    std::fill_n(z_.column(j), z_.rows, 0.0);
+  }
+  return next_width_ > 0;
+}
+
+Iteration::Ritz Iteration::calc_ritz() {
+  Ritz ritz;
+  const auto n = static_cast<std::size_t>(size_);
+  ritz.theta.assign(n, 0.0);
+  int rank = 0;
+  MPI_Comm_rank(comm_, &rank);
+  Small last(static_cast<std::size_t>(width_) * n, 0.0);
+  int failed = 0;
+  if (rank == 0) {  // One rank calculates and the others take its bits: decisions must be the same everywhere.
+    ritz.vectors.resize(n * n);
+    for (int j = 0; j < size_; ++j) {
+      for (int i = 0; i < size_; ++i) ritz.vectors[static_cast<std::size_t>(j) * n + static_cast<std::size_t>(i)] = t(i, j);
+    }
+    PetscBLASInt size = size_;
+    PetscBLASInt info = 0;
+    PetscBLASInt work_size = 1 + 6 * size + 2 * size * size;
+    PetscBLASInt integers = 3 + 5 * size;
+    Small work(static_cast<std::size_t>(work_size));
+    std::vector<PetscBLASInt> integer_work(static_cast<std::size_t>(integers));
+    dsyevd_("V", "L", &size, ritz.vectors.data(), &size, ritz.theta.data(), work.data(), &work_size, integer_work.data(), &integers, &info);
+    failed = info;
+    for (std::size_t i = 0; i < n; ++i)
+      std::copy_n(ritz.vectors.data() + i * n + n - static_cast<std::size_t>(width_), width_,
+                  last.data() + i * static_cast<std::size_t>(width_));
+  }
+  MPI_Bcast(&failed, 1, MPI_INT, 0, comm_);
+  if (failed != 0) check(PETSC_ERR_LIB);
+  MPI_Bcast(ritz.theta.data(), size_, MPI_DOUBLE, 0, comm_);
+  MPI_Bcast(last.data(), static_cast<int>(last.size()), MPI_DOUBLE, 0, comm_);
+  ritz.error.assign(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    double square = 0;
+    for (int k = 0; k < next_width_; ++k) {
+      double sum = 0;
+      for (int j = 0; j < width_; ++j)
+        sum += coupling_[static_cast<std::size_t>(j * next_width_ + k)] *
+               last[i * static_cast<std::size_t>(width_) + static_cast<std::size_t>(j)];
+      square += sum * sum;
+    }
+    ritz.error[i] = std::sqrt(square);  // so far the residual
+  }
+  calc_errors(ritz);
+  return ritz;
+}
+
+// From residuals to what the convergence test makes of them, the order of the wanted ones, and whether they are all there.
+void Iteration::calc_errors(Ritz& ritz) const {
+  const std::size_t n = ritz.theta.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double theta = ritz.theta[i];
+    const double residual = ritz.error[i];
+    PetscReal error = 0;
+    check((*eps_->converged)(eps_, theta, 0, residual, &error, eps_->convergedctx));
+    double gap = std::numeric_limits<double>::infinity();
+    for (std::size_t k = i; k > 0; --k) {
+      gap = theta - ritz.theta[k - 1];
+      if (gap > kSame * std::abs(theta)) break;
+    }
+    for (std::size_t k = i + 1; k < n; ++k) {
+      if (ritz.theta[k] - theta <= kSame * std::abs(theta)) continue;
+      gap = std::min(gap, ritz.theta[k] - theta);
+      break;
+    }
+    const double allowed = std::max(kAngle * gap, kSmallest * std::abs(theta));
+    ritz.error[i] = std::max(error, residual / allowed * eps_->tol);
+  }
+  Small lambda = ritz.theta;
+  Small imaginary(n, 0.0);
+  check(STBackTransform(eps_->st, static_cast<PetscInt>(n), lambda.data(), imaginary.data()));
+  choose_wanted(ritz, lambda);
+}
+
+void Iteration::choose_wanted(Ritz& ritz, const Small& lambda) const {
+  const std::size_t n = lambda.size();
+  ritz.order.resize(n);
+  std::iota(ritz.order.begin(), ritz.order.end(), 0);
+  const auto is_converged = [&](int i) { return ritz.error[static_cast<std::size_t>(i)] <= eps_->tol; };
+  const auto wanted = static_cast<std::size_t>(eps_->nev);
+  if (eps_->which != EPS_ALL) {
+    std::stable_sort(ritz.order.begin(), ritz.order.end(), [&](int a, int b) {
+      PetscInt result = 0;
+      check((*eps_->sc->comparison)(lambda[static_cast<std::size_t>(a)], 0, lambda[static_cast<std::size_t>(b)], 0, &result,
+                                    eps_->sc->comparisonctx));
+      return result < 0;
+    });
+    ritz.converged = static_cast<std::size_t>(std::find_if_not(ritz.order.begin(), ritz.order.end(), is_converged) - ritz.order.begin());
+    ritz.done = ritz.converged >= wanted;
+    return;
+  }
+  const auto is_inside = [&](int i) {
+    const double x = lambda[static_cast<std::size_t>(i)];
+    return x >= eps_->inta && x <= eps_->intb;
+  };
+  // Converged ones of the interval, the others of the interval, those beyond it by their nearness to the shift.
+  const auto rank = [&](int i) { return is_inside(i) ? (is_converged(i) ? 0 : 1) : 2; };
+  std::stable_sort(ritz.order.begin(), ritz.order.end(), [&](int a, int b) {
+    if (rank(a) != rank(b)) return rank(a) < rank(b);
+    return rank(a) == 2 && std::abs(ritz.theta[static_cast<std::size_t>(a)]) > std::abs(ritz.theta[static_cast<std::size_t>(b)]);
+  });
+  ritz.converged = static_cast<std::size_t>(std::count_if(ritz.order.begin(), ritz.order.end(), [&](int i) { return rank(i) == 0; }));
+  const auto inside = static_cast<std::size_t>(std::count_if(ritz.order.begin(), ritz.order.end(), is_inside));
+  // The iteration has seen past the interval when something beyond its farther end has settled.
+  PetscScalar sigma = 0;
+  check(STGetShift(eps_->st, &sigma));
+  const double reach = std::max(eps_->intb - sigma, sigma - eps_->inta);
+  const bool sees_past = std::any_of(ritz.order.begin(), ritz.order.end(), [&](int i) {
+    const auto at = static_cast<std::size_t>(i);
+    return !is_inside(i) && std::abs(lambda[at] - sigma) > reach && ritz.error[at] <= kSeen;
+  });
+  ritz.done = ritz.converged >= wanted || (inside == ritz.converged && sees_past);
+}
+
+void Iteration::share_vectors(Ritz& ritz) const {
+  ritz.vectors.resize(ritz.theta.size() * ritz.theta.size());
+  MPI_Bcast(ritz.vectors.data(), static_cast<int>(ritz.vectors.size()), MPI_DOUBLE, 0, comm_);
+}
+
+Small Iteration::pick_vectors(const Ritz& ritz, std::size_t count) const {
+  const std::size_t n = ritz.theta.size();
+  Small picked(n * count);
+  for (std::size_t j = 0; j < count; ++j)
+    std::copy_n(ritz.vectors.data() + static_cast<std::size_t>(ritz.order[j]) * n, n, picked.data() + j * n);
+  return picked;
+}
+
+// The next look at the Ritz pairs: when the wanted ones should be there, going by how they came so far.
+void Iteration::plan_check(const Ritz& ritz) {
+  const auto wanted = static_cast<double>(eps_->nev);
+  const auto converged = static_cast<double>(ritz.converged);
+  double ahead = 4.0 * block_;
+  if (ritz.converged > last_converged_) {
+    const double rate = (converged - static_cast<double>(last_converged_)) / (size_ - last_size_);
+    ahead = std::min(ahead, (wanted - converged) / rate * 0.7);
+  }
+  last_converged_ = ritz.converged;
+  last_size_ = size_;
+  next_check_ = size_ + std::max(block_, static_cast<int>(ahead));
+}
+
+bool Iteration::report(const Ritz& ritz) {
+  const std::size_t n = ritz.theta.size();
+  eps_->nconv = static_cast<PetscInt>(std::min(ritz.converged, n));
+  for (std::size_t j = 0; j < n; ++j) {
+    eps_->eigr[j] = ritz.theta[static_cast<std::size_t>(ritz.order[j])];
+    eps_->eigi[j] = 0;
+    eps_->errest[j] = ritz.error[static_cast<std::size_t>(ritz.order[j])];
+  }
+  const PetscInt nev = eps_->which == EPS_ALL && !ritz.done ? std::max(eps_->nev, eps_->nconv + 1) : eps_->nev;
+  check((*eps_->stopping)(eps_, eps_->its, eps_->max_it, eps_->nconv, nev, &eps_->reason, eps_->stoppingctx));
+  if (eps_->reason == EPS_CONVERGED_ITERATING && ritz.done) eps_->reason = EPS_CONVERGED_TOL;
+  check(EPSMonitor(eps_, eps_->its, eps_->nconv, eps_->eigr, eps_->eigi, eps_->errest, static_cast<PetscInt>(n)));
+  return eps_->reason != EPS_CONVERGED_ITERATING;
+}
+
+// Keeps the best Ritz vectors; the next block follows them.
+void Iteration::restart(Ritz& ritz) {
+  share_vectors(ritz);
+  const int most = size_ - 2 * block_;
+  const int kept =
+      std::clamp(std::max(static_cast<int>(ritz.converged) + block_, (static_cast<int>(eps_->nev) + size_) / 2), 1, std::max(most, 1));
+  const auto n = static_cast<std::size_t>(size_);
+  const Small picked = pick_vectors(ritz, static_cast<std::size_t>(kept));
+  combine_columns(basis_.part(0, size_), picked.data(), kept);
+  Small coupling(static_cast<std::size_t>(next_width_) * static_cast<std::size_t>(kept), 0.0);
+  for (int j = 0; j < kept; ++j) {
+    const double* last = picked.data() + static_cast<std::size_t>(j) * n + n - static_cast<std::size_t>(width_);
+    for (int k = 0; k < next_width_; ++k) {
+      for (int i = 0; i < width_; ++i)
+        coupling[static_cast<std::size_t>(j * next_width_ + k)] += coupling_[static_cast<std::size_t>(i * next_width_ + k)] * last[i];
+    }
+  }
+  std::fill(t_.begin(), t_.end(), 0.0);
+  for (int j = 0; j < kept; ++j) t(j, j) = ritz.theta[static_cast<std::size_t>(ritz.order[static_cast<std::size_t>(j)])];
+  coupling_ = coupling;
+  size_ = width_ = kept;
+  last_size_ = size_;
+}
+
+void Iteration::finish(Ritz& ritz) {
+  share_vectors(ritz);
+  const auto count = static_cast<std::size_t>(eps_->nconv);
+  combine_columns(basis_.part(0, size_), pick_vectors(ritz, count).data(), static_cast<int>(count));
+}
+
+void Iteration::run() {
+  start();
+  next_check_ = std::min(static_cast<int>(1.3 * static_cast<double>(eps_->nev)) + 2 * block_, room_);
+  while (true) {
+    const bool goes_on = step();
+    ++eps_->its;
+    const bool is_full = size_ + next_width_ > room_;
+    if (!goes_on || is_full || size_ >= next_check_ || eps_->its >= eps_->max_it) {
+      Ritz ritz = calc_ritz();
+      if (!goes_on) ritz.done = true;
+      if (report(ritz)) {
+        finish(ritz);
+        break;
+      }
+      if (is_full) restart(ritz);
+      plan_check(ritz);
+    }
+    for (int j = 0; j < width_; ++j) {
+      for (int i = 0; i < next_width_; ++i) {
+        t(size_ + i, size_ - width_ + j) = t(size_ - width_ + j, size_ + i) = coupling_[static_cast<std::size_t>(j * next_width_ + i)];
+      }
+    }
+    for (int j = 0; j < next_width_; ++j) std::copy_n(w_.column(j), w_.rows, basis_.column(size_ + j));
+    previous_ = size_ - width_;
+    size_ += next_width_;
+    width_ = next_width_;
+  }
+  PetscScalar* array = everything_.values;
+  check(BVRestoreArray(eps_->V, &array));
+}
+
+// ---- what SLEPc calls; exceptions become PETSc's errors with the same words.
+
+template <typename Work>
+PetscErrorCode guard(Work&& work) {
+  try {
+    work();
+  } catch (const std::bad_alloc&) {
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "out of memory");
+  } catch (const std::exception& error) {
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_LIB, "%s", error.what());
+  }
+  return 0;
+}
+
+PetscErrorCode set_up(EPS eps) {
+  EPSCheckHermitianDefinite(eps);
+  EPSCheckUnsupported(eps,
+                      EPS_FEATURE_ARBITRARY | EPS_FEATURE_REGION | EPS_FEATURE_EXTRACTION | EPS_FEATURE_TWOSIDED | EPS_FEATURE_BALANCE);
+  return guard([&] {
+    Settings& settings = get_settings(eps);
+    if (settings.block == PETSC_DEFAULT) settings.block = kDefaultBlock;
+    if (eps->which == 0) {
+      PetscBool inverts = PETSC_FALSE;
+      check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps->st), STSINVERT, &inverts));
+      eps->which = inverts == PETSC_TRUE ? EPS_TARGET_MAGNITUDE : EPS_LARGEST_MAGNITUDE;
+    }
+    if (eps->ncv == PETSC_DEFAULT) eps->ncv = std::min(eps->n, 2 * eps->nev + 8 * settings.block);
+    eps->ncv = std::min(eps->n, std::max(eps->ncv, std::min(eps->n, eps->nev + 3 * settings.block)));
+    if (eps->mpd == PETSC_DEFAULT) eps->mpd = eps->ncv;
+    if (eps->max_it == PETSC_DEFAULT) eps->max_it = std::max<PetscInt>(200, 20 * eps->ncv / settings.block);
+    check(EPSAllocateSolution(eps, 0));
+    check(EPS_SetInnerProduct(eps));
+  });
+}
+
+PetscErrorCode set_up_sort(EPS eps) {
+  switch (eps->which) {
+    case EPS_LARGEST_MAGNITUDE:
+      eps->sc->comparison = SlepcCompareLargestMagnitude;
+      break;
+    case EPS_SMALLEST_MAGNITUDE:
+      eps->sc->comparison = SlepcCompareSmallestMagnitude;
+      break;
+    case EPS_LARGEST_REAL:
+      eps->sc->comparison = SlepcCompareLargestReal;
+      break;
+    case EPS_TARGET_MAGNITUDE:
+      eps->sc->comparison = SlepcCompareTargetMagnitude;
+      break;
+    case EPS_TARGET_REAL:
+      eps->sc->comparison = SlepcCompareTargetReal;
+      break;
+    default:
+      eps->sc->comparison = SlepcCompareSmallestReal;
+  }
+  eps->sc->comparisonctx = &eps->target;
+  eps->sc->map = nullptr;
+  eps->sc->mapobj = nullptr;
+  return 0;
+}
+
+PetscErrorCode solve(EPS eps) {
+  return guard([&] { Iteration(eps).run(); });
+}
+
+PetscErrorCode transform_back(EPS eps) { return STBackTransform(eps->st, eps->nconv, eps->eigr, eps->eigi); }
+
+PetscErrorCode set_from_options(EPS eps, PetscOptionItems* PetscOptionsObject) {
+  PetscOptionsHeadBegin(PetscOptionsObject, "EPS block Lanczos options");
+  Settings& settings = get_settings(eps);
+  PetscInt block = settings.block;
+  PetscCall(PetscOptionsInt("-eps_blocklanczos_block_size", "Columns per block", "set_block_size", block, &block, nullptr));
+  PetscOptionsHeadEnd();
+  return set_block_size(eps, block);
+}
+
+PetscErrorCode view_settings(EPS eps, PetscViewer viewer) {
+  return PetscViewerASCIIPrintf(viewer, "  block Lanczos: blocks of %d columns, basis of %d\n", static_cast<int>(get_settings(eps).block),
+                                static_cast<int>(eps->ncv));
+}
+
+PetscErrorCode destroy(EPS eps) {
+  PetscCall(MatDestroy(&get_settings(eps).locked));
+  delete static_cast<Settings*>(eps->data);
+  eps->data = nullptr;
+  return 0;
+}
+
+PetscErrorCode set_default_transformation(EPS eps) {
+  const char* type = nullptr;
+  PetscCall(STGetType(eps->st, &type));
+  if (type == nullptr) PetscCall(STSetType(eps->st, STSINVERT));
+  return 0;
+}
+
+PetscErrorCode create(EPS eps) {
+  eps->data = new Settings;
+  eps->useds = PETSC_FALSE;
+  eps->categ = EPS_CATEGORY_KRYLOV;
+  eps->ops->solve = solve;
+  eps->ops->setup = set_up;
+  eps->ops->setupsort = set_up_sort;
+  eps->ops->setfromoptions = set_from_options;
+  eps->ops->destroy = destroy;
+  eps->ops->view = view_settings;
+  eps->ops->backtransform = transform_back;
+  eps->ops->setdefaultst = set_default_transformation;
+  return 0;
+}
+
+}  // namespace
+
+PetscErrorCode register_block_lanczos() { return EPSRegister(kBlockLanczosType, create); }
+
+PetscErrorCode set_block_size(EPS eps, PetscInt columns) {
+  PetscBool is_ours = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_ours));
+  if (is_ours == PETSC_FALSE) return 0;
+  if (columns != PETSC_DEFAULT && columns < 1)
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "blocks of %d columns", static_cast<int>(columns));
+  get_settings(eps).block = columns;
+  eps->state = EPS_STATE_INITIAL;
+  return 0;
+}
+
+PetscErrorCode set_locked(EPS eps, Mat columns) {
+  PetscBool is_ours = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_ours));
+  if (is_ours == PETSC_FALSE) return 0;
+  if (columns != nullptr) PetscCall(PetscObjectReference(reinterpret_cast<PetscObject>(columns)));
+  PetscCall(MatDestroy(&get_settings(eps).locked));
+  get_settings(eps).locked = columns;
+  return 0;
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,137 @@
+// Method:     In the span of a cluster Phi the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with smooth weights w_d of no symmetry,
+//             has eigenvectors that depend on the span alone. Phi times these, by ascending eigenvalue, is the basis. If two eigenvalues of
+//             one form nearly coincide, another form is taken: the first of a fixed list that parts them well, or the best of the list.
+// Source:     Stewart, Sun, Matrix perturbation theory, 1990, chapter V: an eigenvector moves by the perturbation over the gap.
+// Deviations: none.
+#include "precompute/eigen/canonical.hpp"
+
+#include <petscblaslapack.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "precompute/eigen/local_columns.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+
+constexpr int kForms = 12;
+constexpr double kEqual = 0.25;      // Of the tolerance: a mixture of such modes has residuals below it.
+constexpr double kLoosest = 2.5e-9;  // Not beyond this, however loose the tolerance,
+constexpr double kTightest = 1e-12;  // and not below rounding.
+constexpr double kGoodGap = 0.05;    // over the square of the size: the eigenvalues of a cluster crowd.
+
+// Where the bodies are: centre and half the diagonal, the same for every partition.
+struct Box {
+  Vec3 centre{};
+  double size = 1;
+};
+
+Box find_box(MPI_Comm comm, const std::vector<Vec3>& positions) {
+  std::array<double, 6> ends;  // largest x, y, z and largest -x, -y, -z
+  ends.fill(-std::numeric_limits<double>::infinity());
+  for (const Vec3& x : positions) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      ends[d] = std::max(ends[d], x[d]);
+      ends[3 + d] = std::max(ends[3 + d], -x[d]);
+    }
+  }
+  MPI_Allreduce(MPI_IN_PLACE, ends.data(), 6, MPI_DOUBLE, MPI_MAX, comm);
+  Box box;
+  double square = 0;
+  for (std::size_t d = 0; d < 3; ++d) {
+    box.centre[d] = 0.5 * (ends[d] - ends[3 + d]);
+    square += std::pow(0.5 * (ends[d] + ends[3 + d]), 2);
+  }
+  if (square > 0) box.size = std::sqrt(square);
+  return box;
+}
+
+// The weight of a displacement at a node, of no symmetry in place, direction and body. Frequencies and phases are multiples of irrational
+// numbers, so that no two forms agree.
+double calc_weight(const Box& box, const Vec3& x, std::int32_t component, std::size_t direction, int form) {
+  const double f = 1.0 + form;
+  const auto d = static_cast<double>(direction);
+  const std::array<double, 3> wave{std::fmod(1.3247179572 * f, 2.0) + 0.7, std::fmod(1.7548776662 * f, 2.0) + 0.9,
+                                   std::fmod(1.4655712319 * f, 2.0) + 0.8};
+  double phase = 0.6180339887 * f + 1.2360679775 * d + 0.8191725134 * component;
+  for (std::size_t i = 0; i < 3; ++i) phase += wave[i] * (x[i] - box.centre[i]) / box.size;
+  return std::sin(phase) + 0.31 * std::cos(1.8392867552 * phase + 0.5 * d);
+}
+
+struct Basis {
+  std::vector<double> rotation;  // (count, count), columns by ascending eigenvalue
+  double gap = 0;                // smallest distance of two eigenvalues
+};
+
+Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box& box, const Columns& phi, int form) {
+  const auto count = static_cast<std::size_t>(phi.count);
+  std::vector<double> weight(static_cast<std::size_t>(phi.rows));
+  for (std::size_t i = 0; i < weight.size(); ++i)
+    weight[i] = operators.mass_diagonal[i] * calc_weight(box, nodes.position[i / 3], nodes.component[i / 3], i % 3, form);
+  std::vector<double> space(weight.size() * count);
+  const Columns weighted{space.data(), phi.rows, phi.rows, phi.count};
+  for (int j = 0; j < phi.count; ++j) {
+    for (std::size_t i = 0; i < weight.size(); ++i) weighted.column(j)[i] = weight[i] * phi.column(j)[i];
+  }
+  Basis basis;
+  basis.rotation.assign(count * count, 0.0);
+  multiply_transposed(phi, weighted, basis.rotation.data(), phi.count);
+  MPI_Allreduce(MPI_IN_PLACE, basis.rotation.data(), static_cast<int>(basis.rotation.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
+  PetscBLASInt size = phi.count;
+  PetscBLASInt room = 64 * size + 3 * size;
+  PetscBLASInt info = 0;
+  std::vector<double> values(count);
+  std::vector<double> work(static_cast<std::size_t>(room));
+  LAPACKsyev_("V", "L", &size, basis.rotation.data(), &size, values.data(), work.data(), &room, &info);
+  if (info != 0) throw SolveError("A cluster of equal modes has no canonical basis (LAPACK dsyev failed).");
+  MPI_Bcast(basis.rotation.data(), static_cast<int>(basis.rotation.size()), MPI_DOUBLE, 0, operators.comm);
+  MPI_Bcast(values.data(), phi.count, MPI_DOUBLE, 0, operators.comm);
+  basis.gap = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < count; ++i) basis.gap = std::min(basis.gap, values[i] - values[i - 1]);
+  return basis;
+}
+
+}  // namespace
+
+std::vector<Cluster> find_clusters(const std::vector<double>& lambda, const ModeErrors& errors, double tolerance) {
+  std::vector<Cluster> clusters;
+  const double equal = std::clamp(kEqual * tolerance, kTightest, kLoosest);
+  for (std::size_t j = 1; j < lambda.size(); ++j) {
+    const double open = std::max(equal, kEqual * std::min(errors.floor[j - 1], errors.floor[j]));
+    if (lambda[j] - lambda[j - 1] > open * lambda[j]) continue;
+    const auto at = static_cast<std::int64_t>(j);
+    if (clusters.empty() || clusters.back().first + clusters.back().count != at) clusters.push_back({at - 1, 1});
+    ++clusters.back().count;
+  }
+  return clusters;
+}
+
+void make_canonical(const Operators& operators, const NodeLayout& nodes, const std::vector<Cluster>& clusters, std::vector<double>& lambda,
+                    Mat shapes) {
+  if (clusters.empty()) return;
+  const Box box = find_box(operators.comm, nodes.position);
+  const LocalColumns access(shapes);
+  for (const Cluster& cluster : clusters) {
+    const Columns phi = access.view().part(static_cast<int>(cluster.first), static_cast<int>(cluster.count));
+    const double good = kGoodGap / static_cast<double>(cluster.count * cluster.count);
+    Basis best = calc_basis(operators, nodes, box, phi, 0);
+    for (int form = 1; form < kForms && best.gap < good; ++form) {
+      Basis other = calc_basis(operators, nodes, box, phi, form);
+      if (other.gap > best.gap) best = std::move(other);
+    }
+    combine_columns(phi, best.rotation.data(), phi.count);
+    const auto begin = lambda.begin() + cluster.first;
+    const double mean = std::accumulate(begin, begin + cluster.count, 0.0) / static_cast<double>(cluster.count);
+    std::fill(begin, begin + cluster.count, mean);
+  }
+}
+
+}  // namespace carillon::eigen

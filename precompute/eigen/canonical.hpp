@@ -1,0 +1,22 @@
+// A basis of modes that cannot be told apart by their frequencies.
+#pragma once
+
+#include <petscmat.h>
+
+#include <vector>
+
+#include "precompute/eigen/check_modes.hpp"
+#include "precompute/eigen/solve_modes.hpp"
+
+namespace carillon::eigen {
+
+/// Runs of modes whose neighbours agree in lambda to a quarter of the tolerance, or to what rounding of K leaves open (errors.floor).
+/// lambda: ascending. Not collective.
+std::vector<Cluster> find_clusters(const std::vector<double>& lambda, const ModeErrors& errors, double tolerance);
+
+/// Replaces the shapes of every cluster by the basis that makes a fixed quadratic form of the nodes' positions, masses and displacements
+/// diagonal, ascending: it depends on the span alone. All modes of a cluster get its mean lambda. Collective.
+void make_canonical(const Operators& operators, const NodeLayout& nodes, const std::vector<Cluster>& clusters, std::vector<double>& lambda,
+                    Mat shapes);
+
+}  // namespace carillon::eigen

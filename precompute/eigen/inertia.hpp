@@ -1,0 +1,58 @@
+// Counts of eigenvalues, and the factorisation they come from.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "precompute/eigen/shifted_factor.hpp"
+#include "precompute/eigen/solve_modes.hpp"
+
+namespace carillon::eigen {
+
+/// How many eigenvalues lie below lambda (scaled).
+struct Inertia {
+  double lambda = 0;
+  std::int64_t below = 0;
+};
+
+/// Factorises K - sigma M where it is asked to, with the solver that the options name, and remembers every count.
+class InertiaCounter {
+ public:
+  /// Problem, options, seconds and statistics must outlive it. to_hz: of a scaled lambda, for messages.
+  InertiaCounter(const Problem& problem, const Options& options, Seconds& seconds, FactorStatistics& statistics,
+                 std::function<double(double)> to_hz);
+
+  /// Factorises at lambda, or up to `reach` (relative) above it where lambda hits an eigenvalue, and counts. The factor is left there.
+  /// Throws SolveError when K - sigma M is singular all around, SystemError when memory does not suffice. Collective.
+  Inertia take(double lambda, double reach = 1e-6);
+
+  /// The factor of the last take.
+  ShiftedFactor& get_factor() { return *factor_; }
+  /// Frees the factor; the next take makes another. Collective.
+  void release() { factor_.reset(); }
+
+  const std::vector<Inertia>& get_taken() const { return taken_; }
+  /// Forgets counts that were taken too near an eigenvalue.
+  void forget(double lambda);
+  double get_worst_backward_error() const { return worst_backward_error_; }
+
+ private:
+  void make_factor();
+  bool try_factorise(double sigma);
+
+  const Problem& problem_;
+  const Options& options_;
+  Seconds& seconds_;
+  FactorStatistics& statistics_;
+  std::function<double(double)> to_hz_;
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  bool uses_mumps_ = false;
+  std::unique_ptr<ShiftedFactor> factor_;
+  std::vector<Inertia> taken_;
+  double worst_backward_error_ = 0;
+};
+
+}  // namespace carillon::eigen

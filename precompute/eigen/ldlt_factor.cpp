@@ -1,0 +1,37 @@
+#include <limits>
+
+#include "precompute/eigen/shifted_factor.hpp"
+#include "precompute/ldlt/factor.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+class LdltFactor final : public ShiftedFactor {
+ public:
+  LdltFactor(Mat stiffness, Mat mass) : factor_(stiffness, mass) {
+    MPI_Comm comm = MPI_COMM_NULL;
+    petsc::check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
+    MPI_Comm_rank(comm, &rank_);
+  }
+
+  bool factorise(double sigma) override { return factor_.factorise(sigma); }
+  void solve(double* x, std::ptrdiff_t stride, int columns) override { factor_.solve(x, petsc::to_petsc_int(stride), columns); }
+  std::int64_t get_negative_pivots() const override { return factor_.get_negative_pivots(); }
+  double get_backward_error() const override { return factor_.get_backward_error(); }
+  std::int64_t get_peak_bytes() const override { return factor_.get_analysis().ranks[static_cast<std::size_t>(rank_)].peak_bytes; }
+  std::string get_solver() const override { return "carillon L D L^T"; }
+  std::string get_ordering() const override { return "METIS nested dissection by rank, interfaces last"; }
+  std::int64_t get_entries() const override { return factor_.get_analysis().entries; }
+  double get_flops() const override { return factor_.get_analysis().flops; }
+
+ private:
+  ldlt::Factor factor_;
+  int rank_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<ShiftedFactor> make_ldlt_factor(Mat stiffness, Mat mass) { return std::make_unique<LdltFactor>(stiffness, mass); }
+
+}  // namespace carillon::eigen
