@@ -22,10 +22,16 @@ namespace carillon::slabs {
 
 using mesh::Vec3;
 
+/// Nodes to hold: those of a set, or those in a closed box {low, high}, as mesh::find_fixed_nodes finds them.
+struct Hold {
+  std::optional<std::string> node_set = std::nullopt;
+  std::optional<std::array<Vec3, 2>> box_m = std::nullopt;
+  std::string place = "";  // begins messages about it: "job.json:7"
+};
+
 struct Wish {
-  int order = 2;                                                 // of the elements to compute with, whatever the file has
-  std::optional<std::string> held_set = std::nullopt;            // hold the nodes of this set ...
-  std::optional<std::array<Vec3, 2>> held_box_m = std::nullopt;  // ... or all in this closed box {low, high}
+  int order = 2;  // of the elements to compute with, whatever the file has
+  std::vector<Hold> hold = {};
 };
 
 /// The boundary of the whole mesh; filled on rank 0 only. The same for every number of ranks, and the same as mesh::extract_boundary's.

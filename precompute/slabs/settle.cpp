@@ -1,7 +1,6 @@
-// Method: elements travel to their parts. Every rank tells the home of each node that it touches it; the home gives the node to that rank
-//   among them which owns the fewest so far (of the nodes of one rank alone, known to all beforehand, and this home's share of the seams),
-//   and answers with position and owner. Owners number their free nodes in ascending order and the homes pass the numbers on to the halos.
-//   Components: each rank joins its own nodes; the homes join what meets in one node; the pairs, which are few, go to all ranks.
+// Method: elements travel to their parts. Every rank tells the home of each node that it touches it; the home gives the node to the highest
+//   of them and answers with position and owner. Owners number their free nodes in ascending order and the homes pass the numbers on to the
+//   halos. Components: each rank joins its own nodes; the homes join what meets in one node; the pairs, which are few, go to all ranks.
 // Source: own.
 // Deviations: none.
 #include "precompute/slabs/settle.hpp"
@@ -74,44 +73,17 @@ struct NodeAnswer {
   std::int32_t is_held;
 };
 
-/// Owners of the nodes at home here. `arrived`: who touches them. Collective.
-std::vector<std::int32_t> find_owners(MPI_Comm comm, const Slab& slab, const Arrived<Touch>& arrived, std::vector<char>& is_shared) {
-  const int rank = get_rank(comm);
-  const auto ranks = static_cast<std::size_t>(get_size(comm));
-  std::vector<std::int32_t> owner;
-  std::vector<std::int64_t> owned;
-  std::vector<std::pair<std::size_t, int>> seam;  // place, rank
-  petsc::run_agreed(comm, [&] {
-    owner.assign(slab.nodes_m.size(), -1);
-    is_shared.assign(slab.nodes_m.size(), 0);
-    owned.assign(ranks, 0);
-    const auto for_each_touch = [&](auto&& visit) {
-      std::size_t i = 0;
-      for (std::size_t source = 0; source < ranks; ++source)
-        for (int k = 0; k < arrived.count[source]; ++k, ++i) visit(slab.find_place(arrived.items[i].node, rank), static_cast<int>(source));
-    };
-    for_each_touch([&](std::size_t place, int source) {
+/// Owners of the nodes at home here: the highest rank that touches them, as fem::distribute has it. `arrived`: who touches them.
+std::vector<std::int32_t> find_owners(int rank, const Slab& slab, const Arrived<Touch>& arrived, std::vector<char>& is_shared) {
+  std::vector<std::int32_t> owner(slab.nodes_m.size(), -1);
+  is_shared.assign(slab.nodes_m.size(), 0);
+  std::size_t i = 0;
+  for (std::size_t source = 0; source < arrived.count.size(); ++source)
+    for (int k = 0; k < arrived.count[source]; ++k, ++i) {
+      const std::size_t place = slab.find_place(arrived.items[i].node, rank);
       if (owner[place] >= 0) is_shared[place] = 1;
-      owner[place] = source;
-    });
-    for_each_touch([&](std::size_t place, int source) {
-      if (is_shared[place] != 0) seam.emplace_back(place, source);
-    });
-    std::sort(seam.begin(), seam.end());
-    for (std::size_t i = 0; i < owner.size(); ++i)
-      if (owner[i] >= 0 && is_shared[i] == 0) ++owned[static_cast<std::size_t>(owner[i])];
-  });
-  MPI_Allreduce(MPI_IN_PLACE, owned.data(), static_cast<int>(ranks), MPI_INT64_T, MPI_SUM, comm);
-  // What this home gives away counts as if every home did the same.
-  const auto homes = static_cast<std::int64_t>(ranks);
-  for (std::size_t i = 0; i < seam.size();) {
-    const std::size_t place = seam[i].first;
-    int best = seam[i].second;
-    for (; i < seam.size() && seam[i].first == place; ++i)
-      if (owned[static_cast<std::size_t>(seam[i].second)] < owned[static_cast<std::size_t>(best)]) best = seam[i].second;
-    owner[place] = best;
-    owned[static_cast<std::size_t>(best)] += homes;
-  }
+      owner[place] = static_cast<std::int32_t>(source);  // sources ascend
+    }
   return owner;
 }
 
@@ -324,10 +296,10 @@ fem::Distribution settle(MPI_Comm comm, const std::string& name, Slab& slab, con
       comm, touches, [&](const Touch& touch) { return slab.find_home(touch.node); }, &order);
   touches = {};
   std::vector<char> is_shared_at_home;
-  const auto owner = find_owners(comm, slab, arrived, is_shared_at_home);
   std::vector<NodeAnswer> replies;
   std::vector<std::pair<std::int32_t, std::int32_t>> links;
   petsc::run_agreed(comm, [&] {
+    const auto owner = find_owners(rank, slab, arrived, is_shared_at_home);
     std::vector<std::int32_t> group_at_home(slab.nodes_m.size(), -1);
     for (const Touch& touch : arrived.items) {
       const std::size_t i = slab.find_place(touch.node, rank);
@@ -350,7 +322,7 @@ fem::Distribution settle(MPI_Comm comm, const std::string& name, Slab& slab, con
     pieces.local = make_local(rank, slab.order, piece, nodes, on_seam);
   });
   number_rows(comm, name, slab, on_seam, pieces);
-  if (wish.held_set || wish.held_box_m) pieces.held_m = share_holding_points(comm, pieces.local, pieces.components);
+  if (!wish.hold.empty()) pieces.held_m = share_holding_points(comm, pieces.local, pieces.components);
   count_ranks(comm, pieces);
   slab.nodes_m = {};
   slab.held = {};

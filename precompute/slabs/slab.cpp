@@ -217,36 +217,69 @@ void read_nodes(const Source& source, const std::string& name, const Layout& lay
   }
 }
 
-/// Marks the nodes of the wished set: `NAME` is every node whose value in point data NAME is not 0, `NAME:N` those whose value is N.
-void read_held_set(const Source& source, const std::string& name, const Layout& layout, const Wish& wish, std::int64_t begin, Slab& slab) {
-  slab.held.assign(slab.nodes_m.size(), 0);
-  if (!wish.held_set) return;
-  const std::string& set = *wish.held_set;
-  const auto mark = [&](const Array& array, auto&& is_in) {
-    const auto values = source.read<std::int64_t>(array, begin, static_cast<std::int64_t>(slab.nodes_m.size()));
-    for (std::size_t i = 0; i < values.size(); ++i) slab.held[i] = is_in(values[i]) ? 1 : 0;
-  };
+std::string begin_message(const std::string& name, const Hold& hold) {
+  return hold.place.empty() ? name : fmt::format("{}: key 'fixed': {}", hold.place, name);
+}
+
+/// The array and the value of a node set: `NAME` is every node whose value in point data NAME is not 0 (then no value), `NAME:N` those
+/// whose value is N. Null if there is none.
+const Array* find_set(const Layout& layout, const std::string& set, std::optional<std::int64_t>& value) {
+  for (const Array& array : layout.point_data) {
+    if (set == array.name) return &array;
+    if (!set.starts_with(array.name + ":")) continue;
+    const std::string number = set.substr(array.name.size() + 1), digits = number.substr(number.starts_with("-") ? 1 : 0);
+    if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) continue;
+    value = std::stoll(number);
+    return &array;
+  }
+  return nullptr;
+}
+
+/// Marks the nodes of a set; returns how many are on this rank.
+std::int64_t read_held_set(const Source& source, const std::string& name, const Layout& layout, const Hold& hold, std::int64_t begin,
+                           Slab& slab) {
+  std::optional<std::int64_t> value;
+  if (const Array* array = find_set(layout, *hold.node_set, value)) {
+    const auto values = source.read<std::int64_t>(*array, begin, static_cast<std::int64_t>(slab.nodes_m.size()));
+    std::int64_t count = 0;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (value ? values[i] == *value : values[i] != 0) {
+        slab.held[i] = 1;
+        ++count;
+      }
+    return count;
+  }
+  const std::string start = begin_message(name, hold);
+  if (layout.point_data.empty())
+    throw InputError(
+        fmt::format("{}: the mesh has no node set '{}': it has none at all; add an integer array to its PointData, or give a box instead",
+                    start, *hold.node_set));
   std::vector<std::string> names;
+  std::string list;
   for (const Array& array : layout.point_data) {
     names.push_back(array.name);
-    if (set == array.name) return mark(array, [](std::int64_t value) { return value != 0; });
-    if (set.size() <= array.name.size() + 1 || set.compare(0, array.name.size() + 1, array.name + ":") != 0) continue;
-    const std::string number = set.substr(array.name.size() + 1);
-    for (const std::int64_t sign : {1, -1}) {
-      const std::string digits = sign < 0 && number[0] == '-' ? number.substr(1) : number;
-      if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) continue;
-      const std::int64_t wanted = (number[0] == '-' ? -1 : 1) * std::stoll(digits);
-      return mark(array, [wanted](std::int64_t value) { return value == wanted; });
-    }
+    if (names.size() <= 20) list += fmt::format("{}'{}'", list.empty() ? "" : ", ", array.name);
   }
-  if (names.empty())
-    throw InputError(fmt::format(
-        "{}: the mesh has no node set '{}': it has none at all; add an integer array to its PointData, or give a box", name, set));
-  std::string list;
-  for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), 20); ++i) list += fmt::format("{}'{}'", i == 0 ? "" : ", ", names[i]);
-  const std::string nearest = config::find_nearest(set, names);
-  throw InputError(fmt::format("{}: the mesh has no node set '{}'{}; it has {} (and with a value: '{}:1')", name, set,
+  const std::string nearest = config::find_nearest(*hold.node_set, names);
+  throw InputError(fmt::format("{}: the mesh has no node set '{}'{}; it has {} (or with a value: '{}:1')", start, *hold.node_set,
                                nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), list, names.front()));
+}
+
+/// Marks the nodes of all wished sets. Collective.
+void read_held_sets(MPI_Comm comm, const Source& source, const std::string& name, const Layout& layout, const Wish& wish,
+                    std::int64_t begin, Slab& slab) {
+  petsc::run_agreed(comm, [&] { slab.held.assign(slab.nodes_m.size(), 0); });
+  for (const Hold& hold : wish.hold) {
+    if (!hold.node_set) continue;
+    std::int64_t count = 0;
+    petsc::run_agreed(comm, [&] { count = read_held_set(source, name, layout, hold, begin, slab); });
+    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, comm);
+    petsc::run_agreed(comm, [&] {
+      if (count == 0)
+        throw InputError(
+            fmt::format("{}: the node set '{}' of the mesh holds no node; name another set", begin_message(name, hold), *hold.node_set));
+    });
+  }
 }
 
 /// Turns elements that are inside out, finds the flat ones, and keeps every element's centre.
@@ -409,8 +442,8 @@ void add_mid_nodes(MPI_Comm comm, Slab& slab, const std::string& name) {
   });
 }
 
-/// The box of the mesh, into the report, and the nodes of a wished box. Collective.
-void find_held_box(MPI_Comm comm, const std::string& name, const Wish& wish, Slab& slab, mesh::CheckReport& report) {
+/// The box of the mesh, into the report, and the nodes of the wished boxes. Collective.
+void find_held_boxes(MPI_Comm comm, const std::string& name, const Wish& wish, Slab& slab, mesh::CheckReport& report) {
   Vec3 low, high;
   low.fill(std::numeric_limits<double>::max());
   high.fill(std::numeric_limits<double>::lowest());
@@ -423,24 +456,30 @@ void find_held_box(MPI_Comm comm, const std::string& name, const Wish& wish, Sla
   MPI_Allreduce(MPI_IN_PLACE, high.data(), 3, MPI_DOUBLE, MPI_MAX, comm);
   report.box_low = low;
   report.box_high = high;
-  if (wish.held_box_m) {
-    const auto& [from, to] = *wish.held_box_m;
-    const double slack = 1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  const double slack = 1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  for (const Hold& hold : wish.hold) {
+    if (!hold.box_m) continue;
+    const auto& [from, to] = *hold.box_m;
+    std::int64_t count = 0;
     for (std::size_t i = 0; i < slab.nodes_m.size(); ++i) {
       bool is_in = true;
       for (std::size_t k = 0; k < 3; ++k) is_in = is_in && slab.nodes_m[i][k] >= from[k] - slack && slab.nodes_m[i][k] <= to[k] + slack;
-      slab.held[i] = is_in ? 1 : 0;
+      if (!is_in) continue;
+      slab.held[i] = 1;
+      ++count;
     }
+    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, comm);
+    petsc::run_agreed(comm, [&] {
+      for (std::size_t k = 0; k < 3; ++k)
+        if (!(from[k] <= to[k]))
+          throw InputError(fmt::format("{}: the box runs from {} to {} along {}; give the smaller corner first", begin_message(name, hold),
+                                       from[k], to[k], "xyz"[k]));
+      if (count == 0)
+        throw InputError(fmt::format(
+            "{}: no node lies in the box ({}, {}, {}) to ({}, {}, {}) m; the mesh spans ({}, {}, {}) to ({}, {}, {}) m",
+            begin_message(name, hold), from[0], from[1], from[2], to[0], to[1], to[2], low[0], low[1], low[2], high[0], high[1], high[2]));
+    });
   }
-  std::int64_t held = std::count(slab.held.begin(), slab.held.end(), 1);
-  MPI_Allreduce(MPI_IN_PLACE, &held, 1, MPI_INT64_T, MPI_SUM, comm);
-  petsc::run_agreed(comm, [&] {
-    if (wish.held_set && held == 0)
-      throw InputError(fmt::format("{}: the node set '{}' of the mesh holds no node; name another set", name, *wish.held_set));
-    if (wish.held_box_m && held == 0)
-      throw InputError(fmt::format("{}: no node lies in the box of 'fixed'; the mesh spans ({}, {}, {}) to ({}, {}, {}) m", name, low[0],
-                                   low[1], low[2], high[0], high[1], high[2]));
-  });
 }
 
 }  // namespace
@@ -467,8 +506,8 @@ Slab read_slab(MPI_Comm comm, const std::filesystem::path& file, const std::stri
                          end = slab.corners.first[static_cast<std::size_t>(rank) + 1];
       read_regions(*source, layout, first_element, slab);
       read_nodes(*source, name, layout, begin, end - begin, slab);
-      read_held_set(*source, name, layout, wish, begin, slab);
     });
+    read_held_sets(comm, *source, name, layout, wish, slab.corners.first[static_cast<std::size_t>(rank)], slab);
   }
   report.order = slab.order;
   std::vector<std::int64_t> flat;
@@ -494,7 +533,7 @@ Slab read_slab(MPI_Comm comm, const std::filesystem::path& file, const std::stri
     report.unreferenced = unused;
   }
   if (wish.order == 2 && slab.order == 1) add_mid_nodes(comm, slab, name);
-  find_held_box(comm, name, wish, slab, report);
+  find_held_boxes(comm, name, wish, slab, report);
   return slab;
 }
 
