@@ -10,6 +10,7 @@
 #include "precompute/io/refine_mesh.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/slabs/read_parallel.hpp"
 
 namespace carillon::io {
 namespace {
@@ -65,7 +66,41 @@ Setting get_setting(const spec::JobSpec& job) {
   return setting;
 }
 
+namespace {
+
+/// Every rank reads its part of the file.
+Body read_in_parallel(Run& run, const Setting& setting) {
+  Body body;
+  body.source = run.job.mesh.string();
+  run.stations.begin("read", body.source + ", by all ranks");
+  slabs::Wish wish;
+  wish.order = setting.element == spec::Element::T10 ? 2 : 1;
+  for (const spec::Fixed& fixed : run.job.fixed)
+    wish.hold.push_back({fixed.node_set, fixed.box_m, (fixed.place.empty() ? run.job.file.string() : fixed.place) + ": key 'fixed'"});
+  slabs::ParallelMesh mesh = slabs::read_parallel(run.comm, run.job.mesh, wish);
+  body.pieces = std::move(mesh.pieces);
+  body.check = std::move(mesh.check);
+  body.held_nodes = mesh.held_nodes;
+  body.surface = {std::move(mesh.boundary.vertices_m), std::move(mesh.boundary.triangles), std::move(mesh.boundary.row)};
+  for (const std::string& line : body.check.warnings) run.stations.warn(line);
+  run.stations.say(fmt::format("{} nodes, {} tetrahedra, {} component{}, {} nodes held", body.pieces.nodes, body.pieces.tets,
+                               body.pieces.components, body.pieces.components == 1 ? "" : "s", body.held_nodes));
+  run.stations.say(fem::describe(body.pieces.report));
+  run.stations.end();
+  return body;
+}
+
+bool is_parallel_format(const Run& run) {
+  int is_parallel = 0;
+  petsc::run_agreed(run.comm, [&] { is_parallel = run.rank == 0 && !run.job.body && slabs::is_parallel_format(run.job.mesh) ? 1 : 0; });
+  MPI_Bcast(&is_parallel, 1, MPI_INT, 0, run.comm);
+  return is_parallel == 1;
+}
+
+}  // namespace
+
 Body make_body(Run& run, const Setting& setting) {
+  if (is_parallel_format(run)) return read_in_parallel(run, setting);
   Body body;
   body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m}) : run.job.mesh.string();
   run.stations.begin("read", body.source);

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -78,6 +79,49 @@ std::string read_file(const fs::path& file, std::string_view what, std::uint64_t
   return bytes;
 }
 
+namespace {
+
+/// All signals wait while it lives.
+class SignalPause {
+ public:
+  SignalPause() {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~SignalPause() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalPause(const SignalPause&) = delete;
+  SignalPause& operator=(const SignalPause&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+/// A file in `folder` that has no name and is gone with its last descriptor; -1 where the file system has no such thing (NFS, FAT).
+int open_nameless(const fs::path& folder) {
+  if (::access("/proc/self/fd", X_OK) != 0) return -1;  // link_nameless() needs it
+  return ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+}
+
+/// Gives the bytes of a nameless file the name. 0 or errno.
+int link_nameless(int descriptor, const fs::path& name) {
+  const std::string self = fmt::format("/proc/self/fd/{}", descriptor);
+  return ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
+}
+
+/// 0 or errno.
+int write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t put = ::write(descriptor, bytes.data(), bytes.size());
+    if (put < 0 && errno == EINTR) continue;
+    if (put <= 0) return put < 0 ? errno : ENOSPC;
+    bytes.remove_prefix(static_cast<std::size_t>(put));
+  }
+  return 0;
+}
+
+}  // namespace
+
 void write_file(const fs::path& file, std::string_view bytes) {
   const fs::path temporary = make_temporary_name(file);
   const auto refuse = [&](int error) {
@@ -86,18 +130,20 @@ void write_file(const fs::path& file, std::string_view bytes) {
         fmt::format("{}: cannot write: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(error)));
   };
   ::unlink(temporary.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
-  Descriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  const int nameless = open_nameless(folder_of(file));
+  Descriptor fd(nameless >= 0 ? nameless : ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (fd.get() < 0) refuse(errno);
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t put = ::write(fd.get(), bytes.data() + done, bytes.size() - done);
-    if (put < 0 && errno == EINTR) continue;
-    if (put <= 0) refuse(put < 0 ? errno : ENOSPC);
-    done += static_cast<std::size_t>(put);
-  }
+  if (const int error = write_all(fd.get(), bytes); error != 0) refuse(error);
   if (::fsync(fd.get()) != 0) refuse(errno);
-  if (!fd.close()) refuse(errno);
-  if (::rename(temporary.c_str(), file.c_str()) != 0) refuse(errno);
+  {
+    // Whoever is killed by a signal that can be caught leaves no temporary name behind.
+    const SignalPause pause;
+    if (nameless >= 0) {
+      if (const int error = link_nameless(fd.get(), temporary); error != 0) refuse(error);
+    }
+    if (!fd.close()) refuse(errno);
+    if (::rename(temporary.c_str(), file.c_str()) != 0) refuse(errno);
+  }
   sync_folder(folder_of(file));
 }
 

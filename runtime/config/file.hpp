@@ -15,7 +15,8 @@ namespace carillon::config {
 std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes);
 
 /// Writes the bytes to a temporary file beside `file`, fsyncs, renames it to `file` and fsyncs the folder: readers see the old content
-/// or the new. Throws SystemError when the disk refuses; nothing is left behind then.
+/// or the new. The temporary file has no name until it is whole, where the file system can do that (not on NFS): a process that is ended in
+/// the middle leaves nothing. Throws SystemError when the disk refuses; nothing is left behind then.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// Throws InputError unless `file` can be written: its folder exists (or can be made) and takes files, and `file` itself is no folder or
