@@ -50,8 +50,11 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   return mesh;
 }
 
-/// CHOLMOD and MUMPS want the elimination order of the whole graph; the factorisation of this project orders by itself.
-bool wants_elimination_order(const spec::JobSpec& job) { return job.factorisation != spec::Factorisation::ldlt; }
+/// CHOLMOD and MUMPS want the elimination order of the whole graph, which costs rank 0 time and memory; the factorisation of this project
+/// orders by itself, and MUMPS does so with more fill where it has to stand in for it.
+bool wants_elimination_order(const spec::JobSpec& job) {
+  return job.factorisation == spec::Factorisation::mumps || job.factorisation == spec::Factorisation::cholmod;
+}
 
 }  // namespace
 

@@ -26,7 +26,7 @@ using mesh::Vec3;
 struct Hold {
   std::optional<std::string> node_set = std::nullopt;
   std::optional<std::array<Vec3, 2>> box_m = std::nullopt;
-  std::string place = "";  // begins messages about it: "job.json:7"
+  std::string place = "";  // begins messages about it: "job.json:7: key 'fixed'"
 };
 
 struct Wish {

@@ -218,7 +218,7 @@ void read_nodes(const Source& source, const std::string& name, const Layout& lay
 }
 
 std::string begin_message(const std::string& name, const Hold& hold) {
-  return hold.place.empty() ? name : fmt::format("{}: key 'fixed': {}", hold.place, name);
+  return hold.place.empty() ? name : fmt::format("{}: {}", hold.place, name);
 }
 
 /// The array and the value of a node set: `NAME` is every node whose value in point data NAME is not 0 (then no value), `NAME:N` those

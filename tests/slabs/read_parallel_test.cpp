@@ -315,7 +315,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"unknown_set",
                 [](mesh::TetMesh&) {},
                 "job.json:3: key 'fixed': ",
-                {.order = 1, .hold = {{.node_set = "clamp", .place = "job.json:3"}}}},
+                {.order = 1, .hold = {{.node_set = "clamp", .place = "job.json:3: key 'fixed'"}}}},
         BadCase{
             "empty_box", [](mesh::TetMesh&) {}, "no node lies in the box", {.order = 1, .hold = {{.box_m = Box{{{7, 7, 7}, {8, 8, 8}}}}}}},
         BadCase{"all_held", [](mesh::TetMesh&) {}, "holds every node", {.order = 1, .hold = {{.box_m = Box{{{-1, -1, -1}, {8, 8, 8}}}}}}}),
