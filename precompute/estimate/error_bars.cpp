@@ -171,7 +171,7 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
   bars.algebraic_cents = calc_algebraic_cents(comm, stiffness, mass, find_mass_bounds(comm, local, mass_kind), solution);
   Recovery recovery = make_recovery(comm, local, solids, material_of_tet);
   const std::vector<double> sums = calc_sums(comm, local, recovery, mass_kind, solution);
-  const Kind kind = local.order == 1 ? Kind::kT4 : is_curved(comm, local) ? Kind::kT10Curved : Kind::kT10;
+  bars.kind = local.order == 1 ? Kind::kT4 : is_curved(comm, local) ? Kind::kT10Curved : Kind::kT10;
   std::vector<double> cents;
   for (std::size_t m = 0; m < solution.lambda.size(); ++m) {
     const double* sum = &sums[m * kSums];
@@ -182,7 +182,7 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
     parts.geometry = sum[3];
     parts.geometry_noise = sum[4];
     bars.parts.push_back(parts);
-    cents.push_back(predict_cents(parts, kind));
+    cents.push_back(predict_cents(parts, bars.kind));
   }
   bars.discretisation_cents = widen_for_order(solution.lambda, cents);
   return bars;

@@ -30,6 +30,13 @@ struct Solution {
   double high_hz = 0.0;              // first and the last mode. high_hz: where the list was cut (max_modes), its last frequency
 };
 
+/// The kinds of mesh whose errors fall at different rates.
+enum class Kind {
+  kT4,         // interpolation h^2, lumping h^2, geometry h^2
+  kT10,        // straight sides: interpolation h^4, lumping h^2, geometry h^2
+  kT10Curved,  // mid nodes on the surface: interpolation h^4, lumping h^2, geometry h^4
+};
+
 /// Error bars, one entry a mode, the same on every rank. A bar b says that the true frequency of the k-th mode lies between
 /// f_k 2^(-b/1200) and f_k 2^(b/1200).
 struct ErrorBars {
@@ -49,6 +56,7 @@ struct ErrorBars {
     double geometry_noise = 0.0;  // how uncertain `geometry` is, >= 0
   };
   std::vector<Parts> parts;
+  Kind kind = Kind::kT4;  // of the mesh the parts come from
 };
 
 /// Calculates the error bars of all modes from K, M and the modes, in one pass over the elements.
@@ -60,13 +68,6 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
 
 /// The elasticity of an isotropic solid.
 Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
-
-/// The kinds of mesh whose errors fall at different rates.
-enum class Kind {
-  kT4,         // interpolation h^2, lumping h^2, geometry h^2
-  kT10,        // straight sides: interpolation h^4, lumping h^2, geometry h^2
-  kT10Curved,  // mid nodes on the surface: interpolation h^4, lumping h^2, geometry h^4
-};
 
 /// Predicts the discretisation bar [cents] of a mode on a mesh whose edges are `edge_ratio` times as long as those the parts come from,
 /// with the rates of `kind` (smooth modes; a held face with its singular rim converges slower, which the safety factor covers for ratios

@@ -21,12 +21,16 @@ Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double densi
 }
 
 double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio) {
-  constexpr double kSafety = 3.0, kMostOfEnergy = 0.9;
+  constexpr double kInterpolation = 2.0, kGeometry = 1.5, kNoise = 0.15, kShared = 0.7, kMostOfEnergy = 0.99;
   const double second = edge_ratio * edge_ratio, fourth = second * second;
-  const double interpolation = parts.interpolation * (kind == Kind::kT4 ? second : fourth);
-  const double geometry = (std::abs(parts.geometry) + parts.geometry_noise) * (kind == Kind::kT10Curved ? fourth : second);
-  const double share = std::min(interpolation, kMostOfEnergy);
-  return 600.0 * std::log2(1.0 + kSafety * (share / (1.0 - share) + std::abs(parts.lumping) * second + geometry));
+  const double share = std::min(parts.interpolation * (kind == Kind::kT4 ? second : fourth), kMostOfEnergy);
+  const double interpolation = share / (1.0 - share);  // of the true lambda, where `share` is of the computed one
+  const double lumping = std::abs(parts.lumping) * second;
+  const double geometry =
+      (kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise) * (kind == Kind::kT10Curved ? fourth : second);
+  // Interpolation raises lambda and lumping lowers it: what they share is not counted twice, but not trusted to cancel either.
+  const double both = kInterpolation * std::abs(interpolation - lumping) + kShared * std::min(interpolation, lumping);
+  return 600.0 * std::log2(1.0 + both + geometry);
 }
 
 }  // namespace carillon::estimate

@@ -47,8 +47,9 @@ int main(int argc, char** argv) {
                "body,set,element,fineness,unknowns,mode,freq_hz,true_hz,truth_cents,algebraic_cents,discretisation_cents,error_cents,"
                "interpolation,energy,lumping,geometry,geometry_magnitude\n");
   if (session.rank() == 0)
-    fmt::print("| body | set | element | unknowns | modes | largest error, cents | bars hold | median bar / error | solve, CPU s | bars, CPU s |\n"
-               "|---|---|---|---|---|---|---|---|---|---|\n");
+    fmt::print(
+        "| body | set | element | unknowns | modes | largest error, cents | bars hold | median bar / error | solve, CPU s | bars, CPU s |\n"
+        "|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Body& body : get_bodies()) {
     if (!wants(bodies, body.name)) continue;
     for (const MeshKind kind : {MeshKind::T4, MeshKind::T4Lumped, MeshKind::T10, MeshKind::T10Curved, MeshKind::T10Lumped}) {
@@ -61,9 +62,9 @@ int main(int argc, char** argv) {
         if (session.rank() != 0) continue;
         double largest = 0;
         for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) largest = std::max(largest, std::abs(outcome.error_cents(m)));
-        fmt::print("| {} | {} | {} | {} | {} | {:.3g} | {:.0f} % | {:.2g} | {:.2f} | {:.3f} |\n", body.name, body.training ? "training" : "test",
-                   describe(kind), outcome.unknowns, outcome.true_hz.size(), largest, 100 * outcome.coverage(), outcome.median_width(),
-                   outcome.solve_cpu_s, outcome.estimate_cpu_s);
+        fmt::print("| {} | {} | {} | {} | {} | {:.3g} | {:.0f} % | {:.2g} | {:.2f} | {:.3f} |\n", body.name,
+                   body.training ? "training" : "test", describe(kind), outcome.unknowns, outcome.true_hz.size(), largest,
+                   100 * outcome.coverage(), outcome.median_width(), outcome.solve_cpu_s, outcome.estimate_cpu_s);
         std::fflush(stdout);
       }
     }

@@ -1,0 +1,270 @@
+// What an error bar promises: it holds, it is no wider than it need be, and it does not depend on how many computed it.
+#include <gtest/gtest.h>
+#include <petscmat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/estimate/algebraic.hpp"
+#include "precompute/fem/assemble.hpp"
+#include "precompute/petsc/session.hpp"
+#include "tests/estimate/bodies.hpp"
+
+namespace carillon::tests {
+namespace {
+
+struct Case {
+  const char* body;
+  int fineness;
+  MeshKind kind;
+};
+
+void PrintTo(const Case& c, std::ostream* out) { *out << c.body << " " << c.fineness << " " << describe(c.kind); }
+
+class KnownBody : public testing::TestWithParam<Case> {};
+
+TEST_P(KnownBody, lies_within_its_bars_which_are_less_than_ten_times_too_wide_at_the_median) {
+  const auto& [name, fineness, kind] = GetParam();
+  const Outcome outcome = solve(PETSC_COMM_WORLD, get_body(name), fineness, kind);
+  ASSERT_EQ(outcome.freq_hz.size(), read_truth(name).size());
+  EXPECT_GE(outcome.coverage(), 0.95);
+  EXPECT_LT(outcome.median_width(), 10.0);
+  for (const auto& parts : outcome.bars.parts) EXPECT_NEAR(parts.energy, 1.0, 1e-3);  // the estimate sums the same energy as K does
+}
+
+INSTANTIATE_TEST_SUITE_P(ErrorBars, KnownBody,
+                         testing::Values(Case{"cube", 6, MeshKind::T4}, Case{"box", 5, MeshKind::T4Lumped},
+                                         Case{"cube-nu045", 3, MeshKind::T10}, Case{"bar", 4, MeshKind::T4}, Case{"plate", 2, MeshKind::T4},
+                                         Case{"slab", 2, MeshKind::T4}, Case{"cantilever", 2, MeshKind::T10},
+                                         Case{"ring", 1200, MeshKind::T4}, Case{"ring", 300, MeshKind::T10},
+                                         Case{"ring", 1200, MeshKind::T10Curved}, Case{"ball", 1200, MeshKind::T4},
+                                         Case{"cylinder-2", 4, MeshKind::T4}, Case{"cylinder-2", 2, MeshKind::T10Curved},
+                                         Case{"pipe", 500, MeshKind::T10Curved}));
+
+TEST(ErrorBars, of_a_bar_of_one_coarse_layer_of_T4_which_is_a_hundred_per_cent_sharp_still_hold) {
+  const Outcome outcome = solve(PETSC_COMM_WORLD, get_body("bar"), -1, MeshKind::T4);
+  double largest = 0;
+  for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
+    largest = std::max(largest, outcome.error_cents(m));
+    EXPECT_TRUE(outcome.contains(m)) << m;
+  }
+  EXPECT_GT(largest, 900);
+  EXPECT_LT(outcome.median_width(), 10.0);
+}
+
+class SameBars : public testing::TestWithParam<Case> {};
+
+TEST_P(SameBars, on_one_rank_and_on_all) {
+  // Bodies without repeated modes, whose shapes are unique. The cantilever's held nodes lie on the border of the ranks, too.
+  const auto& [name, fineness, kind] = GetParam();
+  const Outcome one = solve(PETSC_COMM_SELF, get_body(name), fineness, kind), all = solve(PETSC_COMM_WORLD, get_body(name), fineness, kind);
+  ASSERT_EQ(one.freq_hz.size(), all.freq_hz.size());
+  for (std::size_t m = 0; m < one.freq_hz.size(); ++m) {
+    EXPECT_NEAR(all.bars.discretisation_cents[m] / one.bars.discretisation_cents[m], 1, 1e-3) << m;
+    EXPECT_NEAR(all.bars.parts[m].interpolation / one.bars.parts[m].interpolation, 1, 1e-3) << m;
+    EXPECT_NEAR(all.bars.parts[m].lumping, one.bars.parts[m].lumping, 1e-6) << m;
+    EXPECT_NEAR(all.bars.parts[m].geometry, one.bars.parts[m].geometry, 1e-4 * one.bars.parts[m].geometry_noise + 1e-12) << m;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ErrorBars, SameBars,
+                         testing::Values(Case{"box", 5, MeshKind::T4Lumped}, Case{"cantilever", 2, MeshKind::T10},
+                                         Case{"cantilever", 4, MeshKind::T4}));
+
+/// A small body with its matrices and modes.
+struct Solved {
+  fem::Distribution pieces;
+  fem::System system;
+  eigen::Modes modes;
+  estimate::Solid solid;
+};
+
+Solved solve_by_hand(const std::string& name, int fineness, MeshKind kind, int max_modes) {
+  const Body& body = get_body(name);
+  std::vector<std::int32_t> held;
+  const mesh::TetMesh mesh = make_mesh(body, fineness, kind, held);
+  spec::Material material;
+  material.young_modulus_pa = body.young_modulus_pa;
+  material.poisson_ratio = body.poisson_ratio;
+  material.density_kg_m3 = body.density_kg_m3;
+  Solved solved;
+  solved.pieces = fem::distribute(PETSC_COMM_WORLD, mesh, held);
+  const auto& local = solved.pieces.local;
+  solved.system = fem::assemble(PETSC_COMM_WORLD, local, material, spec::Mass::consistent);
+  eigen::NodeLayout layout;
+  layout.position.assign(local.nodes_m.begin(), local.nodes_m.begin() + local.free_nodes);
+  layout.component.assign(local.component.begin(), local.component.begin() + local.free_nodes);
+  layout.component_count = solved.pieces.components;
+  layout.held = solved.pieces.held_m;
+  eigen::Options options;
+  options.high_hz = 1e7;
+  options.max_modes = max_modes;
+  solved.modes = eigen::solve_modes({solved.system.stiffness, solved.system.mass, layout}, options);
+  solved.solid = estimate::make_isotropic(body.young_modulus_pa, body.poisson_ratio, body.density_kg_m3);
+  return solved;
+}
+
+TEST(AlgebraicBar, contains_the_true_eigenvalue_of_modes_that_were_spoilt) {
+  Solved solved = solve_by_hand("box", -3, MeshKind::T10, 8);
+  const std::vector<double> lambda = solved.modes.lambda;
+  std::vector<double> spoilt, residual;
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise;
+  petsc::VecHandle x, kx, mx;
+  petsc::check(MatCreateVecs(solved.system.mass, x.out(), kx.out()));
+  petsc::check(VecDuplicate(x, mx.out()));
+  for (std::size_t m = 0; m < lambda.size(); ++m) {
+    PetscInt rows = 0;
+    petsc::check(VecGetLocalSize(x, &rows));
+    Vec column = nullptr;
+    petsc::check(MatDenseGetColumnVec(solved.modes.shapes, static_cast<PetscInt>(m), &column));
+    PetscScalar* values = nullptr;
+    petsc::check(VecGetArray(column, &values));
+    for (PetscInt i = 0; i < rows; ++i) values[i] *= 1 + 3e-6 * noise(random);
+    petsc::check(VecRestoreArray(column, &values));
+    petsc::check(MatMult(solved.system.mass, column, mx));
+    PetscScalar mass = 0, energy = 0;
+    petsc::check(VecDot(column, mx, &mass));
+    petsc::check(VecScale(column, 1 / std::sqrt(mass)));
+    petsc::check(VecScale(mx, 1 / std::sqrt(mass)));
+    petsc::check(MatMult(solved.system.stiffness, column, kx));
+    petsc::check(VecDot(column, kx, &energy));
+    petsc::check(VecAXPY(kx, -energy, mx));
+    PetscReal above = 0, below = 0;
+    petsc::check(VecNorm(kx, NORM_2, &above));
+    petsc::check(VecNorm(mx, NORM_2, &below));
+    spoilt.push_back(energy);
+    residual.push_back(above / (energy * below));
+    petsc::check(MatDenseRestoreColumnVec(solved.modes.shapes, static_cast<PetscInt>(m), &column));
+  }
+  const estimate::ErrorBars bars = estimate::calc_error_bars(
+      PETSC_COMM_WORLD, solved.pieces.local, solved.system.stiffness, solved.system.mass, std::span(&solved.solid, 1), {},
+      spec::Mass::consistent, {spoilt, residual, solved.modes.shapes, 20, std::sqrt(spoilt.back()) / (2 * std::numbers::pi)});
+  for (std::size_t m = 0; m < lambda.size(); ++m) {
+    const double error = 600 * std::abs(std::log2(spoilt[m] / lambda[m]));
+    EXPECT_GT(error, 1e-7) << "the test must spoil something";
+    EXPECT_LE(error, bars.algebraic_cents[m]) << m;
+    EXPECT_LT(bars.algebraic_cents[m], 200) << m;
+  }
+}
+
+TEST(AlgebraicBar, of_converged_modes_is_next_to_nothing) {
+  const Outcome outcome = solve(PETSC_COMM_WORLD, get_body("box"), 5, MeshKind::T4);
+  for (const double cents : outcome.bars.algebraic_cents) {
+    EXPECT_GT(cents, 0);  // rounding leaves something open always
+    EXPECT_LT(cents, 1e-2);
+  }
+}
+
+class MassBounds : public testing::TestWithParam<Case> {};
+
+TEST_P(MassBounds, enclose_the_mass_between_multiples_of_its_diagonal) {
+  const auto& [name, fineness, kind] = GetParam();
+  Solved solved = solve_by_hand(name, fineness, kind, 1);
+  const estimate::MassBounds bounds = estimate::find_mass_bounds(PETSC_COMM_WORLD, solved.pieces.local, spec::Mass::consistent);
+  EXPECT_GT(bounds.least, 0.02);
+  EXPECT_LT(bounds.greatest, 10);
+  // D^-1/2 M D^-1/2 by power iteration, from above and, shifted, from below.
+  petsc::VecHandle scale, x, y;
+  petsc::check(MatCreateVecs(solved.system.mass, scale.out(), x.out()));
+  petsc::check(VecDuplicate(x, y.out()));
+  petsc::check(MatGetDiagonal(solved.system.mass, scale));
+  petsc::check(VecSqrtAbs(scale));
+  petsc::check(VecReciprocal(scale));
+  petsc::check(MatDiagonalScale(solved.system.mass, scale, scale));
+  double extreme[2] = {0, 0};
+  for (int end = 0; end < 2; ++end) {
+    const double shift = end == 0 ? 0 : extreme[0];
+    petsc::check(VecSetRandom(x, nullptr));
+    for (int step = 0; step < 300; ++step) {
+      PetscReal norm = 0;
+      PetscScalar quotient = 0;
+      petsc::check(VecNormalize(x, &norm));
+      petsc::check(MatMult(solved.system.mass, x, y));
+      petsc::check(VecDot(x, y, &quotient));
+      extreme[end] = quotient;
+      petsc::check(VecAXPY(y, -shift, x));
+      petsc::check(VecCopy(y, x));
+    }
+  }
+  EXPECT_LE(extreme[0], bounds.greatest);
+  EXPECT_GE(extreme[1], bounds.least);
+  EXPECT_LT(bounds.greatest, 4 * extreme[0]);
+  EXPECT_GT(bounds.least, extreme[1] / 8);
+}
+
+INSTANTIATE_TEST_SUITE_P(ErrorBars, MassBounds,
+                         testing::Values(Case{"box", -3, MeshKind::T4}, Case{"box", -3, MeshKind::T10},
+                                         Case{"ball", 300, MeshKind::T10Curved}));
+
+TEST(GeometryPart, foretells_what_curving_the_sides_of_T10_changes) {
+  // The oracle: the same lattice with its mid nodes on the true cylinders, solved.
+  const Outcome straight = solve(PETSC_COMM_WORLD, get_body("cylinder-2"), 4, MeshKind::T10),
+                curved = solve(PETSC_COMM_WORLD, get_body("cylinder-2"), 4, MeshKind::T10Curved);
+  double largest = 0;
+  for (std::size_t m = 0; m < straight.freq_hz.size(); ++m)
+    largest = std::max(largest, std::abs(std::pow(curved.freq_hz[m] / straight.freq_hz[m], 2) - 1));
+  EXPECT_GT(largest, 0.005);
+  for (std::size_t m = 0; m < straight.freq_hz.size(); ++m) {
+    const double change = std::pow(curved.freq_hz[m] / straight.freq_hz[m], 2) - 1;
+    EXPECT_NEAR(straight.bars.parts[m].geometry, change, 0.25 * largest) << m;
+  }
+}
+
+TEST(GeometryPart, is_nothing_where_faces_are_flat) {
+  const Outcome outcome = solve(PETSC_COMM_WORLD, get_body("box"), 5, MeshKind::T4);
+  for (const auto& parts : outcome.bars.parts) EXPECT_EQ(parts.geometry_noise, 0);
+}
+
+TEST(Materials, are_smoothed_each_by_itself) {
+  // A bar of two materials, one ten times as stiff: strains jump at the interface, which T10 follow; the same energy comes out.
+  Solved solved = solve_by_hand("bar", -1, MeshKind::T10, 1);
+  const auto& local = solved.pieces.local;
+  std::vector<std::int32_t> material_of_tet;
+  for (std::int32_t e = 0; e < local.tet_count(); ++e) {
+    double x = 0;
+    for (int i = 0; i < 4; ++i) x += local.nodes_m[local.tets[10 * static_cast<std::size_t>(e) + i]][0] / 4;
+    material_of_tet.push_back(x < 0 ? 0 : 1);
+  }
+  // A stretch that is linear in each half, and exact there: not a mode, but the estimate may not see any error in it.
+  const std::vector<estimate::Solid> solids{estimate::make_isotropic(1e9, 0.0, 1000), estimate::make_isotropic(10e9, 0.0, 1000)};
+  PetscScalar* values = nullptr;
+  petsc::check(MatDenseGetArray(solved.modes.shapes, &values));
+  for (std::int32_t i = 0; i < local.free_nodes; ++i) {
+    const double x = local.nodes_m[i][0];
+    values[3 * i] = x < 0 ? 10 * x : x;
+    values[3 * i + 1] = values[3 * i + 2] = 0;
+  }
+  petsc::check(MatDenseRestoreArray(solved.modes.shapes, &values));
+  const std::vector<double> residual{1e-8};
+  const auto bars = estimate::calc_error_bars(PETSC_COMM_WORLD, local, solved.system.stiffness, solved.system.mass, solids, material_of_tet,
+                                              spec::Mass::consistent, {solved.modes.lambda, residual, solved.modes.shapes, 20, 1e6});
+  ASSERT_EQ(bars.parts.size(), 1U);
+  EXPECT_GT(bars.parts[0].energy, 0);
+  EXPECT_LT(bars.parts[0].interpolation, 1e-6 * bars.parts[0].energy);
+}
+
+TEST(Prediction, of_the_bars_on_a_finer_mesh_is_right_to_a_factor_of_two) {
+  const Outcome coarse = solve(PETSC_COMM_WORLD, get_body("cube"), 6, MeshKind::T4),
+                fine = solve(PETSC_COMM_WORLD, get_body("cube"), 10, MeshKind::T4);
+  for (std::size_t m = 0; m < coarse.freq_hz.size(); ++m) {
+    const double predicted = estimate::predict_cents(coarse.bars.parts[m], coarse.bars.kind, 0.6);
+    EXPECT_GT(predicted, fine.bars.discretisation_cents[m] / 2) << m;
+    EXPECT_LT(predicted, fine.bars.discretisation_cents[m] * 2) << m;
+  }
+}
+
+TEST(Arguments, that_do_not_fit_are_refused_on_every_rank) {
+  Solved solved = solve_by_hand("box", -3, MeshKind::T4, 2);
+  const std::vector<double> one{solved.modes.lambda[0]}, residual{1e-9};
+  EXPECT_THROW((void)estimate::calc_error_bars(PETSC_COMM_WORLD, solved.pieces.local, solved.system.stiffness, solved.system.mass,
+                                               std::span(&solved.solid, 1), {}, spec::Mass::consistent,
+                                               {one, residual, solved.modes.shapes, 20, 1e6}),
+               InputError);
+}
+
+}  // namespace
+}  // namespace carillon::tests
