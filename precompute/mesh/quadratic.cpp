@@ -13,6 +13,7 @@ TetMesh to_quadratic(const TetMesh& mesh) {
   fine.order = 2;
   fine.nodes = mesh.nodes;
   fine.regions = mesh.regions;
+  fine.region_names = mesh.region_names;
   fine.node_sets = mesh.node_sets;
   const std::size_t count = static_cast<std::size_t>(mesh.tet_count());
   fine.tets.resize(10 * count);
@@ -67,6 +68,7 @@ TetMesh to_linear(const TetMesh& mesh) {
   TetMesh coarse;
   coarse.order = 1;
   coarse.regions = mesh.regions;
+  coarse.region_names = mesh.region_names;
   std::vector<std::int32_t> number(mesh.nodes.size(), -1);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (std::size_t k = 0; k < 4; ++k) number[static_cast<std::size_t>(mesh.tet(e)[k])] = 0;

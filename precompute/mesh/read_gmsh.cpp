@@ -381,7 +381,10 @@ TetMesh GmshReader::read() {
       cursor_.fail(cursor_.place(), "the file ends without a section ${}; it was cut short: write or copy it again", needed);
   merge_repeated();
   name_groups();
-  return assemble_mesh(std::move(raw_), cursor_, cursor_);
+  TetMesh mesh = assemble_mesh(std::move(raw_), cursor_, cursor_);
+  for (const auto& [group, name] : names_)
+    if (group.first == 3) mesh.region_names[group.second] = name;
+  return mesh;
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ struct TetMesh {
   std::vector<Vec3> nodes;                                     // (N) [m]
   std::vector<std::int32_t> tets;                              // (E, 4) or (E, 10), zero-based
   std::vector<std::int32_t> regions;                           // (E), the file's region tag, 0 where it has none
+  std::map<std::int32_t, std::string> region_names;            // of the tags that the file names
   std::map<std::string, std::vector<std::int32_t>> node_sets;  // named sets of the file, ascending
 
   int nodes_per_tet() const { return order == 1 ? 4 : 10; }
