@@ -16,6 +16,10 @@ namespace {
 
 typedef double Vector __attribute__((vector_size(64)));
 
+/// Numbers of L to call from memory ahead of their use: the order of use inside a tile is not what the processor foresees.
+constexpr int kAhead = 1024;
+constexpr int kLine = 8;
+
 template <int kHeight, int kBegin, int kCount, int kUsed, int kStride, bool kSet>
 inline void multiply_rows(const double* tile, int n, const Vector* in, Vector* out) {
   Vector sum[kCount][kUsed];
@@ -25,6 +29,7 @@ inline void multiply_rows(const double* tile, int n, const Vector* in, Vector* o
     Vector row[kUsed];
     for (int v = 0; v < kUsed; ++v) row[v] = in[k * kStride + v];
     const double* a = tile + k * kHeight + kBegin;
+    for (int i = 0; i < kCount; i += kLine) __builtin_prefetch(a + kAhead + i);
     for (int i = 0; i < kCount; ++i)
       for (int v = 0; v < kUsed; ++v) sum[i][v] = kSet ? sum[i][v] + row[v] * a[i] : sum[i][v] - row[v] * a[i];
   }
@@ -61,6 +66,7 @@ inline void multiply_columns(const double* tile, const Vector* in, Vector* out) 
   Vector sum[kCount][kUsed];
   for (int k = 0; k < kCount; ++k)
     for (int v = 0; v < kUsed; ++v) sum[k][v] = out[k * kStride + v];
+  for (int i = 0; i < kHeight * kCount; i += kLine) __builtin_prefetch(tile + kAhead + i);
   for (int i = 0; i < kHeight; ++i) {
     Vector row[kUsed];
     for (int v = 0; v < kUsed; ++v) row[v] = in[i * kStride + v];

@@ -9,8 +9,6 @@
 // Deviations: no delayed pivots: a bad pivot shows in the backward error, which the caller is told.
 #include "precompute/ldlt/numeric.hpp"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -387,12 +385,11 @@ class Factoriser {
 
 Buffer::Buffer(std::int64_t count) : size_(count) {
   if (count == 0) return;
-  constexpr std::size_t kLargePage = std::size_t{2} << 20;
+  // Pages of the usual size: large ones made the solves 5 % faster, and the first factorisation up to twice as slow.
+  constexpr std::size_t kAlignment = 64;
   const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(count);
-  const std::size_t alignment = bytes >= kLargePage ? kLargePage : 64;
-  data_.reset(static_cast<double*>(std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment)));
+  data_.reset(static_cast<double*>(std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment)));
   if (data_ == nullptr) throw std::bad_alloc();
-  if (bytes >= kLargePage) (void)madvise(data_.get(), bytes, MADV_HUGEPAGE);
 }
 
 Numbers make_numbers(const Plan& plan) {

@@ -10,7 +10,7 @@
 
 namespace carillon::ldlt {
 
-/// Uninitialised numbers, aligned for vectors, on large pages where the system has them. Throws std::bad_alloc.
+/// Uninitialised numbers, aligned for vectors. Throws std::bad_alloc.
 class Buffer {
  public:
   Buffer() = default;
