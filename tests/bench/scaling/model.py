@@ -39,6 +39,9 @@ class Body:
     separator: float  # unknowns of the separator that halves the body
     surface_nodes: float
     file_bytes: float
+    shrink: float = 2 ** (-2 / 3)  # separators of a level over those of the level above
+    neighbours: float = 14  # ranks that a rank has to do with
+    groups: float = 12  # of interface nodes that a rank is near to
     mass_entries_per_row: float = 1.0  # 1: lumped
 
     def grow(self, unknowns, entries_power, flops_power):
@@ -63,7 +66,8 @@ class Rates:
     solve_gflops: float
     orthogonalise_gflops: float
     write_s_per_value: float  # surface node x mode
-    plan_s_per_group2: float  # order of the interface: seconds over (groups of interface nodes)^2, on every rank alike
+    plan_s: float  # order of the interface, on every rank alike: plan_s ranks^plan_power
+    plan_power: float
 
 
 def find_levels(ranks):
@@ -72,30 +76,28 @@ def find_levels(ranks):
 
 
 def find_fronts(body, ranks):
-    """[(pivots, order)] of the largest front of each level above the subtrees, root first. Halving a body's volume shrinks its separators by
-    2^(-2/3); a front other than the root has the separators around it for a border: in all about 2.5 times its pivots."""
-    return [(body.separator * 2 ** (-2 / 3 * level), body.separator * 2 ** (-2 / 3 * level) * (1.0 if level == 0 else 2.5)) for level in range(find_levels(ranks))]
+    """[(pivots, order)] of the largest front of each level above the subtrees, root first. A front other than the root has the separators around
+    it for a border: in all about 2.5 times its pivots."""
+    return [(body.separator * body.shrink**level, body.separator * body.shrink**level * (1.0 if level == 0 else 2.5)) for level in range(find_levels(ranks))]
 
 
 def find_interface_unknowns(body, ranks):
-    """Unknowns between the ranks: level l has 2^l separators of s 2^(-2l/3)."""
-    return min(sum(body.separator * 2 ** (level / 3) for level in range(find_levels(ranks))), body.unknowns)
+    """Unknowns between the ranks: level l has 2^l separators."""
+    return min(sum(body.separator * (2 * body.shrink) ** level for level in range(find_levels(ranks))), body.unknowns)
 
 
 def find_halo_unknowns(body, ranks):
-    """Unknowns that one rank gets from its neighbours for a product with K or M: the faces of its part. A part's area is that of a separator
-    of the level of p parts, on all its sides (three pairs; half of a shell's lie in the open)."""
-    return 0.0 if ranks == 1 else 3 * body.separator * ranks ** (-2 / 3)
+    """Unknowns that one rank gets from its neighbours for a product with K or M: every separator has two sides."""
+    return 0.0 if ranks == 1 else 2 * find_interface_unknowns(body, ranks) / ranks
 
 
-def count_meetings(ranks):
-    """Fronts of the interface at which one rank meets others: one for two ranks; a part inside a body has about 14 neighbours, and every set of
-    neighbours that share nodes is a front of its own."""
-    return 0 if ranks == 1 else min(ranks - 1, 14) + find_levels(ranks) - 1
+def count_meetings(body, ranks):
+    """Fronts of the interface at which one rank meets others: one for two ranks, in the end those of all groups near it."""
+    return 0 if ranks == 1 else min(ranks - 1, body.groups)
 
 
-PROJECTED_SHARE = 0.2  # of DGEMM's rate: what a dense symmetric eigensolver reaches
-PROJECTED_TRIES = 4  # convergence tests of a slice
+PROJECTED_SHARE = 0.4  # of DGEMM's rate: what a dense symmetric eigensolver reaches
+PROJECTED_TRIES = 1.7  # convergence tests of a slice, in units of the last: at 60, 80 and 100 % of the final basis
 
 
 def count_projected_flops(body):
@@ -144,7 +146,7 @@ class Model:
             out["read"] = (0.0, rates.read_s_per_unknown * n * slow, 0.0)
             out["partition"] = (0.0, rates.partition_s_per_unknown * n * slow, self.send_s(p - 1, body.file_bytes * (p - 1) / p))
         halo = find_halo_unknowns(body, p)
-        out["assemble"] = (rates.assemble_s_per_unknown * n / p * slow, 0.0, 0.0 if p == 1 else self.send_s(14, 8 * 9 * 15 * halo / 3))
+        out["assemble"] = (rates.assemble_s_per_unknown * n / p * slow, 0.0, 0.0 if p == 1 else self.send_s(body.neighbours, 8 * 9 * 15 * halo / 3))
 
         # Factor: the subtrees run side by side; above them one rank after the other, each front where it stands.
         fronts = find_fronts(body, p)
@@ -152,8 +154,7 @@ class Model:
         shared = body.factorisations * max(body.factor_flops - top, 0.0) / p / (1e9 * rates.factor_gflops * self.speed)
         path = sum(count_front_flops(*front) for front in fronts) / (1e9 * rates.front_gflops * self.speed)
         updates = sum(self.send_s(2, 8 * (order - pivots) ** 2 / 2) for pivots, order in fronts)
-        groups = 7.0 * p if p > 2 else p - 1.0  # sets of ranks that share nodes: a part has about 14 neighbours, each pair counts once
-        plan = rates.plan_s_per_group2 * groups**2 * slow
+        plan = 0.0 if p == 1 else rates.plan_s * p**rates.plan_power * slow
         out["factor"] = (shared, body.factorisations * path + plan, body.factorisations * updates)
 
         # Solve: L is read twice per block of columns; fronts on the path wait for one another twice, down and up.
@@ -162,7 +163,7 @@ class Model:
         shared = blocks * self.compute_s(4 * own * body.block, rates.solve_gflops, 16 * own)
         path_entries = sum(pivots * order - pivots**2 / 2 for pivots, order in fronts)
         path = blocks * self.compute_s(4 * path_entries * body.block, rates.solve_gflops, 16 * path_entries)
-        exchange = blocks * sum(2 * self.send_s(1, small * order) for _, order in fronts)
+        exchange = blocks * (2 * count_meetings(body, p) * machine.latency_s + sum(2 * self.send_s(1, small * order) for _, order in fronts))
         out["solve"] = (shared, path, exchange)
 
         # Orthogonalise: per block one recurrence and one pass against the whole basis (half of its final size on average), Ritz vectors at
@@ -171,7 +172,7 @@ class Model:
         shared = self.compute_s(flops / p, rates.orthogonalise_gflops, 0.0)
         projected = count_projected_flops(body) / (1e9 * PROJECTED_SHARE * rates.dense_gflops * self.speed)
         sums = blocks * (5 * self.reduce_s(p, small * body.block) + self.reduce_s(p, small * body.basis / 2)) + self.reduce_s(p, 8 * body.basis * body.modes)
-        products = 0.0 if body.mass_entries_per_row <= 1 or p == 1 else blocks * 4 * self.send_s(14, small * halo)
+        products = 0.0 if body.mass_entries_per_row <= 1 or p == 1 else blocks * 4 * self.send_s(body.neighbours, small * halo)
         out["orthogonalise"] = (shared, projected, sums + products)
 
         # Write: the surface's values go to rank 0, which packs and writes them.
@@ -190,12 +191,12 @@ class Model:
         return 8 * body.entries / ranks + 8 * body.unknowns * (body.basis + 3 * body.block) / ranks + 2 * largest
 
     def count_messages(self, ranks):
-        """{phase: (collective sums, point-to-point messages)} of a rank, for the check against counted ones."""
+        """{phase: (collective calls, point-to-point messages)} of a rank, for the check against counted ones."""
         p, body = ranks, self.body
         if p == 1:
             return {}
         blocks = body.right_sides / body.block
-        return {"orthogonalise": (6 * blocks, 0), "solve": (0, blocks * count_meetings(p)), "factor": (3 * body.factorisations, body.factorisations * count_meetings(p))}
+        return {"orthogonalise": (6 * blocks, 0), "solve": (0, blocks * count_meetings(body, p)), "factor": (3 * body.factorisations, body.factorisations * 2 * count_meetings(body, p))}
 
 
 def find_limit(model, phase, ranks):

@@ -12,7 +12,7 @@ import model
 BODY = model.Body(unknowns=1e5, modes=200, entries=3e7, factor_flops=3e10, factorisations=4, right_sides=480, block=16, basis=480, separator=900,
                   surface_nodes=2e4, file_bytes=8e6)
 RATES = model.Rates(dense_gflops=50, memory_gb_s=30, read_s_per_unknown=2e-6, partition_s_per_unknown=3e-6, assemble_s_per_unknown=4e-6, factor_gflops=25,
-                    front_gflops=30, solve_gflops=20, orthogonalise_gflops=25, write_s_per_value=2e-8, plan_s_per_group2=2.5e-7)
+                    front_gflops=30, solve_gflops=20, orthogonalise_gflops=25, write_s_per_value=2e-8, plan_s=1e-6, plan_power=2)
 HERE = model.Machine("here", dense_gflops=50, memory_gb_s=30, latency_s=5e-7, transfer_gb_s=6, disk_gb_s=1)
 
 
