@@ -20,6 +20,13 @@ struct BlockPivots {
   double smallest = 0;  // least magnitude of an eigenvalue of D (of 2x2 pivots: a lower bound)
 };
 
+/// Consecutive rows of a child that stay consecutive in its parent.
+struct Run {
+  int from = 0;
+  int to = 0;
+  int length = 0;
+};
+
 /// Right-hand sides are rows of 8 * vectors numbers, aligned to 64 bytes; vectors is 1 or 2.
 struct Kernels {
   /// out (m rows) -= A in (n rows); A (m, n) in tiles.
@@ -33,8 +40,11 @@ struct Kernels {
   /// Factorises a symmetric block, both triangles given, columns kMaxBlock apart, by rook pivoting; replaces it by T = L^-1 P with rows
   /// kMaxBlock apart. False if a pivot vanishes exactly or is not finite.
   bool (*factorise_block)(double* block, int n, BlockPivots& pivots);
-  /// target[to[i]] += source[i] for i < n.
-  void (*scatter_add)(const double* source, const std::int32_t* to, int n, double* target);
+  /// L = W D^-1 (m, n): W by columns m apart, L by columns `ld` apart and again in tiles. Raises growth to the largest magnitude in L.
+  void (*divide_and_pack)(const double* product, int m, int n, const BlockPivots& pivots, double* below, int ld, double* tiles,
+                          double& growth);
+  /// target[run.to + i] += source[run.from + i] for every run.
+  void (*add_runs)(const double* source, const Run* runs, int count, double* target);
   const char* name;
 };
 

@@ -267,13 +267,68 @@ bool factorise_block(double* block, int n, BlockPivots& pivots) {
   return true;
 }
 
-void scatter_add(const double* source, const std::int32_t* to, int n, double* target) {
-  for (int i = 0; i < n; ++i) target[to[i]] += source[i];
+typedef double Quad __attribute__((vector_size(32)));
+typedef double UnalignedQuad __attribute__((vector_size(32), aligned(8)));
+
+inline Quad load(const double* from) { return *reinterpret_cast<const UnalignedQuad*>(from); }
+inline void store(double* to, Quad value) { *reinterpret_cast<UnalignedQuad*>(to) = value; }
+inline Quad find_larger(Quad a, Quad b) {
+  const Quad size = b < 0 ? -b : b;
+  return size > a ? size : a;
+}
+
+/// One tile of full height, column after column.
+inline void divide_tile(const double* product, int m, int n, const BlockPivots& pivots, double* below, int ld, double* tile,
+                        Quad& largest) {
+  constexpr int kParts = kTileRows / 4;
+  for (int k = 0; k < n; ++k) {
+    const double* w = product + static_cast<long>(k) * m;
+    const double diagonal = pivots.diagonal[k];
+    Quad value[kParts];
+    for (int q = 0; q < kParts; ++q) value[q] = load(w + 4 * q) * diagonal;
+    if (pivots.off[k] != 0)
+      for (int q = 0; q < kParts; ++q) value[q] += load(w + m + 4 * q) * pivots.off[k];
+    if (k > 0 && pivots.off[k - 1] != 0)
+      for (int q = 0; q < kParts; ++q) value[q] += load(w - m + 4 * q) * pivots.off[k - 1];
+    for (int q = 0; q < kParts; ++q) {
+      largest = find_larger(largest, value[q]);
+      store(below + static_cast<long>(k) * ld + 4 * q, value[q]);
+      store(tile + k * kTileRows + 4 * q, value[q]);
+    }
+  }
+}
+
+void divide_and_pack(const double* product, int m, int n, const BlockPivots& pivots, double* below, int ld, double* tiles, double& growth) {
+  Quad largest{};
+  int i = 0;
+  for (; i + kTileRows <= m; i += kTileRows, tiles += kTileRows * n) divide_tile(product + i, m, n, pivots, below + i, ld, tiles, largest);
+  for (int q = 0; q < 4; ++q) growth = largest[q] > growth ? largest[q] : growth;
+  const int height = m - i;
+  for (int k = 0; k < n; ++k)
+    for (int r = i; r < m; ++r) {
+      const double* w = product + static_cast<long>(k) * m + r;
+      double value = w[0] * pivots.diagonal[k];
+      if (pivots.off[k] != 0) value += w[m] * pivots.off[k];
+      if (k > 0 && pivots.off[k - 1] != 0) value += w[-m] * pivots.off[k - 1];
+      growth = magnitude(value) > growth ? magnitude(value) : growth;
+      below[static_cast<long>(k) * ld + r] = value;
+      tiles[k * height + r - i] = value;
+    }
+}
+
+void add_runs(const double* source, const Run* runs, int count, double* target) {
+  for (int k = 0; k < count; ++k) {
+    const double* __restrict__ from = source + runs[k].from;
+    double* __restrict__ to = target + runs[k].to;
+    const int length = runs[k].length;
+    for (int i = 0; i < length; ++i) to[i] += from[i];
+  }
 }
 
 }  // namespace
 
 extern const Kernels kTable;
-const Kernels kTable{subtract_product, set_product, subtract_transposed, add_transposed, factorise_block, scatter_add, CARILLON_ISA_NAME};
+const Kernels kTable{subtract_product, set_product, subtract_transposed, add_transposed, factorise_block,
+                     divide_and_pack,  add_runs,    CARILLON_ISA_NAME};
 
 }  // namespace carillon::ldlt::CARILLON_ISA

@@ -194,35 +194,39 @@ class Factoriser {
     }
   }
 
-  /// Rows of a child in the front, and the same less the pivots.
+  /// Where a child's rows are in the front, as runs. Those that are pivots come first.
   void locate(const Ints& rows) {
-    to_columns_.clear();
-    to_update_.clear();
-    for (const std::int32_t node : rows)
-      for (int d = 0; d < 3; ++d) {
-        to_columns_.push_back(3 * where_[node] + d);
-        to_update_.push_back(3 * where_[node] + d - w_);
-      }
+    runs_.clear();
+    row_runs_.clear();
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const int from = 3 * static_cast<int>(i);
+      const int to = 3 * where_[rows[i]];
+      if (runs_.empty() || runs_.back().to + runs_.back().length != to) runs_.push_back({from, to, 0});
+      runs_.back().length += 3;
+      for (int d = 0; d < 3; ++d) row_runs_.push_back(static_cast<int>(runs_.size()) - 1);
+    }
   }
 
-  /// Adds column j of a child's update matrix, from its diagonal on.
+  /// Adds column j of a child's update matrix, from its diagonal on. source: where its row 0 would be.
   void add_column(const double* source, int j) {
-    const int column = to_columns_[j];
-    const int count = static_cast<int>(to_columns_.size()) - j;
-    if (column < w_)
-      kernels_.scatter_add(source, to_columns_.data() + j, count, columns_.data() + static_cast<std::ptrdiff_t>(column) * f_);
-    else
-      kernels_.scatter_add(source, to_update_.data() + j, count, update_ + static_cast<std::ptrdiff_t>(column - w_) * r_);
+    const int r = row_runs_[j];
+    const Run whole = runs_[r];
+    const int column = whole.to + j - whole.from;
+    double* target = column < w_ ? columns_.data() + static_cast<std::ptrdiff_t>(column) * f_
+                                 : update_ + static_cast<std::ptrdiff_t>(column - w_) * r_ - w_;
+    runs_[r] = {j, column, whole.length - (j - whole.from)};
+    kernels_.add_runs(source, runs_.data() + r, static_cast<int>(runs_.size()) - r, target);
+    runs_[r] = whole;
   }
 
   void add_child(std::int32_t s) {
     const Front& child = plan_.fronts[s];
     locate(child.rows);
-    const std::ptrdiff_t r = static_cast<std::ptrdiff_t>(to_columns_.size());
+    const std::ptrdiff_t r = 3 * static_cast<std::ptrdiff_t>(child.rows.size());
     const bool stacked = is_stacked(child);
     if (stacked) used_[child.depth % 2] -= r * r;
     const double* source = child_update(child, s);
-    for (std::ptrdiff_t j = 0; j < r; ++j) add_column(source + j * r + j, static_cast<int>(j));
+    for (std::ptrdiff_t j = 0; j < r; ++j) add_column(source + j * r, static_cast<int>(j));
     if (!stacked) loose_[s] = Buffer();
   }
 
@@ -234,11 +238,11 @@ class Factoriser {
   void add_remote_child(const Edge& edge, Buffer& packed) {
     MPI_Recv(packed.data(), static_cast<int>(packed.size()), MPI_DOUBLE, edge.rank, kUpdateTag + edge.tag, plan_.comm, MPI_STATUS_IGNORE);
     locate(edge.rows);
-    const int r = static_cast<int>(to_columns_.size());
+    const int r = 3 * static_cast<int>(edge.rows.size());
     const double* source = packed.data();
     for (int j = 0; j < r; ++j) {
       add_column(source, j);
-      source += r - j;
+      source += r - j - 1;
     }
     packed = Buffer();
   }
@@ -274,7 +278,9 @@ class Factoriser {
     std::copy(pivots.diagonal, pivots.diagonal + n, numbers_.d_diagonal.data() + first_row);
     std::copy(pivots.off, pivots.off + n, numbers_.d_off.data() + first_row);
     multiply('N', m, n, n, 1.0, below, f_, block_.data(), kMaxBlock, 0.0, product, std::max(m, 1));
-    divide_by_pivots(product, m, n, pivots, below);
+    transpose_block(n);
+    packed = pack_tiles(block_.data(), kMaxBlock, n, n, packed);
+    kernels_.divide_and_pack(product, m, n, pivots, below, f_, packed, growth_);
     for (std::int32_t q = p + 1; q < count_panels(front.width); ++q) {
       const int from = 3 * find_panel_start(front.width, q);
       const int width = 3 * find_panel_start(front.width, q + 1) - from;
@@ -286,10 +292,13 @@ class Factoriser {
       multiply('T', r_ - j, std::min(kUpdateColumns, r_ - j), n, -1.0, below + from, f_, product + from, m, 1.0,
                update_ + static_cast<std::ptrdiff_t>(j) * r_ + j, r_);
     }
-    for (int i = 0; i < n; ++i)  // T stands by rows.
+    return packed + static_cast<std::ptrdiff_t>(m) * n;
+  }
+
+  /// T comes by rows.
+  void transpose_block(int n) {
+    for (int i = 0; i < n; ++i)
       for (int k = 0; k < i; ++k) std::swap(block_.data()[i * kMaxBlock + k], block_.data()[k * kMaxBlock + i]);
-    packed = pack_tiles(block_.data(), kMaxBlock, n, n, packed);
-    return pack_tiles(below, f_, m, n, packed);
   }
 
   /// block_ <- T of the diagonal block; zero with zero pivots when one vanishes, so that what follows stays finite.
@@ -306,30 +315,6 @@ class Factoriser {
     std::fill(block, block + kMaxBlock * kMaxBlock, 0.0);
     std::fill(pivots.diagonal, pivots.diagonal + n, 0.0);
     std::fill(pivots.off, pivots.off + n, 0.0);
-  }
-
-  /// below (m, n) <- product D^-1.
-  void divide_by_pivots(const double* product, int m, int n, const BlockPivots& pivots, double* below) {
-    for (int k = 0; k < n; ++k) {
-      const double* w0 = product + static_cast<std::ptrdiff_t>(k) * m;
-      double* l0 = below + static_cast<std::ptrdiff_t>(k) * f_;
-      const double d0 = pivots.diagonal[k];
-      if (pivots.off[k] == 0) {
-        for (int i = 0; i < m; ++i) l0[i] = w0[i] * d0;
-        continue;
-      }
-      const double* w1 = w0 + m;
-      double* l1 = l0 + f_;
-      const double d1 = pivots.diagonal[k + 1];
-      const double off = pivots.off[k];
-      for (int i = 0; i < m; ++i) {
-        l0[i] = w0[i] * d0 + w1[i] * off;
-        l1[i] = w0[i] * off + w1[i] * d1;
-      }
-      ++k;
-    }
-    for (int k = 0; k < n; ++k)
-      for (int i = 0; i < m; ++i) growth_ = std::max(growth_, std::abs(below[static_cast<std::ptrdiff_t>(k) * f_ + i]));
   }
 
   void reduce() {
@@ -360,9 +345,9 @@ class Factoriser {
   Buffer product_;
   Buffer block_;
   double* update_ = nullptr;
-  Ints where_;  // (local_nodes) node of the front in work
-  Ints to_columns_;
-  Ints to_update_;
+  Ints where_;             // (local_nodes) node of the front in work
+  std::vector<Run> runs_;  // of the child that is being added
+  Ints row_runs_;          // the run of each of its rows
 
   Buffer stack_[2];
   std::int64_t used_[2] = {0, 0};
