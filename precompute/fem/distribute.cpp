@@ -267,9 +267,33 @@ LocalMesh send_pieces(MPI_Comm comm, const mesh::TetMesh& mesh, const Plan& plan
   return own;
 }
 
+/// Per component its held points, from rank 0 to all. Collective.
+void share_held_points(MPI_Comm comm, std::vector<std::vector<Vec3>>& held_m) {
+  std::vector<std::int32_t> counts;
+  std::vector<Vec3> points;
+  petsc::run_agreed(comm, [&] {
+    for (const auto& list : held_m) {
+      counts.push_back(static_cast<std::int32_t>(list.size()));
+      points.insert(points.end(), list.begin(), list.end());
+    }
+  });
+  std::array<std::int64_t, 2> sizes{static_cast<std::int64_t>(counts.size()), static_cast<std::int64_t>(points.size())};
+  MPI_Bcast(sizes.data(), 2, MPI_INT64_T, 0, comm);
+  petsc::run_agreed(comm, [&] {
+    counts.resize(sizes[0]);
+    points.resize(sizes[1]);
+  });
+  MPI_Bcast(counts.data(), petsc::to_petsc_int(sizes[0]), MPI_INT32_T, 0, comm);
+  MPI_Bcast(points.data(), petsc::to_petsc_int(3 * sizes[1]), MPI_DOUBLE, 0, comm);
+  petsc::run_agreed(comm, [&] {
+    held_m.assign(counts.size(), {});
+    auto at = points.begin();
+    for (std::size_t c = 0; c < counts.size(); at += counts[c++]) held_m[c].assign(at, at + counts[c]);
+  });
+}
+
 void share_facts(MPI_Comm comm, Distribution& out) {
-  int rank = 0, ranks = 1;
-  MPI_Comm_rank(comm, &rank);
+  int ranks = 1;
   MPI_Comm_size(comm, &ranks);
   std::array<std::int64_t, 6> numbers{out.nodes, out.tets, out.free_nodes, out.components, out.report.edge_cut, out.report.contiguous};
   MPI_Bcast(numbers.data(), static_cast<int>(numbers.size()), MPI_INT64_T, 0, comm);
@@ -280,27 +304,15 @@ void share_facts(MPI_Comm comm, Distribution& out) {
   out.report.edge_cut = numbers[4];
   out.report.contiguous = numbers[5] != 0;
   MPI_Bcast(&out.report.element_balance, 1, MPI_DOUBLE, 0, comm);
-  out.report.ranks.resize(ranks);
-  std::array<std::int64_t, 3> mine{out.local.tet_count(), out.local.owned_nodes,
+  static_assert(sizeof(PartitionReport::Rank) == 3 * sizeof(std::int64_t));
+  petsc::run_agreed(comm, [&] { out.report.ranks.resize(ranks); });
+  const PartitionReport::Rank mine{out.local.tet_count(), out.local.owned_nodes,
                                    static_cast<std::int64_t>(out.local.nodes_m.size()) - out.local.owned_nodes};
-  std::vector<std::int64_t> all(3 * static_cast<std::size_t>(ranks));
-  MPI_Allgather(mine.data(), 3, MPI_INT64_T, all.data(), 3, MPI_INT64_T, comm);
+  MPI_Allgather(&mine, 3, MPI_INT64_T, out.report.ranks.data(), 3, MPI_INT64_T, comm);
   std::int64_t largest = 0;
-  for (int r = 0; r < ranks; ++r) {
-    out.report.ranks[r] = {all[3 * r], all[3 * r + 1], all[3 * r + 2]};
-    largest = std::max(largest, all[3 * r + 1]);
-  }
+  for (const auto& rank : out.report.ranks) largest = std::max(largest, rank.owned_nodes);
   out.report.node_balance = static_cast<double>(largest) * ranks / static_cast<double>(out.nodes);
-
-  std::int64_t lists = static_cast<std::int64_t>(out.held_m.size());
-  MPI_Bcast(&lists, 1, MPI_INT64_T, 0, comm);
-  out.held_m.resize(lists);
-  for (auto& list : out.held_m) {
-    std::int64_t size = static_cast<std::int64_t>(list.size());
-    MPI_Bcast(&size, 1, MPI_INT64_T, 0, comm);
-    list.resize(size);
-    MPI_Bcast(list.data(), petsc::to_petsc_int(3 * size), MPI_DOUBLE, 0, comm);
-  }
+  share_held_points(comm, out.held_m);
 }
 
 }  // namespace
