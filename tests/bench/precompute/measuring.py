@@ -18,12 +18,20 @@ class Cost:
     wall_s: float
 
 
+def make_environment():
+    """That of every program that is measured: one thread, MPI on any machine, and OpenBLAS free to take the kernels of the processor."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
+    return kept | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive", "OMPI_ALLOW_RUN_AS_ROOT": "1",
+                   "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none",
+                   "OMPI_MCA_mpi_yield_when_idle": "1"}
+
+
 def run_measured(command, cwd, environment=None, timeout_s=3600):
     """Runs the command; its output goes nowhere unless it fails. Raises RuntimeError with its last lines when it does."""
     with tempfile.TemporaryFile("w+") as log:
         start = time.monotonic()
         child = subprocess.Popen([str(word) for word in command], cwd=cwd, stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                                 env={**os.environ, **(environment or {})}, start_new_session=True)
+                                 env=make_environment() | (environment or {}), start_new_session=True)
         status = 0
         while True:
             pid, status, usage = os.wait4(child.pid, os.WNOHANG)
