@@ -44,10 +44,12 @@ std::span<const Vec3> copy_positions(const LocalMesh& local, std::int32_t e, std
 
 }  // namespace
 
-System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass) {
+System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, Form form) {
   LocalRows rows = make_rows(comm, local, mass == spec::Mass::lumped);
   petsc::run_agreed(comm, [&] {
-    const std::vector<Solid> solids(materials.list.begin(), materials.list.end());
+    std::vector<Solid> solids(materials.list.begin(), materials.list.end());
+    if (form == Form::displacement)
+      for (Solid& solid : solids) solid.full_lambda_pa = solid.lame_lambda_pa;
     ElementMatrices element;
     std::array<Vec3, kMaxNodes> x;
     for (std::int32_t e = 0; e < local.tet_count(); ++e) {

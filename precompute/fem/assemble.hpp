@@ -17,6 +17,9 @@ struct System {
   petsc::MatHandle mass;       // M [kg], (3n, 3n), AIJ, in K's pattern (diagonal when lumped): m_ij I, the zeros of I not stored
 };
 
+/// The form of T10 in nearly incompressible solids. automatic: mean dilatation, see Solid; displacement: none, which locks, for comparison.
+enum class Form { automatic, displacement };
+
 /// Mass, centre, inertia and volume of the body, held nodes included; axes of the mesh.
 struct RigidBody {
   double mass_kg = 0.0;
@@ -29,7 +32,7 @@ struct RigidBody {
 /// their pattern cannot be changed. Nodes that no tetrahedron of `local` uses have empty rows.
 /// Collective. Throws on every rank: InputError naming an element whose Jacobian is not positive everywhere (inside out, or a mid-side node
 /// out of place); SystemError when memory runs out.
-System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass);
+System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, Form form = Form::automatic);
 
 /// Integrates the rigid-body data over the tetrahedra. Collective.
 RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials& materials);

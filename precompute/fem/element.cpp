@@ -1,17 +1,15 @@
 // Method: everything an element's stiffness needs of its shape are the integrals of products of gradients, P_ij = integral b_i b_j^T dV.
-// They
-//   are constant for T4; a straight T10 is a fixed combination of its T4; a curved one takes a rule of 14 points. The material then
+//   They are constant for T4; a straight T10 is a fixed combination of its T4; a curved one takes a rule of 14 points. The material then
 //   contracts them. The mass of a curved T10 is exact: its Jacobian is a cubic, known by 20 values, and integral N_i N_j (cubic k) is a
-//   table. Nearly incompressible T10: bubbles b = 256 L0 L1 L2 L3 in three directions, the dilatation projected on linear functions (which
-//   those bubbles balance), bubbles condensed.
+//   table. Nearly incompressible T10: of the dilatation in an element only the mean meets a lambda above kFullLambda mu. Ten nodes cannot
+//   keep the whole field free of dilatation and bend as well; one condition an element they can.
 // Source: OSG02 section 3.2; Zienkiewicz and Taylor, "The Finite Element Method", vol. 1 (T10); Hinton, Rock and Zienkiewicz 1976,
-// Earthquake
-//   Eng. Struct. Dyn. 4, 245 (HRZ lumping); Crouzeix and Raviart 1973, RAIRO 7, 33 (quadratic velocity with bubble, linear pressure);
-//   Simo and Hughes 1998, "Computational Inelasticity", section 4.5 (projected dilatation).
+//   Earthquake Eng. Struct. Dyn. 4, 245 (HRZ lumping); Nagtegaal, Parks and Rice 1974, CMAME 4, 153, and Malkus and Hughes 1978, CMAME 15,
+//   63 (mean dilatation, selective integration).
 // Deviations: OSG02 eq. 12 is printed with -vol/2; stiffness is minus the Jacobian of the force, which gives +vol. OSG02's row-sum lumping
 //   (eq. 15) is negative at the corners of a T10, so T10 is lumped by HRZ: the diagonal of the consistent mass scaled to the true mass.
-//   Crouzeix and Raviart's element has bubbles on its faces too in three dimensions; without them it is as good on the bodies measured in
-//   docs/elements.md. The bubbles carry no mass, so that the mass matrix couples no two directions.
+//   Mean dilatation replaces the whole of lambda in those papers; here it takes what lambda is above a multiple of mu, so that every nu up
+//   to 0.4545 keeps its usual form and quadratic elements keep their order.
 #include "precompute/fem/element.hpp"
 
 #include <algorithm>
@@ -173,7 +171,7 @@ void put_straight_t10(const std::array<Vec3, 4>& b, double volume, const Solid& 
   const Products products = calc_linear_products(b, volume);
   std::array<std::array<double, 9>, 16> linear;
   for (int a = 0; a < 4; ++a)
-    for (int c = 0; c < 4; ++c) contract(products.at(a, c), solid, solid.lame_lambda_pa, linear[4 * a + c].data());
+    for (int c = 0; c < 4; ++c) contract(products.at(a, c), solid, solid.full_lambda_pa, linear[4 * a + c].data());
   const Recipe& recipe = get_recipe();
   int pair = 0;
   for (int i = 0; i < kMaxNodes; ++i)
@@ -275,94 +273,12 @@ double calc_curved_mass(std::span<const Vec3> x, std::array<double, kMaxNodes * 
   return volume;
 }
 
-/// Solves the positive definite n x n system in place for `columns` right-hand sides, row-major; Cholesky.
-template <int n>
-void solve_definite(std::array<double, n * n> a, double* b, int columns) {
-  for (int j = 0; j < n; ++j) {
-    for (int k = 0; k < j; ++k)
-      for (int i = j; i < n; ++i) a[i * n + j] -= a[i * n + k] * a[j * n + k];
-    const double root = std::sqrt(a[j * n + j]);
-    for (int i = j; i < n; ++i) a[i * n + j] /= root;
-  }
-  for (int c = 0; c < columns; ++c) {
-    for (int i = 0; i < n; ++i) {
-      for (int k = 0; k < i; ++k) b[i * columns + c] -= a[i * n + k] * b[k * columns + c];
-      b[i * columns + c] /= a[i * n + i];
-    }
-    for (int i = n - 1; i >= 0; --i) {
-      for (int k = i + 1; k < n; ++k) b[i * columns + c] -= a[k * n + i] * b[k * columns + c];
-      b[i * columns + c] /= a[i * n + i];
-    }
-  }
-}
-
-/// The mixed form: integral 2 mu eps : eps + lambda (Pi div u)^2, Pi the projection on linear functions, u = nodes + bubbles; the bubbles
-/// condensed. 33 displacements: node by node, then the bubble.
-void put_mixed(const Gradients& gradients, const Solid& solid, ElementMatrices& out) {
-  constexpr int kNodal = 3 * kMaxNodes, kAll = kNodal + 3;
-  static const std::array<Vec3, 14> kBubble = [] {  // derivatives of 256 L0 L1 L2 L3 along L1, L2, L3
-    std::array<Vec3, 14> derivative{};
-    for (std::size_t q = 0; q < 14; ++q) {
-      const Barycentric& l = get_rule_of_degree_5()[q].at;
-      const auto without = [&](int a) {
-        double product = 256.0;
-        for (int i = 0; i < 4; ++i) product *= i == a ? 1.0 : l[i];
-        return product;
-      };
-      for (int d = 0; d < 3; ++d) derivative[q][d] = without(d + 1) - without(0);
-    }
-    return derivative;
-  }();
-  std::array<double, kAll * kAll> k{};
-  std::array<double, 4 * kAll> moments{}, projected{};  // integral L_a div(u), and its image under the inverse of `gram`
-  std::array<double, 16> gram{};                        // integral L_a L_b
-  for (std::size_t q = 0; q < 14; ++q) {
-    std::array<double, kAll> b{};
-    std::copy(gradients.b[q].begin(), gradients.b[q].end(), b.begin());
-    for (int d = 0; d < 3; ++d)
-      for (int r = 0; r < 3; ++r) b[kNodal + r] += kBubble[q][d] * gradients.jacobian[q].inverse[d][r];
-    const double dv = gradients.dv[q];
-    const Barycentric& l = get_rule_of_degree_5()[q].at;
-    for (int a = 0; a < 4; ++a) {
-      for (int c = 0; c < 4; ++c) gram[4 * a + c] += dv * l[a] * l[c];
-      for (int i = 0; i < kAll; ++i) moments[a * kAll + i] += dv * l[a] * b[i];
-    }
-    for (int i = 0; i < kAll / 3; ++i)
-      for (int j = i; j < kAll / 3; ++j) {
-        const double* p = &b[3 * i];
-        const double* s = &b[3 * j];
-        const double mu = dv * solid.lame_mu_pa, dot = mu * (p[0] * s[0] + p[1] * s[1] + p[2] * s[2]);
-        for (int r = 0; r < 3; ++r)
-          for (int c = 0; c < 3; ++c) k[(3 * i + r) * kAll + 3 * j + c] += mu * s[r] * p[c] + (r == c ? dot : 0.0);
-      }
-  }
-  projected = moments;
-  solve_definite<4>(gram, projected.data(), kAll);
-  for (int i = 0; i < kAll; ++i)
-    for (int j = i - i % 3; j < kAll; ++j) {
-      double sum = 0.0;
-      for (int a = 0; a < 4; ++a) sum += moments[a * kAll + i] * projected[a * kAll + j];
-      k[i * kAll + j] += solid.lame_lambda_pa * sum;
-    }
-  std::array<double, 9> bubble;
-  std::array<double, 3 * kNodal> coupling, condensed;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) bubble[3 * r + c] = k[(kNodal + r) * kAll + kNodal + c];
-    for (int i = 0; i < kNodal; ++i) coupling[r * kNodal + i] = k[i * kAll + kNodal + r];
-  }
-  condensed = coupling;
-  solve_definite<3>(bubble, condensed.data(), kNodal);
-  for (int i = 0; i < kMaxNodes; ++i)
-    for (int j = i; j < kMaxNodes; ++j) {
-      std::array<double, 9> block;
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) {
-          double sum = k[(3 * i + r) * kAll + 3 * j + c];
-          for (int s = 0; s < 3; ++s) sum -= coupling[s * kNodal + 3 * i + r] * condensed[s * kNodal + 3 * j + c];
-          block[3 * r + c] = sum;
-        }
-      put_block(block.data(), i, j, out);
-    }
+/// Adds what the bulk modulus is stiffer than the products have it, for the mean dilatation only: excess (integral div u)^2 / V.
+void add_mean_dilatation(const std::array<double, 3 * kMaxNodes>& divergence, double volume, double excess, ElementMatrices& out) {
+  constexpr int kWidth = 3 * kMaxNodes;
+  for (int row = 0; row < kWidth; ++row)
+    for (int column = 0; column < kWidth; ++column)
+      out.stiffness[row * kWidth + column] += excess / volume * divergence[row] * divergence[column];
 }
 
 void lump_hrz(ElementMatrices& out, double mass_kg) {
@@ -377,8 +293,8 @@ void lump_hrz(ElementMatrices& out, double mass_kg) {
 
 Solid::Solid(const spec::Material& material)
     : isotropic(!material.orthotropic),
-      mixed(isotropic && material.poisson_ratio >= kMixedFrom),
       lame_lambda_pa(material.lame_lambda_pa()),
+      full_lambda_pa(std::min(lame_lambda_pa, kFullLambda * material.lame_mu_pa())),
       lame_mu_pa(material.lame_mu_pa()),
       density_kg_m3(material.density_kg_m3) {
   if (isotropic) return;
@@ -401,16 +317,28 @@ bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, 
     put_stiffness(calc_linear_products(b, volume), solid, solid.lame_lambda_pa, out);
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j) out.mass[i * 4 + j] = mass_kg / 20.0 * (i == j ? 2 : 1);
-  } else if (!curved && !solid.mixed) {
+  } else if (!curved) {
     put_straight_t10(b, volume, solid, out);
     put_straight_mass(mass_kg, out);
+    if (solid.lame_lambda_pa > solid.full_lambda_pa) {
+      // integral d N / d L_a is 0 for corners (4 L_a - 1) and V for mid nodes (4 L_b)
+      std::array<double, 3 * kMaxNodes> divergence{};
+      for (int e = 0; e < 6; ++e)
+        for (int r = 0; r < 3; ++r) divergence[12 + 3 * e + r] = volume * (b[mesh::kEdges[e][0]][r] + b[mesh::kEdges[e][1]][r]);
+      add_mean_dilatation(divergence, volume, solid.lame_lambda_pa - solid.full_lambda_pa, out);
+    }
   } else {
     Gradients gradients;
     if (!calc_gradients(x, gradients)) return false;
-    if (solid.mixed) {
-      put_mixed(gradients, solid, out);
-    } else {
-      put_stiffness(calc_curved_products(gradients), solid, solid.lame_lambda_pa, out);
+    put_stiffness(calc_curved_products(gradients), solid, solid.full_lambda_pa, out);
+    if (solid.lame_lambda_pa > solid.full_lambda_pa) {
+      std::array<double, 3 * kMaxNodes> divergence{};
+      double sum = 0.0;
+      for (std::size_t q = 0; q < 14; ++q) {
+        sum += gradients.dv[q];
+        for (std::size_t i = 0; i < divergence.size(); ++i) divergence[i] += gradients.dv[q] * gradients.b[q][i];
+      }
+      add_mean_dilatation(divergence, sum, solid.lame_lambda_pa - solid.full_lambda_pa, out);
     }
     mass_kg = solid.density_kg_m3 * calc_curved_mass(x, out.mass);
     for (double& m : out.mass) m *= solid.density_kg_m3;

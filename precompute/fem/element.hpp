@@ -25,16 +25,17 @@ struct ElementMoments {
   std::array<double, 9> second_kg_m2{};  // (3, 3) integral rho x x^T
 };
 
-/// From this Poisson's ratio on, T10 are the mixed form that does not lock; docs/elements.md has the figures behind it.
-inline constexpr double kMixedFrom = 0.4;
+/// Of the dilatation within a T10 only its mean meets a lambda above this many mu; docs/elements.md has the figures behind the number.
+/// Poisson's ratios up to kFullLambda / (2 (kFullLambda + 1)) = 0.4545 are not touched.
+inline constexpr double kFullLambda = 10.0;
 
 /// A material as the elements use it, made once for many elements.
 struct Solid {
   Solid(const spec::Material& material);  // NOLINT(google-explicit-constructor): a material is a solid
 
   bool isotropic = true;
-  bool mixed = false;  // T10: isotropic and nu >= kMixedFrom
   double lame_lambda_pa = 0.0;
+  double full_lambda_pa = 0.0;  // what all of the dilatation in a T10 meets; its mean over the element meets lame_lambda_pa
   double lame_mu_pa = 0.0;
   double density_kg_m3 = 0.0;
   std::array<double, 81> tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd; of anisotropic solids only
@@ -44,8 +45,7 @@ struct Solid {
 /// are (isoparametric) unless all lie within 1e-6 of an edge's length from its middle. Straight-sided T10 are integrated exactly; the mass
 /// of curved ones too, their stiffness by a rule of degree 5.
 /// T4: OSG02 eqs. 12 (corrected: + vol), 14, 15; T10: the same strain energy, HRZ lumping (Hinton, Rock and Zienkiewicz 1976).
-/// Nearly incompressible T10 (Solid::mixed): the dilatation is projected on the linear functions of the element and three bubble
-/// displacements without mass are condensed.
+/// T10 of nearly incompressible solids (Solid::full_lambda_pa below lame_lambda_pa): mean dilatation for what lambda is above that.
 /// Returns false, with `out` unusable, when the Jacobian is not positive at every node and integration point of the stiffness; each of them
 /// is one that mesh::is_folded tests. Not collective.
 [[nodiscard]] bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, ElementMatrices& out);

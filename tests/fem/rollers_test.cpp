@@ -4,54 +4,18 @@
 // are reduced here and solved with Eigen.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
-#include <Eigen/Sparse>
 #include <cmath>
 
 #include "precompute/fem/assemble.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/subspace.hpp"
 
 namespace carillon::fem {
 namespace {
 
 constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
 const spec::Material kAluminium{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
-
-using SparseMatrix = Eigen::SparseMatrix<double>;
-
-/// The rows and columns of one rank's matrix for which `number` is not negative.
-SparseMatrix reduce(const Mat matrix, const std::vector<int>& number, int size) {
-  std::vector<Eigen::Triplet<double>> entries;
-  for (PetscInt row = 0; row < static_cast<PetscInt>(number.size()); ++row) {
-    PetscInt count = 0;
-    const PetscInt* columns = nullptr;
-    const double* values = nullptr;
-    petsc::check(MatGetRow(matrix, row, &count, &columns, &values));
-    for (PetscInt i = 0; i < count; ++i)
-      if (number[row] >= 0 && number[columns[i]] >= 0) entries.emplace_back(number[row], number[columns[i]], values[i]);
-    petsc::check(MatRestoreRow(matrix, row, &count, &columns, &values));
-  }
-  SparseMatrix reduced(size, size);
-  reduced.setFromTriplets(entries.begin(), entries.end());
-  return reduced;
-}
-
-/// The lowest eigenfrequencies by subspace iteration with K^-1 M and Rayleigh-Ritz.
-std::vector<double> iterate_subspace(const SparseMatrix& k, const SparseMatrix& m) {
-  const Eigen::SimplicialLLT<SparseMatrix> factor(k);
-  Eigen::MatrixXd basis = Eigen::MatrixXd::Random(k.rows(), 16);
-  Eigen::VectorXd lambda;
-  for (int pass = 0; pass < 25; ++pass) {
-    basis = factor.solve(m * basis).eval();
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(basis.transpose() * (k * basis), basis.transpose() * (m * basis));
-    basis = (basis * ritz.eigenvectors()).eval();
-    lambda = ritz.eigenvalues();
-  }
-  std::vector<double> frequencies;
-  for (int i = 0; i < 6; ++i) frequencies.push_back(std::sqrt(lambda[i]) / (2 * M_PI));
-  return frequencies;
-}
 
 std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, spec::Mass mass) {
   const Distribution pieces = distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {});
@@ -63,7 +27,10 @@ std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, spec::
       const double x = pieces.local.nodes_m[i][d];
       number.push_back(x > 1e-12 && x < kSize[d] - 1e-12 ? size++ : -1);
     }
-  return iterate_subspace(reduce(system.stiffness, number, size), reduce(system.mass, number, size));
+  const auto pairs = tests::iterate_subspace(tests::reduce(system.stiffness, number, size), tests::reduce(system.mass, number, size), 6);
+  std::vector<double> frequencies;
+  for (const double lambda : pairs.lambda) frequencies.push_back(std::sqrt(lambda) / (2 * M_PI));
+  return frequencies;
 }
 
 constexpr double kS110 = 9380.300465361, kP100 = 10329.70716337, kS210 = 13008.13627197;

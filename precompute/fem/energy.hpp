@@ -1,0 +1,33 @@
+// Where the energy of a mode sits, and how fast the mode decays for it.
+#pragma once
+
+#include <petscmat.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/fem/assemble.hpp"
+
+namespace carillon::fem {
+
+/// Parts of a mode's energy by material; each sums to 1 over the materials.
+struct EnergyShares {
+  std::int32_t materials = 0;
+  std::vector<double> elastic;  // (modes, materials) phi^T K_r phi / phi^T K phi
+  std::vector<double> kinetic;  // (modes, materials) phi^T M_r phi / phi^T M phi
+};
+
+struct Decay {
+  std::vector<double> decay_per_s;  // (modes) d
+  EnergyShares shares;              // empty when there is one material: then no energy was integrated
+};
+
+/// Calculates the decay rate of every mode, d = c / 2. One material: c(lambda) of its law. Several: the sum over the materials of what each
+/// law draws from its share of the mode's elastic and kinetic energy (spec::Material::calc_damping_per_s), which is the diagonal of the
+/// modal damping matrix; docs/equations.md, damping. `lambda` (modes) [rad^2/s^2]; `shapes` (3n, modes) dense, rows as those of the system
+/// of `local`, null when there are no modes. Collective. Throws on every rank what assemble() throws.
+Decay calc_decay(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, std::span<const double> lambda,
+                 Mat shapes);
+
+}  // namespace carillon::fem
