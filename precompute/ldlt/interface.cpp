@@ -1,11 +1,14 @@
-// Method:     The separator between the ranks is one-sided: of two neighbours on different ranks the one on the higher rank belongs to it.
+// Method:     The separator between two ranks is a minimum vertex cover of the edges between them, found from a maximum matching; edges
+// that
+//             the pairs of ranks before have covered are left out. (The nodes of one side alone, a simpler cover, are up to twice as many.)
 //             So interior nodes of different ranks are never neighbours, and each rank eliminates its own without a message. Interface
 //             nodes that touch the same ranks form a group; eliminating an interior makes a clique of its boundary, so groups are ordered
 //             by minimum weighted degree in the graph where groups near a common rank are neighbours. Supernodes of the interface go to the
 //             least loaded rank of those below them in the tree.
-// Source:     Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear equations. George and Liu 1989, The
-//             evolution of the minimum degree ordering algorithm. Geist and Ng 1989, Task scheduling for parallel sparse Cholesky
-//             factorization (subtree to rank).
+// Source:     Koenig 1931 (cover from matching); Pothen, Simon, Liou 1990, Partitioning sparse matrices with eigenvectors of graphs (vertex
+//             from edge separators). Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear equations. George
+//             and Liu 1989, The evolution of the minimum degree ordering algorithm. Geist and Ng 1989, Task scheduling for parallel sparse
+//             Cholesky factorization (subtree to rank).
 // Deviations: the interface is planned on every rank, in memory that grows with the whole interface (not with the whole graph).
 #include "precompute/ldlt/interface.hpp"
 
@@ -31,6 +34,70 @@ Ints gather_ints(MPI_Comm comm, const Ints& own, std::vector<int>& counts) {
   Ints all(static_cast<std::size_t>(offsets.back()) + static_cast<std::size_t>(counts.back()));
   MPI_Allgatherv(own.data(), mine, MPI_INT32_T, all.data(), counts.data(), offsets.data(), MPI_INT32_T, comm);
   return all;
+}
+
+/// The edges between two ranks: links of the left nodes to the right ones.
+struct Bipartite {
+  Ints left;
+  Ints right;
+  std::vector<Ints> links;
+};
+
+Bipartite make_bipartite(const std::vector<std::pair<std::int32_t, std::int32_t>>& edges) {
+  Bipartite graph;
+  for (const auto& [a, b] : edges) {
+    graph.left.push_back(a);
+    graph.right.push_back(b);
+  }
+  for (Ints* side : {&graph.left, &graph.right}) {
+    std::sort(side->begin(), side->end());
+    side->erase(std::unique(side->begin(), side->end()), side->end());
+  }
+  const auto find = [](const Ints& side, std::int32_t node) {
+    return static_cast<std::int32_t>(std::lower_bound(side.begin(), side.end(), node) - side.begin());
+  };
+  graph.links.resize(graph.left.size());
+  for (const auto& [a, b] : edges) graph.links[find(graph.left, a)].push_back(find(graph.right, b));
+  return graph;
+}
+
+/// Walks from the left nodes `front` along free and matched edges in turn. reached_from: (right) the left node before, -1: not reached.
+/// Stops at a right node without a partner, and returns it; -1 if there is none.
+std::int32_t walk(const Bipartite& graph, const Ints& partner_of_right, Ints front, Ints& reached_from) {
+  for (std::size_t i = 0; i < front.size(); ++i)
+    for (const std::int32_t r : graph.links[front[i]]) {
+      if (reached_from[r] >= 0) continue;
+      reached_from[r] = front[i];
+      if (partner_of_right[r] < 0) return r;
+      front.push_back(partner_of_right[r]);
+    }
+  return -1;
+}
+
+/// A minimum vertex cover, added to `cover`.
+void cover_edges(const Bipartite& graph, std::set<std::int32_t>& cover) {
+  Ints partner_of_left(graph.left.size(), -1);
+  Ints partner_of_right(graph.right.size(), -1);
+  Ints reached_from;
+  for (std::int32_t l = 0; l < static_cast<std::int32_t>(graph.left.size()); ++l) {
+    reached_from.assign(graph.right.size(), -1);
+    for (std::int32_t r = walk(graph, partner_of_right, {l}, reached_from); r >= 0;) {
+      const std::int32_t from = reached_from[r];
+      partner_of_right[r] = from;
+      std::swap(partner_of_left[from], r);  // the node that loses its partner takes the one before it
+      if (from == l) break;
+    }
+  }
+  // Of the nodes that walks from unmatched left nodes reach, the right ones are in the cover; of the others, the left ones.
+  Ints unmatched;
+  for (std::int32_t l = 0; l < static_cast<std::int32_t>(graph.left.size()); ++l)
+    if (partner_of_left[l] < 0) unmatched.push_back(l);
+  reached_from.assign(graph.right.size(), -1);
+  (void)walk(graph, partner_of_right, unmatched, reached_from);
+  for (std::size_t r = 0; r < graph.right.size(); ++r) {
+    if (reached_from[r] >= 0) cover.insert(graph.right[r]);
+    if (reached_from[r] < 0 && partner_of_right[r] >= 0) cover.insert(graph.left[partner_of_right[r]]);
+  }
 }
 
 /// Interface nodes near the same ranks.
@@ -134,11 +201,7 @@ void choose_owners(Interface& interface, std::vector<double> load) {
   interface.owner.resize(supernodes.size());
   for (std::size_t s = 0; s < supernodes.size(); ++s) {
     const Supernode& node = supernodes[s];
-    if (below[s].empty()) {
-      const std::int32_t i = interface.index[node.first];
-      const auto after = std::upper_bound(interface.first_of_rank.begin(), interface.first_of_rank.end(), i);
-      below[s].insert(static_cast<std::int32_t>(after - interface.first_of_rank.begin()) - 1);
-    }
+    if (below[s].empty()) below[s].insert(find_rank(interface.first_of_rank, interface.index[node.first]));
     interface.owner[s] = *std::min_element(below[s].begin(), below[s].end(), [&](int a, int b) { return load[a] < load[b]; });
     load[interface.owner[s]] += calc_cost_ns(node.width, node.size());
     if (node.parent >= 0) below[node.parent].insert(below[s].begin(), below[s].end());
@@ -147,6 +210,10 @@ void choose_owners(Interface& interface, std::vector<double> load) {
 }
 
 }  // namespace
+
+int find_rank(const Ints& starts, std::int32_t item) {
+  return static_cast<int>(std::upper_bound(starts.begin(), starts.end(), item) - starts.begin()) - 1;
+}
 
 Lists gather_lists(MPI_Comm comm, const Lists& own, Ints& first_of_rank) {
   Ints lengths;
@@ -159,6 +226,25 @@ Lists gather_lists(MPI_Comm comm, const Lists& own, Ints& first_of_rank) {
   for (const std::int32_t length : all_lengths) all.offsets.push_back(all.offsets.back() + length);
   all.items = gather_ints(comm, own.items, counts);
   return all;
+}
+
+void find_separator(MPI_Comm comm, const Lists& edges, const Ints& rank_starts, Interface& interface) {
+  Ints first_of_rank;
+  const Lists all = gather_lists(comm, edges, first_of_rank);
+  std::map<std::pair<int, int>, std::vector<std::pair<std::int32_t, std::int32_t>>> by_ranks;
+  for (std::int32_t i = 0; i < all.count(); ++i)
+    for (const std::int32_t* b = all.begin(i) + 1; b != all.end(i); ++b)
+      by_ranks[{find_rank(rank_starts, *all.begin(i)), find_rank(rank_starts, *b)}].emplace_back(*all.begin(i), *b);
+  std::set<std::int32_t> cover;
+  for (auto& [ranks, pairs] : by_ranks) {
+    std::erase_if(pairs, [&](const auto& edge) { return cover.contains(edge.first) || cover.contains(edge.second); });
+    cover_edges(make_bipartite(pairs), cover);
+  }
+  interface.nodes.assign(cover.begin(), cover.end());
+  interface.first_of_rank.clear();
+  for (const std::int32_t start : rank_starts)
+    interface.first_of_rank.push_back(
+        static_cast<std::int32_t>(std::lower_bound(interface.nodes.begin(), interface.nodes.end(), start) - interface.nodes.begin()));
 }
 
 std::int32_t Interface::find(std::int32_t global_node) const {

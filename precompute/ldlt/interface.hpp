@@ -25,6 +25,9 @@ struct Lists {
 /// The lists of all ranks in order of rank. first_of_rank: (ranks + 1) where each rank's begin. Collective.
 Lists gather_lists(MPI_Comm comm, const Lists& own, Ints& first_of_rank);
 
+/// The rank whose part holds `item`; starts: (ranks + 1) where the parts begin.
+int find_rank(const Ints& starts, std::int32_t item);
+
 /// Interface nodes are numbered first by their global numbers (`index`), then by the order of elimination (`position`).
 struct Interface {
   Ints nodes;          // (I) global node of each index, ascending
@@ -42,6 +45,11 @@ struct Interface {
   std::int32_t find(std::int32_t global_node) const;  // index, -1: not an interface node
   std::int32_t count() const { return static_cast<std::int32_t>(nodes.size()); }
 };
+
+/// The separator: a small set of nodes that holds one end of every edge between ranks. edges: one list for each node of this rank with
+/// neighbours on higher ranks, the node and then those neighbours, global numbers. rank_starts: (ranks + 1) first node of each rank. Fills
+/// nodes and first_of_rank. Collective.
+void find_separator(MPI_Comm comm, const Lists& edges, const Ints& rank_starts, Interface& interface);
 
 /// A first elimination order: nodes between the same ranks stay together, such groups go by minimum degree. Fills position and index.
 /// Local, and the same on every rank.

@@ -73,18 +73,20 @@ NodeLinks find_links(const LocalRows& k, const LocalRows& m) {
 /// Gathers the interface nodes, who they touch, and orders them. is_interface: (own and ghost nodes). Collective.
 Interface gather_interface(MPI_Comm comm, const NodeLinks& nodes, const Ints& rank_starts, std::vector<bool>& is_interface) {
   const auto global = [&](std::int32_t v) { return v < nodes.own_nodes ? nodes.first_node + v : nodes.ghosts[v - nodes.own_nodes]; };
-  Lists own;  // one list: the nodes
-  is_interface.assign(static_cast<std::size_t>(nodes.own_nodes) + nodes.ghosts.size(), false);
+  Lists edges;
   for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+    Ints higher;
     for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
-      is_interface[v] = is_interface[v] || global(*u) < nodes.first_node;
-    if (is_interface[v]) {
-      own.items.push_back(global(v));
-      own.close();
-    }
+      if (global(*u) >= nodes.first_node + nodes.own_nodes) higher.push_back(global(*u));
+    if (higher.empty()) continue;
+    edges.items.push_back(global(v));
+    edges.items.insert(edges.items.end(), higher.begin(), higher.end());
+    edges.close();
   }
   Interface interface;
-  interface.nodes = gather_lists(comm, own, interface.first_of_rank).items;
+  find_separator(comm, edges, rank_starts, interface);
+  is_interface.assign(static_cast<std::size_t>(nodes.own_nodes) + nodes.ghosts.size(), false);
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) is_interface[v] = interface.find(global(v)) >= 0;
   for (std::size_t g = 0; g < nodes.ghosts.size(); ++g)
     is_interface[static_cast<std::size_t>(nodes.own_nodes) + g] = interface.find(nodes.ghosts[g]) >= 0;
 
@@ -98,8 +100,7 @@ Interface gather_interface(MPI_Comm comm, const NodeLinks& nodes, const Ints& ra
       if (is_interface[*u]) {
         links.items.push_back(interface.find(node));
       } else {
-        ranks.push_back(static_cast<std::int32_t>(std::upper_bound(rank_starts.begin(), rank_starts.end(), node) - rank_starts.begin()) -
-                        1);
+        ranks.push_back(find_rank(rank_starts, node));
       }
     }
     std::sort(ranks.begin(), ranks.end());
@@ -323,9 +324,7 @@ class PlanMaker {
     for (std::int32_t p = 0; p < interface_.count(); ++p) {
       while (p >= interface_.forest.supernodes[s].first + interface_.forest.supernodes[s].width) ++s;
       const std::int32_t i = interface_.index[p];
-      const int from = static_cast<int>(std::upper_bound(interface_.first_of_rank.begin(), interface_.first_of_rank.end(), i) -
-                                        interface_.first_of_rank.begin()) -
-                       1;
+      const int from = find_rank(interface_.first_of_rank, i);
       const int to = interface_.owner[s];
       if (from != plan_.rank && to != plan_.rank) continue;
       Ints rows{p};

@@ -18,6 +18,9 @@ using test::make_random;
 using test::MassKind;
 using test::Pencil;
 
+// A random block of three rows may be nearly singular, and pivots are not sought outside the blocks.
+constexpr double kRandomTolerance = 1e-10;
+
 int find_ranks() {
   int ranks = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &ranks);
@@ -64,7 +67,7 @@ std::vector<double> pick_shifts(const Eigen::VectorXd& lambda, int count) {
   return shifts;
 }
 
-void expect_counts_and_solves(Pencil& pencil, int shift_count) {
+void expect_counts_and_solves(Pencil& pencil, int shift_count, double tolerance = 1e-12) {
   const Eigen::VectorXd lambda = calc_eigenvalues(pencil);
   Factor factor(pencil.k, pencil.m);
   const std::vector<double> shifts = pick_shifts(lambda, shift_count);
@@ -72,8 +75,8 @@ void expect_counts_and_solves(Pencil& pencil, int shift_count) {
   for (const double sigma : shifts) {
     ASSERT_TRUE(factor.factorise(sigma)) << sigma << ", backward error " << factor.get_backward_error();
     EXPECT_EQ(factor.get_negative_pivots(), count_below(lambda, sigma)) << sigma;
-    EXPECT_LT(factor.get_backward_error(), 1e-12);
-    EXPECT_LT(solve_and_measure(factor, pencil, sigma, 3), 1e-12) << sigma;
+    EXPECT_LT(factor.get_backward_error(), tolerance);
+    EXPECT_LT(solve_and_measure(factor, pencil, sigma, 3), tolerance) << sigma;
   }
 }
 
@@ -90,7 +93,7 @@ TEST(factor, counts_and_solves_as_dense_solvers_do_on_a_lattice_with_consistent_
 TEST(factor, counts_and_solves_as_dense_solvers_do_on_random_indefinite_matrices) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     Pencil pencil = make_random(20 + 17 * static_cast<int>(seed), 6, seed);
-    expect_counts_and_solves(pencil, 8);
+    expect_counts_and_solves(pencil, 8, kRandomTolerance);
   }
 }
 
@@ -137,9 +140,9 @@ TEST(factor, works_when_neighbours_lie_on_all_ranks) {
   std::vector<int> nodes_of_rank(find_ranks(), 1);
   nodes_of_rank.back() = 60 - (find_ranks() - 1);
   test::distribute(pencil, nodes_of_rank);
-  expect_counts_and_solves(pencil, 5);
+  expect_counts_and_solves(pencil, 5, kRandomTolerance);
   Pencil even = make_random(60, 12, 22);
-  expect_counts_and_solves(even, 5);
+  expect_counts_and_solves(even, 5, kRandomTolerance);
 }
 
 TEST(factor, takes_a_shift_below_the_rigid_motions_however_small) {
