@@ -36,10 +36,5 @@ System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& material
 
 /// Integrates the rigid-body data over the tetrahedra. Collective.
 RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials& materials);
-inline RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, double density_kg_m3) {
-  spec::Material material;
-  material.density_kg_m3 = density_kg_m3;
-  return calc_rigid_body(comm, local, Materials(material));
-}
 
 }  // namespace carillon::fem
