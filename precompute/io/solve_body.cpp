@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "precompute/fem/energy.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::io {
@@ -62,6 +63,8 @@ class ProgressLines {
 
 eigen::Factorisation find_factorisation(spec::Factorisation wanted) {
   switch (wanted) {
+    case spec::Factorisation::ldlt:
+      return eigen::Factorisation::kLdlt;
     case spec::Factorisation::mumps:
       return eigen::Factorisation::kMumps;
     case spec::Factorisation::cholmod:
@@ -112,12 +115,6 @@ estimate::ErrorBars calc_bars(Run& run, const Body& body, const fem::System& sys
                                    run.job.mass, solution);
 }
 
-std::vector<double> calc_decays(const SolvedBody& solved) {
-  std::vector<double> decays;
-  for (const double lambda : solved.modes.lambda) decays.push_back(solved.materials.list[0].calc_decay_per_s(lambda));
-  return decays;
-}
-
 void warn_of_oddities(Run& run, const eigen::Modes& modes) {
   if (modes.mechanism_count > 0)
     run.stations.warn(fmt::format(
@@ -139,7 +136,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   solved.volume_m3 = fem::calc_volumes(run.comm, body.pieces.local, solved.materials);
   solved.rigid = fem::calc_rigid_body(run.comm, body.pieces.local, solved.materials);
   for (const spec::Material& material : solved.materials.list) {
-    if (is_linear && material.poisson_ratio > 0.45)
+    if (is_linear && material.poisson_ratio > 0.4)
       run.stations.warn(
           fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
                       material.poisson_ratio));
@@ -150,7 +147,8 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   warn_of_oddities(run, solved.modes);
 
   run.stations.begin("errors", "error bars and decays");
-  solved.decay_per_s = calc_decays(solved);
+  solved.decay_per_s =
+      fem::calc_decay(run.comm, body.pieces.local, solved.materials, run.job.mass, solved.modes.lambda, solved.modes.shapes).decay_per_s;
   solved.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, solved); });
   run.stations.end();
   return solved;
