@@ -4,7 +4,7 @@ import collections
 import subprocess
 
 # The first rule whose text stands in the name of a function on the way, from the innermost outwards, says the phase.
-RULES = (("ldlt::Factor::solve", "solve"), ("ldlt::(anonymous namespace)::Solver", "solve"), ("ldlt::", "factor"),
+RULES = (("ldlt::Factor::solve", "solve"), ("ldlt::solve_columns", "solve"), ("ldlt::(anonymous namespace)::Solver", "solve"), ("ldlt::", "factor"),
          ("MumpsFactor", "factor"), ("fem::assemble", "assemble"), ("fem::Assembl", "assemble"), ("calc_rigid_body", "assemble"), ("fem::distribute", "partition"),
          ("slabs::", "read"), ("partition::", "partition"), ("mesh::", "read"), ("estimate::", "error bars"), ("calc_surface_modes", "write"), ("gather", "write"),
          ("write_outputs", "write"), ("collect_bank", "write"), ("eigen::", "orthogonalise"))

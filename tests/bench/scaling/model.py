@@ -39,9 +39,12 @@ class Body:
     separator: float  # unknowns of the separator that halves the body
     surface_nodes: float
     file_bytes: float
+    columns: float = 1000  # of all unknowns that are in memory at the peak: the basis, its copies, the modes
     shrink: float = 2 ** (-2 / 3)  # separators of a level over those of the level above
     neighbours: float = 14  # ranks that a rank has to do with
     groups: float = 12  # of interface nodes that a rank is near to
+    more_flops: float = 0.0  # of a factorisation, per level of ranks: the interface last is no nested dissection
+    more_entries: float = 0.0  # of L
     mass_entries_per_row: float = 1.0  # 1: lumped
 
     def grow(self, unknowns, entries_power, flops_power):
@@ -96,6 +99,8 @@ def count_meetings(body, ranks):
     return 0 if ranks == 1 else min(ranks - 1, body.groups)
 
 
+PROGRAM_BYTES = 9e7  # what a rank holds before it has a matrix
+ORDERING_S_PER_NODE = 3e-6  # nested dissection by METIS, as the ranks order their interiors
 PROJECTED_SHARE = 0.4  # of DGEMM's rate: what a dense symmetric eigensolver reaches
 PROJECTED_TRIES = 1.7  # convergence tests of a slice, in units of the last: at 60, 80 and 100 % of the final basis
 
@@ -112,9 +117,7 @@ def count_front_flops(pivots, order):
 class Model:
     def __init__(self, body, rates, machine):
         self.body, self.rates, self.machine = body, rates, machine
-        # A rate of the code changes with the processor as DGEMM does, or with memory where a step is bound by that.
-        self.speed = machine.dense_gflops / rates.dense_gflops
-        self.memory = machine.memory_gb_s / rates.memory_gb_s
+        self.speed = machine.dense_gflops / rates.dense_gflops  # a rate of the code changes with the processor as DGEMM does
 
     def reduce_s(self, ranks, size):
         """Allreduce of `size` bytes: log2(p) steps there and back for short ones, each byte twice over the wire for long ones."""
@@ -127,14 +130,17 @@ class Model:
         """A step is bound by arithmetic or by memory, whichever takes longer."""
         return max(flops / (1e9 * gflops * self.speed), size / (1e9 * self.machine.memory_gb_s))
 
-    def calc(self, ranks, parallel_reading=True):
-        """{phase: (computing shared by all ranks, computing that does not shrink, messages)}, seconds on the critical path."""
+    def calc(self, ranks, parallel_reading=True, spread_fronts=False):
+        """{phase: (computing shared by all ranks, computing that does not shrink, messages)}, seconds on the critical path.
+
+        spread_fronts: what is not built: a front of level l belongs to the p / 2^l ranks below it, which reach half of their rate together, in panels of
+        64 columns; and the interface is ordered by nested dissection, in time that grows with its size alone."""
         body, rates, machine, p = self.body, self.rates, self.machine, ranks
         n = body.unknowns
         levels = find_levels(p)
         blocks = body.right_sides / body.block
         small = 8 * body.block
-        slow = 1 / min(self.speed, self.memory)  # codes of pointers and branches: whatever of processor and memory is worse
+        slow = 1 / self.speed
         out = {}
 
         # Reading and cutting: on rank 0 (METIS), or by slabs of the file with recursive bisection (about 70 collective steps a level) and
@@ -151,27 +157,33 @@ class Model:
         # Factor: the subtrees run side by side; above them one rank after the other, each front where it stands.
         fronts = find_fronts(body, p)
         top = sum(2**level * count_front_flops(*front) for level, front in enumerate(fronts))
-        shared = body.factorisations * max(body.factor_flops - top, 0.0) / p / (1e9 * rates.factor_gflops * self.speed)
+        flops = body.factor_flops * (1 + body.more_flops * levels)
+        shared = body.factorisations * max(flops - top, 0.0) / p / (1e9 * rates.factor_gflops * self.speed)
         path = sum(count_front_flops(*front) for front in fronts) / (1e9 * rates.front_gflops * self.speed)
         updates = sum(self.send_s(2, 8 * (order - pivots) ** 2 / 2) for pivots, order in fronts)
         plan = 0.0 if p == 1 else rates.plan_s * p**rates.plan_power * slow
+        if spread_fronts:
+            shares = [max(1.0, 0.5 * p / 2**level) for level in range(levels)]
+            path = sum(count_front_flops(*front) / share for front, share in zip(fronts, shares)) / (1e9 * rates.front_gflops * self.speed)
+            updates = sum(self.send_s(order / 64 * 2 * math.log2(2 * share), 8 * pivots * order / math.sqrt(share)) for (pivots, order), share in zip(fronts, shares))
+            plan = ORDERING_S_PER_NODE * find_interface_unknowns(body, p) / 3 * slow
         out["factor"] = (shared, body.factorisations * path + plan, body.factorisations * updates)
 
         # Solve: L is read twice per block of columns; fronts on the path wait for one another twice, down and up.
         top_entries = sum(2**level * (pivots * order - pivots**2 / 2) for level, (pivots, order) in enumerate(fronts))
-        own = max(body.entries - top_entries, 0.0) / p
+        own = max(body.entries * (1 + body.more_entries * levels) - top_entries, 0.0) / p
         shared = blocks * self.compute_s(4 * own * body.block, rates.solve_gflops, 16 * own)
-        path_entries = sum(pivots * order - pivots**2 / 2 for pivots, order in fronts)
+        path_entries = sum((pivots * order - pivots**2 / 2) / (shares[level] if spread_fronts else 1.0) for level, (pivots, order) in enumerate(fronts))
         path = blocks * self.compute_s(4 * path_entries * body.block, rates.solve_gflops, 16 * path_entries)
         exchange = blocks * (2 * count_meetings(body, p) * machine.latency_s + sum(2 * self.send_s(1, small * order) for _, order in fronts))
         out["solve"] = (shared, path, exchange)
 
         # Orthogonalise: per block one recurrence and one pass against the whole basis (half of its final size on average), Ritz vectors at
-        # the end; six small sums over the ranks a block; M z needs the halo when M is not diagonal. The projected problem is rank 0's.
+        # the end; nine sums over the ranks a block; M z needs the halo when M is not diagonal. The projected problem is rank 0's.
         flops = blocks * 4 * n * (body.basis / 2) * body.block + 2 * n * body.basis * body.modes
         shared = self.compute_s(flops / p, rates.orthogonalise_gflops, 0.0)
         projected = count_projected_flops(body) / (1e9 * PROJECTED_SHARE * rates.dense_gflops * self.speed)
-        sums = blocks * (5 * self.reduce_s(p, small * body.block) + self.reduce_s(p, small * body.basis / 2)) + self.reduce_s(p, 8 * body.basis * body.modes)
+        sums = blocks * (8 * self.reduce_s(p, small * body.block) + self.reduce_s(p, small * body.basis / 2)) + self.reduce_s(p, 8 * body.basis * body.modes)
         products = 0.0 if body.mass_entries_per_row <= 1 or p == 1 else blocks * 4 * self.send_s(body.neighbours, small * halo)
         out["orthogonalise"] = (shared, projected, sums + products)
 
@@ -183,12 +195,14 @@ class Model:
     def calc_seconds(self, ranks, **options):
         return {phase: sum(parts) for phase, parts in self.calc(ranks, **options).items()}
 
-    def calc_memory_bytes(self, ranks):
-        """Of the largest rank: its share of L and of the basis, and the largest front above the subtrees with what it comes from."""
+    def calc_memory_bytes(self, ranks, spread_fronts=False):
+        """Of the largest rank: MPI, PETSc and the program, its share of L and of the columns, the largest front above the subtrees and its child's."""
         body = self.body
         fronts = find_fronts(body, ranks)
-        largest = max((8 * order**2 / 2 for _, order in fronts), default=0.0)
-        return 8 * body.entries / ranks + 8 * body.unknowns * (body.basis + 3 * body.block) / ranks + 2 * largest
+        shares = [ranks / 2**level if spread_fronts else 1.0 for level in range(len(fronts))]
+        largest = max((8 * order**2 / 2 / share for (_, order), share in zip(fronts, shares)), default=0.0)
+        entries = body.entries * (1 + body.more_entries * find_levels(ranks))
+        return PROGRAM_BYTES + 8 * entries / ranks + 8 * body.unknowns * body.columns / ranks + 2 * largest
 
     def count_messages(self, ranks):
         """{phase: (collective calls, point-to-point messages)} of a rank, for the check against counted ones."""
@@ -196,12 +210,23 @@ class Model:
         if p == 1:
             return {}
         blocks = body.right_sides / body.block
-        return {"orthogonalise": (6 * blocks, 0), "solve": (0, blocks * count_meetings(body, p)), "factor": (3 * body.factorisations, body.factorisations * 2 * count_meetings(body, p))}
+        meetings = count_meetings(body, p)
+        return {"orthogonalise": (9 * blocks, 0), "solve": (0, blocks * meetings), "factor": (50 + 3 * body.factorisations, body.factorisations * (3 + 2 * meetings))}
+
+    def calc_work_s(self, ranks):
+        """{phase: seconds of computing summed over the ranks}."""
+        body, rates = self.body, self.rates
+        work = {phase: ranks * shared + serial for phase, (shared, serial, _) in self.calc(ranks).items()}
+        # The fronts beside the path are somebody's work, too; together the factor and a solve cost what they cost one rank.
+        levels = find_levels(ranks)
+        work["factor"] = body.factorisations * body.factor_flops * (1 + body.more_flops * levels) / (1e9 * rates.factor_gflops * self.speed)
+        work["solve"] = 4 * body.entries * (1 + body.more_entries * levels) * body.right_sides / (1e9 * rates.solve_gflops * self.speed)
+        return work
 
 
-def find_limit(model, phase, ranks):
+def find_limit(model, phase, ranks, **options):
     """Which of the three parts of a phase is the largest: "shared", "serial" or "messages"."""
-    parts = model.calc(ranks)[phase]
+    parts = model.calc(ranks, **options)[phase]
     return ("shared", "serial", "messages")[max(range(3), key=lambda i: parts[i])]
 
 
