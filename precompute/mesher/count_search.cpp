@@ -35,6 +35,12 @@ bool is_level(const std::vector<Trial>& trials, double target) {
 }  // namespace
 
 double CountModel::calc_nodes(double edge_m) const {
+  if (is_wall) {
+    // One, then two and more rows of nodes between the skins as edges shrink; far below the wall as in a solid.
+    const double layers = volume_m3 / (edge_m * area_m2);
+    const double between = 1.4 * std::clamp(layers - 0.97, 0.0, 0.6) + 0.61 * std::max(0.0, layers - 1.57);
+    return factor * (1.55 + between) * area_m2 / (edge_m * edge_m);
+  }
   return factor * (0.61 * volume_m3 / std::pow(edge_m, 3) + 1.15 * area_m2 / (edge_m * edge_m));
 }
 

@@ -10,9 +10,11 @@
 
 namespace carillon::mesher {
 
-/// About how many nodes a body gets; fitted to meshes of the hollow bunny with 5,000 to 40,000 nodes.
+/// About how many nodes a body gets. Solids: volume and skin apart. Walls (`is_wall`, area of both skins): the skins alone until the wall
+/// leaves room between them; fitted to the hollow bunny with edges of a third to one of its wall, where it is right within 8 %.
 struct CountModel {
   double volume_m3 = 0, area_m2 = 0, factor = 1;
+  bool is_wall = false;
   double calc_nodes(double edge_m) const;
   double find_edge(double nodes) const;
 };

@@ -35,7 +35,7 @@ struct Order {
   std::optional<long long> nodes;
   std::string up, method;
   int order = 1;
-  bool straight = false;
+  bool straight = false, facets = false;
   bool quiet = false;
 };
 
@@ -110,7 +110,11 @@ void check_options(const Order& order) {
       const std::string hint = name == "wall" && shape.name == "box" ? "; --shape hollow-box has a wall" : "";
       throw InputError(fmt::format("--{} does not belong to --shape {}, which takes {}{}", name, shape.name, takes, hint));
     }
-    const char* foreign = order.scale ? "--scale" : !order.up.empty() ? "--up" : !order.method.empty() ? "--method" : nullptr;
+    const char* foreign = order.scale             ? "--scale"
+                          : !order.up.empty()     ? "--up"
+                          : !order.method.empty() ? "--method"
+                          : order.facets          ? "--facets"
+                                                  : nullptr;
     if (foreign) {
       throw InputError(fmt::format("{} is for surfaces; --shape {} takes its dimensions in metres: {}", foreign, shape.name, takes));
     }
@@ -140,6 +144,7 @@ Result make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.nodes = order.nodes;
   options.order = order.order;
   options.straight = order.straight;
+  options.facets = order.facets;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
   Result result;
@@ -211,6 +216,7 @@ std::string format_json(const Order& order, const Result& result, const mesh::Ch
     text +=
         fmt::format("  \"method\": {},\n  \"input_triangles\": {},\n  \"scale\": {:.12g},\n  \"input_volume_m3\": {:.12g},\n",
                     quote(s.method == mesher::Method::kStuffing ? "stuffing" : "delaunay"), s.input_triangles, s.scale, s.input_volume_m3);
+    text += fmt::format("  \"facet_pieces\": {},\n", s.facet_pieces);
     text += fmt::format(
         "  \"expected_volume_m3\": {:.12g},\n  \"wall_min_m\": {:.9g},\n  \"wall_mean_m\": {:.9g},\n  \"wall_max_m\": {:.9g},\n",
         s.expected_volume_m3, s.wall_min_m, s.wall_mean_m, s.wall_max_m);
@@ -312,6 +318,7 @@ int run(int argc, char** argv) {
   app.add_option("--edge", order.edge, "Length of the edges in metres, in place of --nodes");
   app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [1]")->check(CLI::IsMember({1, 2}));
   app.add_flag("--straight", order.straight, "Order 2: mid-side nodes in the middle of their edges, not on the true surface");
+  app.add_flag("--facets", order.facets, "Surface: its facets are the body; without this a smooth surface through their corners is");
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
   app.add_flag("--quiet", order.quiet, "No progress on the way");
   std::map<std::string, std::string> help{

@@ -16,6 +16,8 @@
 #include "precompute/mesher/curve_mesh.hpp"
 #include "precompute/mesher/part_nodes.hpp"
 #include "precompute/mesher/quiet.hpp"
+#include "precompute/mesher/repair.hpp"
+#include "precompute/mesher/round_surface.hpp"
 #include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
@@ -26,10 +28,11 @@ namespace carillon::mesher {
 namespace {
 
 constexpr double kCountTolerance = 0.10;             // promised
-constexpr double kCountAim = 0.04;                   // where the search is content
+constexpr double kCountAim = 0.08;                   // where the search is content
 constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kSliverDeg = 12;
+constexpr double kRoundness = 1e-4;  // of the body's diagonal: facets that bulge less are as good as round
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
 constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
@@ -281,24 +284,38 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
                     report.layers_mean));
 }
 
+/// Takes the smooth surface through the corners in place of the facets, unless it runs through itself where they do not.
+void round(MendedSurface& mended, const SurfaceOptions& options, SurfaceReport& report) {
+  const double tolerance = kRoundness * calc_box(mended.surface.points).diagonal();
+  TriangleSurface rounded = round_surface(mended.surface, options.sharp_angle_deg, tolerance, report.facet_pieces);
+  if (report.facet_pieces == 1) return;
+  if (mended.clean && !is_clean(rounded)) {
+    report.facet_pieces = 1;
+    report.notes.push_back("The smooth surface through the facets' corners would run through itself; the facets were taken as they are.");
+    return;
+  }
+  mended.surface = std::move(rounded);
+}
+
 mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   Body body;
   TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
   report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
   scale_surface(raw, options, report);
   body.mended = phases.run("mending", [&] { return mend_surface(std::move(raw), options.surface, report); });
+  if (!options.facets && !report.wrapped) phases.run("rounding", [&] { return round(body.mended, options, report), 0; });
   body.wall_m = options.wall_m.value_or(0);
   const TriangleSurface& surface = body.mended.surface;
   report.input_area_m2 = calc_area(surface);
   report.input_volume_m3 = calc_volume(surface) - body.mended.offset_m * report.input_area_m2;
 
-  // The wall takes at most the whole volume; the inner skin is about as large as the outer one.
+  // The wall takes at most the whole volume; its two skins are about its volume over its thickness each.
   const double wall_volume = std::min(body.wall_m * report.input_area_m2, report.input_volume_m3);
-  body.model =
-      body.wall_m > 0 ? CountModel{wall_volume, 2 * report.input_area_m2} : CountModel{report.input_volume_m3, report.input_area_m2};
+  body.model = body.wall_m > 0 ? CountModel{.volume_m3 = wall_volume, .area_m2 = 2 * wall_volume / body.wall_m, .is_wall = true}
+                               : CountModel{.volume_m3 = report.input_volume_m3, .area_m2 = report.input_area_m2};
   body.thickness_m = body.wall_m > 0 ? body.wall_m : 2 * report.input_volume_m3 / report.input_area_m2;
-  // A second-order mesh has about seven and a half times as many nodes as corners.
-  if (options.order == 2) body.model.factor = 7.5;
+  // A second-order mesh of a solid has about seven and a half times as many nodes as corners, of a thin wall fewer.
+  if (options.order == 2) body.model.factor = body.wall_m > 0 ? 6.4 : 7.5;
   const double diagonal = calc_box(surface.points).diagonal();
   double edge = options.edge_m
                     ? *options.edge_m
@@ -321,6 +338,11 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   if (body.wall_m > 0 || !body.mended.clean || report.method == Method::kStuffing)
     body.field = phases.run("computing distances", [&] { return make_field(body, options, edge); });
   report.expected_volume_m3 = body.field ? calc_volume(*body.field, body.wall_m) : report.input_volume_m3;
+  if (body.wall_m > 0) {
+    body.model.volume_m3 = report.expected_volume_m3;
+    body.model.area_m2 = 2 * report.expected_volume_m3 / body.wall_m;
+    if (options.nodes) edge = body.model.find_edge(static_cast<double>(*options.nodes));
+  }
 
   const auto stuff_body = [&] {
     const auto refine = [&](double e) { return stuff(*body.field, body.wall_m, e); };

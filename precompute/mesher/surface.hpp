@@ -38,6 +38,7 @@ struct SurfaceOptions {
   std::optional<double> edge_m = std::nullopt;       // length of the tetrahedra's edges
   std::optional<std::int64_t> nodes = std::nullopt;  // nodes of the final mesh (order 2: with the mid-side ones), met within 10 %
   int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten
+  bool facets = false;                               // the facets are the body, not samples of a smooth surface
   bool straight = false;                             // order 2: all mid-side nodes in the middle, none on the true surface
   double sharp_angle_deg = 40;                       // an edge whose two faces turn by more than this, and not by noise, stays sharp
   Method method = Method::kAutomatic;
@@ -51,6 +52,7 @@ struct SurfaceReport {
   std::int64_t removed_triangles = 0;  // duplicate or degenerate ones
   std::int64_t flipped_triangles = 0;  // turned so that all of them face outward
   std::int64_t holes_closed = 0;       // boundary loops filled with triangles
+  int facet_pieces = 1;                // into how many each facet's sides were cut to follow the smooth surface through its corners
   bool wrapped = false;                // the surface could not be mended: its alpha wrap was meshed
   std::int64_t components = 0;         // of the input surface after mending
   double scale = 1;                    // metres per unit of the file, as applied

@@ -39,16 +39,31 @@ Triangle get_face(const mesh::TetMesh& mesh, std::int64_t e, int face) {
 /// The element at the other side of each face of each element; -1 at the boundary.
 std::vector<std::array<std::int32_t, 4>> find_neighbours(const mesh::TetMesh& mesh) {
   std::vector<std::array<std::int32_t, 4>> neighbours(static_cast<std::size_t>(mesh.tet_count()), {-1, -1, -1, -1});
-  std::unordered_map<Triangle, std::array<std::int32_t, 2>, KeyHash> open;
-  open.reserve(neighbours.size() * 2);
+  // Faces in buckets by their lowest node; few share one, so twins are found by looking through the bucket.
+  struct Entry {
+    std::int32_t middle, high, element;
+    int face;
+  };
+  std::vector<std::size_t> begin(mesh.nodes.size() + 1, 0);
+  for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
+    for (int f = 0; f < 4; ++f) ++begin[static_cast<std::size_t>(sorted(get_face(mesh, e, f))[0]) + 1];
+  for (std::size_t v = 1; v < begin.size(); ++v) begin[v] += begin[v - 1];
+  std::vector<Entry> entries(begin.back());
+  std::vector<std::size_t> end(begin.begin(), begin.end() - 1);
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (int f = 0; f < 4; ++f) {
-      const auto [found, fresh] = open.try_emplace(sorted(get_face(mesh, e, f)), std::array{e, f});
-      if (fresh) continue;
-      const auto [other, other_face] = found->second;
-      neighbours[e][f] = other;
-      neighbours[other][other_face] = e;
-      open.erase(found);
+      const Triangle key = sorted(get_face(mesh, e, f));
+      const std::size_t bucket = static_cast<std::size_t>(key[0]);
+      std::size_t n = begin[bucket];
+      while (n < end[bucket] && (entries[n].middle != key[1] || entries[n].high != key[2])) ++n;
+      if (n == end[bucket]) {
+        entries[end[bucket]++] = {key[1], key[2], e, f};
+        continue;
+      }
+      const Entry twin = entries[n];
+      neighbours[e][f] = twin.element;
+      neighbours[twin.element][twin.face] = e;
+      entries[n] = entries[--end[bucket]];
     }
   return neighbours;
 }
@@ -221,13 +236,15 @@ double calc_flatness(const std::array<Vec3, 4>& corners) {
   std::array<Vec3, 4> normal;
   for (int f = 0; f < 4; ++f)
     normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
-  double worst = 180;
+  std::array<double, 4> square;
+  for (int f = 0; f < 4; ++f) square[f] = dot(normal[f], normal[f]);
+  double most = 0;  // the square of the cosine of the flattest angle
   for (int i = 0; i < 4; ++i)
     for (int j = i + 1; j < 4; ++j) {
-      const double turn = std::atan2(norm(cross(normal[i], normal[j])), dot(normal[i], normal[j])) * 180 / std::numbers::pi;
-      worst = std::min({worst, turn, 180 - turn});
+      const double product = dot(normal[i], normal[j]);
+      most = std::max(most, product * product / (square[i] * square[j]));
     }
-  return worst;
+  return std::acos(std::sqrt(std::min(most, 1.0))) * 180 / std::numbers::pi;
 }
 
 }  // namespace carillon::mesher
