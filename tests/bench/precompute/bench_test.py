@@ -76,6 +76,12 @@ class Measuring(unittest.TestCase):
             measuring.replace_between("x", "t", "new")
 
 
+    def test_the_page_has_a_place_for_everything_that_is_renewed(self):
+        page = (pathlib.Path(__file__).resolve().parents[3] / "docs/performance.md").read_text()
+        for name in ("table", "goals", "phases", "proof", "table-800", "goals-800"):
+            self.assertIn("x", measuring.replace_between(page, name, "x"))
+
+
 class System(unittest.TestCase):
     def setUp(self):
         self.nodes, self.tets = make_cube()

@@ -64,6 +64,14 @@ class Model(unittest.TestCase):
         self.assertGreater(sizes[2], 2 * 8 * (2.5 * 900 * 2 ** (-2 / 3)) ** 2 / 2)
 
 
+    def test_spread_fronts_shrink_with_the_ranks_and_the_chain_does_not(self):
+        big = model.Model(BODY.grow(1e7, 4 / 3, 2), RATES, HERE)
+        times = [[big.calc(p, spread_fronts=spread)["factor"][1] for p in (64, 512)] for spread in (False, True)]
+        self.assertGreaterEqual(times[0][1], times[0][0])
+        self.assertLess(times[1][1], 0.5 * times[1][0])
+        self.assertLess(times[1][0], times[0][0])
+
+
 class Messages(unittest.TestCase):
     def test_the_innermost_known_function_says_the_phase(self):
         self.assertEqual(messages.find_phase(["PetscSFBcastBegin", "carillon::eigen::NodeMatrix::multiply", "carillon::io::run_job"]), "orthogonalise")
