@@ -179,10 +179,64 @@ void subtract_product_avx512(const Columns& a, const double* small, int small_st
     panel.store(b, first, rows);
   }
 }
+constexpr int kRowTile = 24;    // rows and
+constexpr int kColumnTile = 8;  // columns of A S in registers
+constexpr int kStripTiles = 4;  // row tiles that share a packed tile of S in the first-level cache
+
+// c (24 x 8) = a s; a: packed (count x 24), s: packed (count x 8). Stores `columns` columns of `rows` rows.
+CARILLON_AVX512 void combine_tile(const double* a, const double* s, int count, double* c, std::ptrdiff_t ldc, int rows, int columns) {
+  __m512d sum[3][kColumnTile];
+  for (auto& row : sum) {
+    for (__m512d& x : row) x = _mm512_setzero_pd();
+  }
+  for (int k = 0; k < count; ++k) {
+    const __m512d a0 = _mm512_loadu_pd(a + k * kRowTile), a1 = _mm512_loadu_pd(a + k * kRowTile + 8),
+                  a2 = _mm512_loadu_pd(a + k * kRowTile + 16);
+#pragma GCC unroll 8
+    for (int j = 0; j < kColumnTile; ++j) {
+      const __m512d x = _mm512_set1_pd(s[k * kColumnTile + j]);
+      sum[0][j] = _mm512_fmadd_pd(a0, x, sum[0][j]);
+      sum[1][j] = _mm512_fmadd_pd(a1, x, sum[1][j]);
+      sum[2][j] = _mm512_fmadd_pd(a2, x, sum[2][j]);
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    const int left = std::clamp(rows - 8 * i, 0, 8);
+    const auto mask = static_cast<__mmask8>((1 << left) - 1);
+    for (int j = 0; j < columns; ++j) _mm512_mask_storeu_pd(c + j * ldc + 8 * i, mask, sum[i][j]);
+  }
+}
+
+void combine_columns_avx512(const Columns& a, const double* small, int kept) {
+  const int groups = (kept + kColumnTile - 1) / kColumnTile;
+  const auto count = static_cast<std::ptrdiff_t>(a.count);
+  std::vector<double> packed(static_cast<std::size_t>(groups) * static_cast<std::size_t>(count) * kColumnTile, 0.0);
+  for (int j = 0; j < kept; ++j) {
+    double* to = packed.data() + (j / kColumnTile) * count * kColumnTile + j % kColumnTile;
+    for (std::ptrdiff_t k = 0; k < count; ++k) to[k * kColumnTile] = small[j * count + k];
+  }
+  std::vector<double> panel(static_cast<std::size_t>(kStripTiles * kRowTile) * static_cast<std::size_t>(count), 0.0);
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kStripTiles * kRowTile) {
+    const std::ptrdiff_t rows = std::min<std::ptrdiff_t>(kStripTiles * kRowTile, a.rows - first);
+    for (std::ptrdiff_t k = 0; k < count; ++k) {
+      const double* from = a.values + k * a.stride + first;
+      for (std::ptrdiff_t r = 0; r < rows; r += kRowTile)
+        std::copy_n(from + r, std::min<std::ptrdiff_t>(kRowTile, rows - r), panel.data() + (r * count) + k * kRowTile);
+    }
+    for (int g = 0; g < groups; ++g) {
+      for (std::ptrdiff_t r = 0; r < rows; r += kRowTile) {
+        combine_tile(panel.data() + r * count, packed.data() + g * count * kColumnTile, a.count, a.column(g * kColumnTile) + first + r,
+                     a.stride, static_cast<int>(std::min<std::ptrdiff_t>(kRowTile, rows - r)),
+                     std::min(kColumnTile, kept - g * kColumnTile));
+      }
+    }
+  }
+}
 #else
 bool has_avx512() { return false; }
 void multiply_transposed_avx512(const Columns&, const Columns&, double*, int) {}
 void subtract_product_avx512(const Columns&, const double*, int, const Columns&) {}
+void combine_columns_avx512(const Columns&, const double*, int) {}
 #endif
 
 constexpr int kNarrow = 32;  // Wider blocks are BLAS's own ground.
@@ -203,6 +257,7 @@ void subtract_product(const Columns& a, const double* small, int small_stride, c
 
 void combine_columns(const Columns& a, const double* small, int kept) {
   if (a.count == 0 || kept == 0) return;
+  if (has_avx512()) return combine_columns_avx512(a, small, kept);
   std::vector<double> panel(static_cast<std::size_t>(kRowsCombined) * static_cast<std::size_t>(a.count));
   for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsCombined) {
     const std::ptrdiff_t rows = std::min(kRowsCombined, a.rows - first);

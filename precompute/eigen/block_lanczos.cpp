@@ -41,7 +41,7 @@ constexpr PetscInt kDefaultBlock = 16;
 constexpr double kWellConditioned = 1e-2;  // Smallest pivot of the scaled Gram matrix that needs no second Cholesky QR,
 constexpr double kDependent = 1e-11;       // and smallest that Cholesky QR is trusted with.
 constexpr double kTaken = 1e-2;            // A projection that takes more of a column's square is done once more.
-constexpr double kAngle = 1e-8;            // Ritz vectors must be told apart from their neighbours to this angle,
+constexpr double kAngle = 1e-7;            // Ritz vectors must be told apart from their neighbours to this angle,
 constexpr double kSmallest = 1e-14;        // as far as residuals, relative to theta, can say.
 constexpr double kSame = 1e-9;             // Closer Ritz values are one.
 constexpr double kSeen = 1e-3;             // A Ritz value with this error is no phantom.
@@ -214,8 +214,8 @@ void Iteration::start() {
   check(BVGetArray(eps_->V, &array));
   const auto rows = static_cast<std::ptrdiff_t>(eps_->nloc);
   fixed_ = {array, rows, rows, static_cast<int>(fixed)};
-  basis_ = {array + fixed * rows, rows, rows, room_};
-  everything_ = {array, rows, rows, static_cast<int>(fixed) + room_};
+  basis_ = {array + fixed * rows, rows, rows, room_ + block_};
+  everything_ = {array, rows, rows, static_cast<int>(fixed) + room_ + block_};
   for (int j = 0; j < block_; ++j) std::copy_n(basis_.column(j), rows, w_.column(j));
   multiply_mass();
   invert();
@@ -577,10 +577,29 @@ void Iteration::restart(Ritz& ritz) {
   last_size_ = size_;
 }
 
+// The Ritz vectors once through the operator, y + V_next R s / theta, which costs next to nothing as V_next is at hand: what is left of
+// frequencies far above the shift, small in the M norm and large in the residual of K, is gone.
 void Iteration::finish(Ritz& ritz) {
   share_vectors(ritz);
   const auto count = static_cast<std::size_t>(eps_->nconv);
-  combine_columns(basis_.part(0, size_), pick_vectors(ritz, count).data(), static_cast<int>(count));
+  const Small picked = pick_vectors(ritz, count);
+  const int extra = next_width_;
+  for (int j = 0; j < extra; ++j) std::copy_n(w_.column(j), w_.rows, basis_.column(size_ + j));
+  const auto n = static_cast<std::size_t>(size_);
+  const std::size_t all = n + static_cast<std::size_t>(extra);
+  Small purified(all * count, 0.0);
+  for (std::size_t j = 0; j < count; ++j) {
+    const double* from = picked.data() + j * n;
+    double* to = purified.data() + j * all;
+    std::copy_n(from, n, to);
+    const double theta = ritz.theta[static_cast<std::size_t>(ritz.order[j])];
+    for (int k = 0; k < extra; ++k) {
+      for (int i = 0; i < width_; ++i)
+        to[n + static_cast<std::size_t>(k)] +=
+            coupling_[static_cast<std::size_t>(i * next_width_ + k)] * from[n - static_cast<std::size_t>(width_ - i)] / theta;
+    }
+  }
+  combine_columns(basis_.part(0, static_cast<int>(all)), purified.data(), static_cast<int>(count));
 }
 
 void Iteration::run() {
@@ -644,7 +663,7 @@ PetscErrorCode set_up(EPS eps) {
     eps->ncv = std::min(eps->n, std::max(eps->ncv, std::min(eps->n, eps->nev + 3 * settings.block)));
     if (eps->mpd == PETSC_DEFAULT) eps->mpd = eps->ncv;
     if (eps->max_it == PETSC_DEFAULT) eps->max_it = std::max<PetscInt>(200, 20 * eps->ncv / settings.block);
-    check(EPSAllocateSolution(eps, 0));
+    check(EPSAllocateSolution(eps, settings.block));  // One block more: the residuals', for the purification.
     check(EPS_SetInnerProduct(eps));
   });
 }

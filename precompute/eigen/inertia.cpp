@@ -60,6 +60,11 @@ Inertia InertiaCounter::take(double lambda, double reach) {
                   to_hz_(lambda)));
 }
 
+ShiftedFactor& InertiaCounter::get_factor() {
+  if (factor_ == nullptr) make_factor();
+  return *factor_;
+}
+
 void InertiaCounter::forget(double lambda) {
   std::erase_if(taken_, [&](const Inertia& taken) { return taken.lambda == lambda; });
 }

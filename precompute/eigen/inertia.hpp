@@ -29,8 +29,8 @@ class InertiaCounter {
   /// Throws SolveError when K - sigma M is singular all around, SystemError when memory does not suffice. Collective.
   Inertia take(double lambda, double reach = 1e-6);
 
-  /// The factor of the last take.
-  ShiftedFactor& get_factor() { return *factor_; }
+  /// The factor of the last take; one that is analysed only if there was none, or it was released. Collective.
+  ShiftedFactor& get_factor();
   /// Frees the factor; the next take makes another. Collective.
   void release() { factor_.reset(); }
 

@@ -172,14 +172,14 @@ void set_goal(EPS eps, const KrylovRequest& request) {
   PetscInt locked = 0;
   check(MatGetSize(request.stiffness, &n, nullptr));
   if (request.locked != nullptr) check(MatGetSize(request.locked, nullptr, &locked));
-  const PetscInt room = n - static_cast<PetscInt>(request.deflated.size()) - locked;
+  const PetscInt room = n - locked;
   PetscBool is_block = PETSC_FALSE;
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_block));
   if (is_block == PETSC_TRUE) {
     const PetscInt wanted = std::min(request.count, room);
     check(EPSSetWhichEigenpairs(eps, EPS_ALL));
     check(EPSSetInterval(eps, request.low, request.high));
-    check(EPSSetDimensions(eps, wanted, std::min(n, 3 * wanted + 12 * kBlock), PETSC_DEFAULT));
+    check(EPSSetDimensions(eps, wanted, std::min(n, 9 * wanted / 4 + 6 * kBlock), PETSC_DEFAULT));
     return;
   }
   // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the
@@ -188,6 +188,25 @@ void set_goal(EPS eps, const KrylovRequest& request) {
   const PetscInt ncv = std::min(room, wanted + (request.sigma > 0 ? wanted / 2 : wanted) + 30);
   check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
   check(EPSSetDimensions(eps, wanted, ncv, ncv));
+}
+
+// For the types that know no locked columns.
+void set_deflation_space(EPS eps, const KrylovRequest& request) {
+  if (request.locked == nullptr) return;
+  PetscInt count = 0;
+  check(MatGetSize(request.locked, nullptr, &count));
+  std::vector<petsc::VecHandle> vectors(static_cast<std::size_t>(count));
+  std::vector<Vec> plain;
+  for (PetscInt j = 0; j < count; ++j) {
+    petsc::VecHandle& vector = vectors[static_cast<std::size_t>(j)];
+    Vec column = nullptr;
+    check(MatCreateVecs(request.stiffness, vector.out(), nullptr));
+    check(MatDenseGetColumnVecRead(request.locked, j, &column));
+    check(VecCopy(column, vector));
+    check(MatDenseRestoreColumnVecRead(request.locked, j, &column));
+    plain.push_back(vector);
+  }
+  check(EPSSetDeflationSpace(eps, count, plain.data()));
 }
 
 }  // namespace
@@ -232,16 +251,23 @@ void FoundModes::add(EPS eps, PetscInt i, double eigenvalue) {
   lambda.push_back(eigenvalue);
 }
 
-petsc::MatHandle FoundModes::copy_between(double low, double high) const {
+petsc::MatHandle FoundModes::copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const {
   std::vector<PetscInt> wanted;
   for (std::size_t j = 0; j < lambda.size(); ++j) {
     if (lambda[j] > low && lambda[j] < high) wanted.push_back(static_cast<PetscInt>(j));
   }
-  if (wanted.empty()) return {};
-  petsc::MatHandle copy = make_columns(static_cast<PetscInt>(wanted.size()));
+  if (wanted.empty() && others.empty()) return {};
+  petsc::MatHandle copy = make_columns(static_cast<PetscInt>(wanted.size() + others.size()));
   const LocalColumns from(columns_);
   const LocalColumns to(copy);
-  for (std::size_t j = 0; j < wanted.size(); ++j) std::copy_n(from.column(wanted[j]), from.rows, to.column(static_cast<PetscInt>(j)));
+  PetscInt at = 0;
+  for (const PetscInt j : wanted) std::copy_n(from.column(j), from.rows, to.column(at++));
+  for (const auto& other : others) {
+    const PetscScalar* values = nullptr;
+    check(VecGetArrayRead(other, &values));
+    std::copy_n(values, to.rows, to.column(at++));
+    check(VecRestoreArrayRead(other, &values));
+  }
   return copy;
 }
 
@@ -291,23 +317,9 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   if (is_block == PETSC_TRUE) {
     check(set_locked(eps, request.locked));
     set_starting_block(eps, request);
+  } else {
+    set_deflation_space(eps, request);
   }
-  std::vector<Vec> deflated = request.deflated;
-  std::vector<petsc::VecHandle> locked_vectors;
-  if (is_block == PETSC_FALSE && request.locked != nullptr) {
-    PetscInt count = 0;
-    check(MatGetSize(request.locked, nullptr, &count));
-    for (PetscInt j = 0; j < count; ++j) {
-      Vec column = nullptr;
-      locked_vectors.emplace_back();
-      check(MatCreateVecs(request.stiffness, locked_vectors.back().out(), nullptr));
-      check(MatDenseGetColumnVecRead(request.locked, j, &column));
-      check(VecCopy(column, locked_vectors.back()));
-      check(MatDenseRestoreColumnVecRead(request.locked, j, &column));
-      deflated.push_back(locked_vectors.back());
-    }
-  }
-  if (!deflated.empty()) check(EPSSetDeflationSpace(eps, static_cast<PetscInt>(deflated.size()), deflated.data()));
   if (request.progress) check(EPSMonitorSet(eps, report_progress, const_cast<KrylovRequest*>(&request), nullptr));
 
   check(EPSSolve(eps));

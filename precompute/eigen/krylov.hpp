@@ -20,8 +20,8 @@ class FoundModes {
   void reset(Mat stiffness, PetscInt capacity);
   /// Copies pair i of a solved eigensolver. Collective.
   void add(EPS eps, PetscInt i, double eigenvalue);
-  /// The modes with low < lambda < high in a matrix of their own; null if there are none. Collective.
-  petsc::MatHandle copy_between(double low, double high) const;
+  /// The modes with low < lambda < high and the other vectors in a matrix of their own; null if there are none. Collective.
+  petsc::MatHandle copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const;
   /// The columns by the order given, and nothing else; this object is empty afterwards. Collective.
   petsc::MatHandle take(const std::vector<std::size_t>& order);
 
@@ -46,8 +46,7 @@ struct KrylovRequest {
   PetscInt nearest = 0;                                  // and so many nearest sigma cover them (for what can only seek the nearest)
   Method method = Method::kAutomatic;                    // unless SLEPc's options say otherwise
   double tolerance = 1e-10;                              // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
-  std::vector<Vec> deflated;                             // M-orthonormal, the run stays M-orthogonal to them
-  Mat locked = nullptr;                                  // more of these, as columns
+  Mat locked = nullptr;                                  // M-orthonormal columns, the run stays M-orthogonal to them; may be null
   const std::vector<Vec3>* position = nullptr;           // of the nodes: what the starting block is made of
   int round = 0;                                         // starting blocks of different rounds differ
   std::function<void(std::int64_t converged)> progress;  // may be empty

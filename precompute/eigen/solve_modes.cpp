@@ -47,8 +47,7 @@ constexpr double kSafeMargin = 1e-7;       // Counts nearer to a mode (relative 
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
 constexpr int kRounds = 60;                // Krylov runs per interval at most until its count is met,
 constexpr int kIdleRounds = 2;             // and so many without a new mode.
-constexpr double kKrylovTolerance = 1e-2;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
-constexpr double kShiftBottom = 0.4;       // Where in a slice that starts at the bottom of the spectrum the shift is.
+constexpr double kKrylovTolerance = 0.1;   // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -62,6 +61,7 @@ class BandSolver {
 
  private:
   void solve_dense_band();
+  void make_counter();
   void solve_sparse_band();
   Slice count_band();
   std::vector<Slice> cut(const Slice& band);
@@ -192,9 +192,13 @@ std::vector<Slice> BandSolver::cut(const Slice& band) {
   return cut_into_slices(wanted, kSliceModes, count);
 }
 
+void BandSolver::make_counter() {
+  counter_ = std::make_unique<InertiaCounter>(problem_, options_, modes_.seconds, modes_.factor, [this](double x) { return to_hz(x); });
+}
+
 void BandSolver::solve_sparse_band() {
   report(Phase::kAnalyse, 0);
-  counter_ = std::make_unique<InertiaCounter>(problem_, options_, modes_.seconds, modes_.factor, [this](double x) { return to_hz(x); });
+  make_counter();
   const Slice band = count_band();
   if (band.count() == 0) return describe_proof();
   if (n_ <= kDenseRowsFull && 4 * band.below_high > n_) {
@@ -213,7 +217,6 @@ void BandSolver::solve_sparse_band() {
   for (const Slice& slice : slices) solve_slice(slice);
   prove();
   describe_proof();
-  counter_->release();
   take_found();
 }
 
@@ -242,10 +245,9 @@ void BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sig
   request.tolerance = kKrylovTolerance * options_.tolerance;
   request.position = &problem_.nodes.position;
   request.round = round;
-  for (const auto& vector : rigid_) request.deflated.push_back(vector);
   // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be held away.
   const double margin = 0.02 * (slice.high - slice.low);
-  const petsc::MatHandle locked = found_.copy_between(slice.low - margin, slice.high + margin);
+  const petsc::MatHandle locked = found_.copy_between(slice.low - margin, slice.high + margin, rigid_);
   request.locked = locked;
   const auto before = static_cast<std::int64_t>(found_.lambda.size());
   request.progress = [&](std::int64_t converged) { report(Phase::kIterate, before + converged); };
@@ -284,10 +286,7 @@ void BandSolver::find_missing(const Slice& slice, double sigma) {
 
 void BandSolver::solve_slice(const Slice& slice) {
   if (slice.count() == 0) return;
-  // From the bottom of the spectrum nothing needs to be skipped but what is deflated; a slice high up is found from its middle.
-  const std::int64_t from_bottom = slice.below_high - modes_.rigid_count;
-  const bool starts_at_bottom = slice.low < 0.05 * slice.high && 5 * (from_bottom - slice.count()) <= slice.count();
-  find_missing(slice, std::lerp(slice.low, slice.high, starts_at_bottom ? kShiftBottom : 0.5));
+  find_missing(slice, std::midpoint(slice.low, slice.high));
 }
 
 // Distance of the nearest mode found, relative to lambda.
@@ -406,12 +405,14 @@ void BandSolver::refine(ModeErrors& errors) {
   RefineRequest request;
   request.operators = operators_.get();
   request.tolerance = options_.tolerance;
-  std::unique_ptr<ShiftedFactor> factor;
   request.get_factor = [&]() -> ShiftedFactor& {
-    if (factor == nullptr) factor = make_mumps_factor(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position);
-    return *factor;
+    if (counter_ == nullptr) make_counter();
+    return counter_->get_factor();
   };
+  const FactorStatistics before = modes_.factor;  // Mending has a factor of its own, which is not the story of the solve.
   const RefineCost cost = refine_modes(request, modes_.lambda, modes_.shapes, errors);
+  modes_.factor = before;
+  counter_.reset();
   modes_.factor.factorisations += cost.factorisations;
   modes_.factor.solves += cost.solves;
   for (std::size_t j = 0; j < errors.residual.size(); ++j) {

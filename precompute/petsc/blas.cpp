@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "precompute/petsc/session.hpp"
+#include <vector>
 
 namespace carillon::petsc {
 namespace {
@@ -51,6 +52,20 @@ bool blas_is_reference() { return find_blas_maker(find_blas_file()) == "referenc
 void pin_blas_threads() {
   if (auto* set = find_symbol<void (*)(int)>("openblas_set_num_threads"); set != nullptr) set(1);
   if (auto* set = find_symbol<void (*)(int)>("omp_set_num_threads"); set != nullptr) set(1);
+}
+
+void reserve_blas_memory(MPI_Comm comm) {
+  constexpr std::size_t kBytes = std::size_t{160} << 20;  // OpenBLAS 0.3 takes 128 MB
+  constexpr PetscBLASInt kSize = 128;                     // beyond its kernels for small matrices, which need no such memory
+  run_agreed(comm, [&] {
+    void* room = std::malloc(kBytes);
+    if (room == nullptr)
+      throw SystemError("Out of memory at the start: OpenBLAS alone needs 0.13 GB of address space. Raise the limit (ulimit -v).");
+    std::free(room);
+    std::vector<double> a(kSize * kSize, 1.0), b(a), c(a);
+    const double one = 1.0, zero = 0.0;
+    BLASgemm_("N", "N", &kSize, &kSize, &kSize, &one, a.data(), &kSize, b.data(), &kSize, &zero, c.data(), &kSize);
+  });
 }
 
 }  // namespace carillon::petsc

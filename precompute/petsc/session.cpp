@@ -67,7 +67,7 @@ void agree_on(MPI_Comm comm, int kind, const std::string& text) {
 
 }  // namespace
 
-Session::Session(int& argc, char**& argv) {
+Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_options) {
   int is_initialized = 0;
   MPI_Initialized(&is_initialized);
   if (is_initialized == 0) {
@@ -77,9 +77,15 @@ Session::Session(int& argc, char**& argv) {
   // PETSc reads these even when it is told to skip its option files.
   unsetenv("PETSC_OPTIONS");
   unsetenv("PETSC_OPTIONS_YAML");
-  static std::array<std::string, 3> own{"carillon", "-skip_petscrc", "-no_signal_handler"};
-  static std::array<char*, 4> own_argv{own[0].data(), own[1].data(), own[2].data(), nullptr};
-  int own_argc = 3;
+  // PETSc keeps the pointers for as long as it runs.
+  static std::vector<std::string> own;
+  static std::vector<char*> own_argv;
+  own = {"carillon", "-skip_petscrc", "-no_signal_handler"};
+  own.insert(own.end(), petsc_options.begin(), petsc_options.end());
+  own_argv.clear();
+  for (std::string& word : own) own_argv.push_back(word.data());
+  own_argv.push_back(nullptr);
+  int own_argc = static_cast<int>(own.size());
   char** own_args = own_argv.data();
   if (SlepcInitialize(&own_argc, &own_args, nullptr, nullptr) != 0) throw SystemError("PETSc and SLEPc do not start.");
   (void)PetscPushErrorHandler(record_error, nullptr);
@@ -93,6 +99,20 @@ Session::~Session() {
   int is_finalized = 0;
   MPI_Finalized(&is_finalized);
   if (started_mpi_ && is_finalized == 0) MPI_Finalize();
+}
+
+std::vector<std::string> find_unused_options() {
+  std::vector<std::string> unused;
+  PetscInt count = 0;
+  char** names = nullptr;
+  char** values = nullptr;
+  check(PetscOptionsLeftGet(nullptr, &count, &names, &values));
+  for (PetscInt i = 0; i < count; ++i) {
+    const std::string name = names[i];
+    if (name != "skip_petscrc" && name != "no_signal_handler") unused.push_back("-" + name);
+  }
+  check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
+  return unused;
 }
 
 void check(PetscErrorCode code) {

@@ -8,17 +8,18 @@
 #include <exception>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace carillon::petsc {
 
 /// Starts MPI, PETSc and SLEPc, and ends them. One per program, made first in main and destroyed last.
 ///
-/// PETSc reads no option from the command line, from PETSC_OPTIONS or from its files, and installs no signal handlers: what a run does is
-/// in its job file alone. PETSc's errors are recorded instead of printed; check() turns them into exceptions.
-/// Throws SystemError when MPI or PETSc does not start.
+/// PETSc reads no option from PETSC_OPTIONS or from its files, takes of the command line what it is handed here ("-eps_monitor",
+/// "-eps_tol", "1e-9"), and installs no signal handlers: what a run does is in its job file and these words alone. PETSc's errors are
+/// recorded instead of printed; check() turns them into exceptions. Throws SystemError when MPI or PETSc does not start.
 class Session {
  public:
-  Session(int& argc, char**& argv);
+  Session(int& argc, char**& argv, const std::vector<std::string>& petsc_options = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -31,6 +32,9 @@ class Session {
   int size_ = 1;
   bool started_mpi_ = false;
 };
+
+/// Names of options that nobody has asked for so far: misspelt ones, at the end of a run. Local; the same on every rank.
+std::vector<std::string> find_unused_options();
 
 /// Throws if a PETSc or SLEPc call failed: SystemError for memory, file and library failures, SolveError for everything else, with PETSc's
 /// own words. Local: the other ranks do not know, so use it where an error is a defect or hits every rank alike.
@@ -77,6 +81,10 @@ std::string blas_name();
 bool blas_is_reference();
 /// One BLAS thread and one OpenMP thread per rank: the panels of the factor are too small for more, and spinning threads slow other ranks.
 void pin_blas_threads();
+
+/// Has OpenBLAS take its working memory (128 MB of address space) now: later, when there is none left, it asks for it for ever instead of
+/// failing. Collective. Throws SystemError on every rank where there is not so much.
+void reserve_blas_memory(MPI_Comm comm);
 
 /// "PETSc 3.18.5", "SLEPc 3.18.2", "Open MPI v4.1.4".
 std::string petsc_version();
