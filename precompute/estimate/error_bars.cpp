@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "precompute/estimate/algebraic.hpp"
 #include "precompute/estimate/recovery.hpp"
@@ -146,18 +147,25 @@ bool is_curved(MPI_Comm comm, const fem::LocalMesh& local) {
   return curved != 0;
 }
 
-/// The k-th lowest of numbers that lie in intervals around `centre` lies between the k-th lowest of all lower and of all upper ends.
-std::vector<double> widen_for_order(std::span<const double> lambda, const std::vector<double>& cents) {
+/// The k-th lowest of numbers that lie in intervals around their centres lies between the k-th lowest of all lower and of all upper ends.
+/// Modes above `top_hz`, which nobody computed, may really lie as much lower as the bars of the last quarter are wide.
+std::vector<double> widen_for_order(std::span<const double> lambda, double top_hz, const std::vector<double>& cents) {
   const std::size_t count = cents.size();
+  const auto to_cents = [&](double l) { return 600 * std::log2(l / lambda[0]); };
+  const double widest = *std::max_element(cents.end() - static_cast<std::ptrdiff_t>((count + 3) / 4), cents.end());
+  const double omega = 2 * std::numbers::pi * top_hz;
+  const double unknown = std::max(to_cents(lambda[count - 1]), top_hz > 0 ? to_cents(omega * omega) : 0.0) - widest;
   std::vector<double> low(count), high(count), result(count);
-  const auto centre = [&](std::size_t m) { return 600 * std::log2(lambda[m] / lambda[0]); };
   for (std::size_t m = 0; m < count; ++m) {
-    low[m] = centre(m) - cents[m];
-    high[m] = centre(m) + cents[m];
+    low[m] = to_cents(lambda[m]) - cents[m];
+    high[m] = to_cents(lambda[m]) + cents[m];
   }
   std::sort(low.begin(), low.end());
   std::sort(high.begin(), high.end());
-  for (std::size_t m = 0; m < count; ++m) result[m] = std::max(centre(m) - low[m], high[m] - centre(m));
+  for (std::size_t m = 0; m < count; ++m) {
+    const double centre = to_cents(lambda[m]);
+    result[m] = std::max(centre - std::min(low[m], unknown), high[m] - centre);
+  }
   return result;
 }
 
@@ -184,7 +192,7 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
     bars.parts.push_back(parts);
     cents.push_back(predict_cents(parts, bars.kind));
   }
-  bars.discretisation_cents = widen_for_order(solution.lambda, cents);
+  bars.discretisation_cents = widen_for_order(solution.lambda, solution.high_hz, cents);
   return bars;
 }
 

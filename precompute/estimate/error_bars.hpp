@@ -50,7 +50,7 @@ struct ErrorBars {
   /// The parts of the estimate as shares of lambda, without safety factors: for predict_cents() and for people.
   struct Parts {
     double interpolation = 0.0;   // energy of the stress that the elements cannot follow, lambda_h - lambda > 0
-    double energy = 0.0;          // of the whole mode: 1, as far as the sums of the estimate are right
+    double energy = 0.0;          // of the whole mode as the estimate sums it: 1 (0.99 for curved T10)
     double lumping = 0.0;         // of a lumped mass: lambda (consistent) - lambda (lumped)
     double geometry = 0.0;        // lambda (smooth surface) - lambda (surface of the mesh), signed
     double geometry_noise = 0.0;  // how uncertain `geometry` is, >= 0

@@ -10,8 +10,8 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <memory>
 #include <numeric>
-#include <optional>
 
 #include "precompute/estimate/surface.hpp"
 #include "precompute/petsc/session.hpp"
@@ -248,9 +248,10 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
   });
   MPI_Allreduce(MPI_IN_PLACE, size.data(), 2, MPI_DOUBLE, MPI_SUM, comm);
 
-  std::optional<Patches> patches;
+  std::unique_ptr<Patches> patches;
   petsc::run_agreed(comm, [&] {
-    patches.emplace(local.order == 1 ? 4 : 10, recovery.vertex_node.size() * solids.size(), std::cbrt(size[0] / size[1]));
+    patches =
+        std::make_unique<Patches>(local.order == 1 ? 4 : 10, recovery.vertex_node.size() * solids.size(), std::cbrt(size[0] / size[1]));
     for_each_sample(local, elements, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
   });
   patches->sum(recovery.vertices, elements.materials);

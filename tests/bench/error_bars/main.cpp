@@ -1,6 +1,9 @@
 // Error bars against known frequencies: a table on the screen and, on request, every mode as CSV.
 //
 //   error_bars [--modes FILE.csv] [--body NAME]... [--element "T4"|"T4 lumped"|"T10"|"T10 curved"|"T10 lumped"]...
+//   error_bars [--modes FILE.csv] --finest FINEST.msh [--mesh COARSER.msh]... [--count 30]
+//
+// The second form: the ceramic of OSG02's bunny in any shape; the modes of the finest mesh stand for the truth, within their own bars.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -8,7 +11,10 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "precompute/mesh/check.hpp"
+#include "precompute/mesh/read.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/estimate/bodies.hpp"
 
@@ -30,14 +36,61 @@ void write_modes(std::FILE* file, const Body& body, int fineness, MeshKind kind,
   std::fflush(file);
 }
 
+void print_head() {
+  fmt::print(
+      "| body | set | element | unknowns | modes | largest error, cents | bars hold | median bar / error | solve, CPU s | bars, CPU s |\n"
+      "|---|---|---|---|---|---|---|---|---|---|\n");
+}
+
+void print_row(const std::string& name, const std::string& set, const std::string& element, const Outcome& outcome) {
+  double largest = 0;
+  for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) largest = std::max(largest, std::abs(outcome.error_cents(m)));
+  fmt::print("| {} | {} | {} | {} | {} | {:.3g} | {:.0f} % | {:.2g} | {:.2f} | {:.3f} |\n", name, set, element, outcome.unknowns,
+             outcome.freq_hz.size(), largest, 100 * outcome.coverage(), outcome.median_width(), outcome.solve_cpu_s,
+             outcome.estimate_cpu_s);
+  std::fflush(stdout);
+}
+
+Outcome solve_file(const std::string& file, int count) {
+  mesh::TetMesh mesh = mesh::read_mesh(file);
+  mesh::check_mesh(mesh, file);
+  const double lambda = 3.99e9, mu = 2.05e9;
+  return solve(PETSC_COMM_WORLD, mesh, {},
+               estimate::make_isotropic(mu * (3 * lambda + 2 * mu) / (lambda + mu), lambda / (2 * (lambda + mu)), 2700), false, 20, 20e3,
+               count);
+}
+
+void compare_meshes(const std::string& finest, const std::vector<std::string>& coarser, int count, std::FILE* modes) {
+  const Outcome truth = solve_file(finest, count);
+  print_head();
+  print_row(finest, "finest", truth.bars.kind == estimate::Kind::kT4 ? "T4" : "T10 curved", truth);
+  for (const std::string& file : coarser) {
+    Outcome outcome = solve_file(file, count);
+    const std::size_t both = std::min(truth.freq_hz.size(), outcome.freq_hz.size());
+    outcome.true_hz.assign(truth.freq_hz.begin(), truth.freq_hz.begin() + static_cast<std::ptrdiff_t>(both));
+    for (std::size_t m = 0; m < both; ++m) outcome.truth_cents.push_back(truth.bar_cents(m) / 2);
+    const MeshKind kind = outcome.bars.kind == estimate::Kind::kT4    ? MeshKind::T4
+                          : outcome.bars.kind == estimate::Kind::kT10 ? MeshKind::T10
+                                                                      : MeshKind::T10Curved;
+    print_row(file, "test", describe(kind), outcome);
+    if (modes != nullptr) write_modes(modes, {.name = "bunny", .fineness = {}}, static_cast<int>(outcome.unknowns), kind, outcome);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::set<std::string> bodies, elements;
+  std::string finest;
+  std::vector<std::string> coarser;
+  int count = 30;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> modes(nullptr, &std::fclose);
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string option = argv[i], value = argv[i + 1];
     if (option == "--modes") modes.reset(std::fopen(value.c_str(), "w"));
+    if (option == "--finest") finest = value;
+    if (option == "--mesh") coarser.push_back(value);
+    if (option == "--count") count = std::stoi(value);
     if (option == "--body") bodies.insert(value);
     if (option == "--element") elements.insert(value);
   }
@@ -46,10 +99,11 @@ int main(int argc, char** argv) {
     fmt::print(modes.get(),
                "body,set,element,fineness,unknowns,mode,freq_hz,true_hz,truth_cents,algebraic_cents,discretisation_cents,error_cents,"
                "interpolation,energy,lumping,geometry,geometry_magnitude\n");
-  if (session.rank() == 0)
-    fmt::print(
-        "| body | set | element | unknowns | modes | largest error, cents | bars hold | median bar / error | solve, CPU s | bars, CPU s |\n"
-        "|---|---|---|---|---|---|---|---|---|---|\n");
+  if (!finest.empty()) {
+    compare_meshes(finest, coarser, count, modes.get());
+    return 0;
+  }
+  if (session.rank() == 0) print_head();
   for (const Body& body : get_bodies()) {
     if (!wants(bodies, body.name)) continue;
     for (const MeshKind kind : {MeshKind::T4, MeshKind::T4Lumped, MeshKind::T10, MeshKind::T10Curved, MeshKind::T10Lumped}) {
@@ -60,12 +114,7 @@ int main(int argc, char** argv) {
         const Outcome outcome = solve(PETSC_COMM_WORLD, body, body.fineness[f], kind);
         if (modes && session.rank() == 0) write_modes(modes.get(), body, body.fineness[f], kind, outcome);
         if (session.rank() != 0) continue;
-        double largest = 0;
-        for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) largest = std::max(largest, std::abs(outcome.error_cents(m)));
-        fmt::print("| {} | {} | {} | {} | {} | {:.3g} | {:.0f} % | {:.2g} | {:.2f} | {:.3f} |\n", body.name,
-                   body.training ? "training" : "test", describe(kind), outcome.unknowns, outcome.true_hz.size(), largest,
-                   100 * outcome.coverage(), outcome.median_width(), outcome.solve_cpu_s, outcome.estimate_cpu_s);
-        std::fflush(stdout);
+        print_row(body.name, body.training ? "training" : "test", describe(kind), outcome);
       }
     }
   }
