@@ -8,34 +8,14 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/shapes/shapes.hpp"
+#include "tests/support/lamb.hpp"
 #include "tests/support/subspace.hpp"
 
 namespace carillon::fem {
 namespace {
 
-/// The frequency equation of the spheroidal modes of degree n at k = omega a / c_T.
-double calc_spheroidal(unsigned n, double k, double nu) {
-  const auto j = [](unsigned degree, double x) { return std::sph_bessel(degree, x); };
-  const double h = k * std::sqrt((1 - 2 * nu) / (2 - 2 * nu));
-  const double t11 = (n * n - n - k * k / 2) * j(n, h) + 2 * h * j(n + 1, h), t13 = n * (n + 1) * ((n - 1) * j(n, k) - k * j(n + 1, k));
-  const double t41 = (n - 1) * j(n, h) - h * j(n + 1, h), t43 = (n * n - 1 - k * k / 2) * j(n, k) + k * j(n + 1, k);
-  return t11 * t43 - t13 * t41;
-}
-
-template <class Function>
-double find_root(double low, double high, Function&& f) {
-  EXPECT_LT(f(low) * f(high), 0);
-  for (int i = 0; i < 60; ++i) {
-    const double middle = (low + high) / 2;
-    (f(low) * f(middle) <= 0 ? high : low) = middle;
-  }
-  return low;
-}
-
-double find_s2(double nu) {
-  return find_root(2.2, 3.2, [&](double k) { return calc_spheroidal(2, k, nu); });
-}
-constexpr double kT2 = 2.5011326204094;  // torsional, j_2'-type equation: no nu in it
+using tests::find_s2;
+using tests::kT2;
 
 /// The first ten elastic modes: five times T2, five times S2.
 std::vector<double> calc_modes(const mesh::TetMesh& mesh, double nu, Form form) {
@@ -70,7 +50,7 @@ std::array<double, 2> calc_errors(const mesh::TetMesh& mesh, double nu, Form for
 }
 
 TEST(LambsEquation, has_the_published_roots) {
-  EXPECT_NEAR(find_s2(0.25), 2.6398692779019, 1e-12);  // Fourier-free oracle: the root with 14 digits, as tabulated for nu = 1/4
+  EXPECT_NEAR(find_s2(0.25), 2.6398692779019, 1e-12);
   EXPECT_NEAR(find_s2(0.0), 2.592038804114, 1e-11);
 }
 

@@ -1,0 +1,89 @@
+// The tables of docs/elements.md: how T4 and T10 converge on a ball (Lamb) and on a chime (3-D Fourier-Ritz), straight and curved, and near
+// nu = 1/2. Prints one line a mesh; fails only if a line cannot be made.
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/fem/assemble.hpp"
+#include "precompute/mesh/check.hpp"
+#include "precompute/petsc/session.hpp"
+#include "precompute/shapes/shapes.hpp"
+#include "tests/support/lamb.hpp"
+
+namespace carillon::fem {
+namespace {
+
+std::vector<double> calc_omega(const mesh::TetMesh& mesh, const spec::Material& material, Form form, double low_hz, double high_hz) {
+  Distribution pieces = distribute(PETSC_COMM_WORLD, mesh, {});
+  const System system = assemble(PETSC_COMM_WORLD, pieces.local, material, spec::Mass::consistent, form);
+  eigen::NodeLayout layout;
+  layout.position.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + pieces.local.free_nodes);
+  layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + pieces.local.free_nodes);
+  layout.component_count = pieces.components;
+  eigen::Options options;
+  options.low_hz = low_hz;
+  options.high_hz = high_hz;
+  std::vector<double> omega;
+  for (const double lambda : eigen::solve_modes({system.stiffness, system.mass, std::move(layout)}, options).lambda)
+    omega.push_back(std::sqrt(lambda));
+  return omega;
+}
+
+mesh::TetMesh make(const std::string& shape, const std::map<std::string, double>& dimensions, int order, double edge_m, bool straight) {
+  shapes::ShapeOptions options;
+  options.shape = shape;
+  options.dimensions = dimensions;
+  options.order = order;
+  options.edge_m = edge_m;
+  mesh::TetMesh mesh = shapes::make_shape(options);
+  return straight ? mesh::to_quadratic(mesh::to_linear(mesh)) : mesh;
+}
+
+void print_ball(const char* element, double nu, int order, Form form, bool straight) {
+  for (const double edge : {0.8, 0.45, 0.21}) {
+    const auto mesh = make("sphere", {{"radius", 1.0}}, order, edge, straight);
+    spec::Material material;
+    material.young_modulus_pa = 2 * (1 + nu);
+    material.poisson_ratio = nu;
+    material.density_kg_m3 = 1;
+    const auto omega = calc_omega(mesh, material, form, 0.1, 3.6 / (2 * std::numbers::pi));
+    ASSERT_GE(omega.size(), 10u);
+    double t2 = 0, s2 = 0;
+    for (int i = 0; i < 5; ++i) {
+      t2 = std::max(t2, std::abs(omega[i] / tests::kT2 - 1));
+      s2 = std::max(s2, std::abs(omega[5 + i] / tests::find_s2(nu) - 1));
+    }
+    fmt::print("ball   {:<24} nu {:<7} {:6} nodes {:6} elements  T2 {:8.4f} %  S2 {:8.4f} %\n", element, nu, mesh.nodes.size(),
+               mesh.tet_count(), 100 * t2, 100 * s2);
+  }
+}
+
+TEST(Convergence, of_the_ball) {
+  print_ball("T10 curved", 0.3, 2, Form::automatic, false);
+  print_ball("T10 straight", 0.3, 2, Form::automatic, true);
+  for (const double nu : {0.45, 0.49, 0.499, 0.4999}) print_ball("T10 curved", nu, 2, Form::automatic, false);
+  for (const double nu : {0.49, 0.4999}) print_ball("T10 displacement form", nu, 2, Form::displacement, false);
+  for (const double nu : {0.3, 0.4, 0.45, 0.4999}) print_ball("T4", nu, 1, Form::automatic, false);
+}
+
+TEST(Convergence, of_the_chime) {
+  // D3 of OSG02 Table 2: 0.505 m, outer radius 12.5 mm, wall 1 mm, aluminium of Table 1; exact in 3-D (Fourier-Ritz): 587.88302 Hz.
+  spec::Material aluminium;
+  aluminium.young_modulus_pa = 68351788079.47;
+  aluminium.poisson_ratio = 0.32980132450331;
+  aluminium.density_kg_m3 = 2700;
+  for (const bool straight : {false, true})
+    for (const double edge : {0.012, 0.008, 0.005}) {
+      const auto mesh = make("tube", {{"length", 0.505}, {"outer-radius", 0.0125}, {"wall", 0.001}}, 2, edge, straight);
+      const auto omega = calc_omega(mesh, aluminium, Form::automatic, 20, 800);
+      ASSERT_GE(omega.size(), 2u);
+      fmt::print("chime  {:<24}            {:6} nodes {:6} elements  first bending {:8.4f} %\n", straight ? "T10 straight" : "T10 curved",
+                 mesh.nodes.size(), mesh.tet_count(), 100 * (omega[0] / (2 * std::numbers::pi) / 587.88302 - 1));
+    }
+}
+
+}  // namespace
+}  // namespace carillon::fem
