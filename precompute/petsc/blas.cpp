@@ -3,9 +3,10 @@
 #include <fmt/core.h>
 
 #include <cstdlib>
+#include <vector>
 
 #include "precompute/petsc/session.hpp"
-#include <vector>
+#include "runtime/config/error.hpp"
 
 namespace carillon::petsc {
 namespace {
@@ -56,15 +57,20 @@ void pin_blas_threads() {
 
 void reserve_blas_memory(MPI_Comm comm) {
   constexpr std::size_t kBytes = std::size_t{160} << 20;  // OpenBLAS 0.3 takes 128 MB
-  constexpr PetscBLASInt kSize = 128;                     // beyond its kernels for small matrices, which need no such memory
+  constexpr int kSize = 128;                              // beyond its kernels for small matrices, which need no such memory
   run_agreed(comm, [&] {
     void* room = std::malloc(kBytes);
     if (room == nullptr)
       throw SystemError("Out of memory at the start: OpenBLAS alone needs 0.13 GB of address space. Raise the limit (ulimit -v).");
     std::free(room);
-    std::vector<double> a(kSize * kSize, 1.0), b(a), c(a);
+    using Gemm = void (*)(const char*, const char*, const int*, const int*, const int*, const double*, const double*, const int*,
+                          const double*, const int*, const double*, double*, const int*);
+    const auto dgemm = find_symbol<Gemm>("dgemm_");
+    if (dgemm == nullptr) return;
+    const std::vector<double> a(kSize * kSize, 1.0);
+    std::vector<double> c(a);
     const double one = 1.0, zero = 0.0;
-    BLASgemm_("N", "N", &kSize, &kSize, &kSize, &one, a.data(), &kSize, b.data(), &kSize, &zero, c.data(), &kSize);
+    dgemm("N", "N", &kSize, &kSize, &kSize, &one, a.data(), &kSize, a.data(), &kSize, &zero, c.data(), &kSize);
   });
 }
 
