@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """What goes wrong on one rank ends all ranks: one message, the right exit code, nothing left behind, no hang.
 
-usage: failures.py BIN_DIR bad_element|out_of_memory|killed_rank|disk|damaged_file
+usage: failures.py BIN_DIR bad_element|out_of_memory|rank_out_of_memory|killed_rank|disk|damaged_file
 """
 import os
 import random
@@ -52,6 +52,17 @@ def out_of_memory(folder):
         text = folder.expect(ranks, 4, ["GB"], before=limit)
         check("coarser" in text or "more ranks" in text or "memory" in text, f"no mend is named:\n{text}")
         print(f"{ranks} ranks: {text.split('error:')[1].strip()} ({time.monotonic() - started:.1f} s)")
+
+
+def rank_out_of_memory(folder):
+    """One rank alone runs out of memory, early and late: all end, with one message."""
+    folder.mesh("--shape", "bar", "--length", 0.3, "--width", 0.1, "--thickness", 0.1, "--nodes", 20000, "--order", 2, "-o", "bar.msh")
+    folder.write_job("bar.msh", band_hz=[20, 8000])
+    program = str(folder.bin / "carillon-precompute")
+    for megabytes in (400, 560):
+        command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-np", "1", program, "job.json", ":", "-np", "1", "prlimit", f"--as={megabytes << 20}", program,
+                   "job.json"]
+        folder.expect(2, 4, ["emory" if megabytes == 400 else "GB"], command=command)
 
 
 def killed_rank(folder):
@@ -121,7 +132,7 @@ def damaged_file(folder):
     folder.expect(2, 2, ["mesh.vtkhdf"])
 
 
-cases = {function.__name__: function for function in (bad_element, out_of_memory, killed_rank, disk, damaged_file)}
+cases = {function.__name__: function for function in (bad_element, out_of_memory, rank_out_of_memory, killed_rank, disk, damaged_file)}
 folder = Folder(sys.argv[1])
 with folder.scratch:
     cases[sys.argv[2]](folder)

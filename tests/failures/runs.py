@@ -34,9 +34,9 @@ class Folder:
     def command(self, ranks, before=(), job="job.json"):
         return ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none", *before, str(self.bin / "carillon-precompute"), job]
 
-    def run(self, ranks, before=(), job="job.json", timeout_s=100):
+    def run(self, ranks, before=(), job="job.json", timeout_s=100, command=None):
         """(exit code, both streams); a run that hangs fails the test."""
-        with subprocess.Popen(self.command(ranks, before, job), cwd=self.path, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        with subprocess.Popen(command or self.command(ranks, before, job), cwd=self.path, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                               text=True) as run:
             try:
                 return run.communicate(timeout=timeout_s)[0], run.returncode
