@@ -1,7 +1,7 @@
 // Method: a cubic patch over each triangle from its corners and the normals there. Normals are estimated from the facets of one side of the
 //   sharp edges, with weights that are exact on a sphere; sharp edges get cubics along the tangent of the circle through their points.
-//   Faces that are flat by design keep their normal at all their corners: polygons of more than four corners, faces much wider than their
-//   neighbours (a plane beside a fillet), and the two sides of a single bend.
+//   Faces that are flat by design keep their normal at all their corners: polygons of more than four corners or with sharp edges all
+//   around, faces much wider than their neighbours (a plane beside a fillet), and the two sides of a single bend; two such meet in a line.
 // Source: Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001, section 3 (the patch); Max, "Weights for computing vertex
 //   normals from facet normals", J. Graphics Tools 4(2), 1999 (the normals).
 // Deviations: they take normals from the modeller and leave creases open; the creases' own curves close them.
@@ -141,7 +141,7 @@ class Rounding {
     for (const auto& [ends, edge] : edges_)
       if (!edge.sharp && edge.turn_deg >= kFlatDeg) ++bends[face_[edge.faces[0]]], ++bends[face_[edge.faces[1]]];
     flat_.assign(face_.size(), 0);
-    for (const auto& [face, own] : corners) flat_[face] = own.size() > 4;
+    for (const auto& [face, own] : corners) flat_[face] = own.size() > 4 || bends[face] == 0;
     for (const auto& [ends, edge] : edges_) {
       if (edge.sharp || edge.turn_deg < kFlatDeg) continue;
       const Vec3 along = calc_unit(at(ends[1]) - at(ends[0]));
@@ -190,6 +190,11 @@ class Rounding {
     }
   }
 
+  /// True for the line in which two flat faces meet.
+  bool is_straight(const Edge& edge) const {
+    return edge.sharp && edge.count == 2 && flat_[face_[edge.faces[0]]] && flat_[face_[edge.faces[1]]];
+  }
+
   void find_edge_curves(double sharp_angle_deg) {
     std::map<std::int32_t, std::vector<std::int32_t>> along;  // points joined to each point by sharp edges
     for (const auto& [ends, edge] : edges_)
@@ -199,14 +204,17 @@ class Rounding {
     const auto calc_tangent = [&](std::int32_t v, std::int32_t next) {
       const auto& others = along.at(v);
       if (others.size() != 2) return Vec3{};
-      const Vec3 in = at(v) - at(others[0] == next ? others[1] : others[0]), out = at(next) - at(v);
+      const std::int32_t before = others[0] == next ? others[1] : others[0];
+      const Vec3 in = at(v) - at(before), out = at(next) - at(v);
       if (dot(in, out) < std::cos(sharp_angle_deg * std::numbers::pi / 180) * norm(in) * norm(out)) return Vec3{};
+      if (is_straight(edges_.at(make_ends(before, v)))) return calc_unit(in);
       return calc_unit((norm(out) / norm(in)) * in + (norm(in) / norm(out)) * out);
     };
     for (auto& [ends, edge] : edges_) {
       const Vec3 &a = at(ends[0]), &b = at(ends[1]), chord = b - a;
       std::array<Vec3, 2> step{chord, chord};  // three times the way to the control points
-      if (edge.sharp) {
+      if (is_straight(edge)) {
+      } else if (edge.sharp) {
         std::array<Vec3, 2> tangent{calc_tangent(ends[0], ends[1]), -1.0 * calc_tangent(ends[1], ends[0])};
         for (int side = 0; side < 2; ++side)  // a curve that ends here bends as it does at its other point
           if (!(norm(tangent[side]) > 0) && norm(tangent[1 - side]) > 0)

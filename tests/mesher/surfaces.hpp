@@ -59,6 +59,56 @@ inline Polygons make_sphere(double radius, int levels) {
   return s;
 }
 
+/// A torus around z, its ring of radius `large` in n steps, its tube of radius `small` in m.
+inline Polygons make_torus(double large, double small, int n, int m) {
+  Polygons s;
+  const double turn = 2 * std::acos(-1.0);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < m; ++j) {
+      const double r = large + small * std::cos(turn * j / m);
+      s.points.push_back({r * std::cos(turn * i / n), r * std::sin(turn * i / n), small * std::sin(turn * j / m)});
+    }
+  const auto at = [&](int i, int j) { return (i % n) * m + j % m; };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < m; ++j)
+      s.faces.insert(s.faces.end(), {{at(i, j), at(i + 1, j), at(i + 1, j + 1)}, {at(i, j), at(i + 1, j + 1), at(i, j + 1)}});
+  return s;
+}
+
+/// A prism along z over a polygon around the origin: sides of two triangles, ends as fans.
+inline Polygons make_prism(const std::vector<std::array<double, 2>>& outline, double length) {
+  Polygons s;
+  const int n = static_cast<int>(outline.size());
+  for (const double z : {-length / 2, length / 2})
+    for (const auto& [x, y] : outline) s.points.push_back({x, y, z});
+  s.points.push_back({0, 0, -length / 2});
+  s.points.push_back({0, 0, length / 2});
+  for (int i = 0; i < n; ++i) {
+    const int j = (i + 1) % n;
+    s.faces.insert(s.faces.end(), {{i, j, n + j}, {i, n + j, n + i}, {2 * n, j, i}, {2 * n + 1, n + i, n + j}});
+  }
+  return s;
+}
+
+inline Polygons make_cylinder(double radius, double length, int n) {
+  std::vector<std::array<double, 2>> outline;
+  for (int i = 0; i < n; ++i)
+    outline.push_back({radius * std::cos(2 * std::acos(-1.0) * i / n), radius * std::sin(2 * std::acos(-1.0) * i / n)});
+  return make_prism(outline, length);
+}
+
+/// A bar of the half widths a and b along z whose four long edges are fillets in `steps` steps.
+inline Polygons make_filleted_bar(double a, double b, double fillet, double length, int steps) {
+  std::vector<std::array<double, 2>> outline;
+  for (int corner = 0; corner < 4; ++corner)
+    for (int k = 0; k <= steps; ++k) {
+      const double angle = std::acos(-1.0) / 2 * (corner + 1.0 * k / steps);
+      const double x = (corner == 0 || corner == 3 ? 1 : -1) * (a - fillet), y = (corner < 2 ? 1 : -1) * (b - fillet);
+      outline.push_back({x + fillet * std::cos(angle), y + fillet * std::sin(angle)});
+    }
+  return make_prism(outline, length);
+}
+
 inline std::filesystem::path get_path(const std::string& name) {
   const auto folder = std::filesystem::temp_directory_path() / ("carillon_mesher_test_" + std::to_string(static_cast<long>(::getpid())));
   std::filesystem::create_directories(folder);
