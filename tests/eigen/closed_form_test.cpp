@@ -100,6 +100,28 @@ TEST(SolveModes, finds_every_copy_of_repeated_eigenvalues) {
   expect_band(solve_modes(system.problem, options), all, options);
 }
 
+TEST(SolveModes, finds_every_copy_when_blocks_are_narrower_than_the_multiplicity) {
+  Network three = make_cube_between_walls(6);
+  for (int copy = 1; copy < 3; ++copy) {
+    Network other = make_cube_between_walls(6);
+    for (Vec3& x : other.nodes) x[0] += 3.0 * copy;
+    three = test::join(three, other);
+  }
+  const test::System system = test::make_system(three);  // 1944 unknowns, up to 54 equal
+  std::vector<double> all;
+  for (const double lambda : calc_cube_eigenvalues(6)) all.insert(all.end(), 3, lambda);
+  Options options;
+  options.low_hz = 10;
+  options.high_hz = to_hz(0.5 * (all[280] + *std::upper_bound(all.begin(), all.end(), all[280] * (1 + 1e-9))));
+  const Modes modes = solve_modes(system.problem, options);
+  EXPECT_GT(modes.factor.solves, 0) << "the sparse path was meant to be tested";
+  expect_band(modes, all, options);
+  std::int64_t largest = 0;
+  for (const Cluster& cluster : modes.proof.clusters) largest = std::max(largest, cluster.count);
+  EXPECT_EQ(largest, 54);
+  EXPECT_EQ(modes.proof.rigid_per_component, (std::vector<std::int64_t>{0, 0, 0}));
+}
+
 TEST(SolveModes, counts_a_mode_on_the_end_of_the_band_as_in_it) {
   const test::System system = test::make_system(make_cube_between_walls(8));
   const std::vector<double> all = calc_cube_eigenvalues(8);

@@ -49,19 +49,19 @@ void visit_stiffness(const Network& network, Add&& add) {
 
 double to_hz(double lambda) { return std::sqrt(lambda) / (2 * std::numbers::pi); }
 
-System make_system(const Network& network) {
+System make_system(const Network& network, MPI_Comm comm) {
   int rank = 0;
   int size = 1;
-  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
   int count = 0;
   const std::vector<int> number = number_free_nodes(network, count);
   const int first = count * rank / size;
   const int last = count * (rank + 1) / size;
   System system;
-  check(MatCreateAIJ(PETSC_COMM_WORLD, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, 90, nullptr, 90, nullptr,
+  check(MatCreateAIJ(comm, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, 90, nullptr, 90, nullptr,
                      system.stiffness.out()));
-  check(MatCreateAIJ(PETSC_COMM_WORLD, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, 1, nullptr, 0, nullptr,
+  check(MatCreateAIJ(comm, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, 1, nullptr, 0, nullptr,
                      system.mass.out()));
   visit_stiffness(network, [&](int a, std::size_t i, int b, std::size_t j, double value) {
     const int row = number[static_cast<std::size_t>(a)];
@@ -90,6 +90,22 @@ System make_system(const Network& network) {
     problem.nodes.held[static_cast<std::size_t>(network.component[n])].push_back(network.nodes[n]);
   }
   return system;
+}
+
+Network reorder(const Network& network, const std::vector<int>& place) {
+  Network other = network;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    const auto to = static_cast<std::size_t>(place[i]);
+    other.nodes[to] = network.nodes[i];
+    other.mass_kg[to] = network.mass_kg[i];
+    other.component[to] = network.component[i];
+  }
+  for (Spring& spring : other.springs) {
+    spring.a = place[static_cast<std::size_t>(spring.a)];
+    spring.b = place[static_cast<std::size_t>(spring.b)];
+  }
+  for (int& node : other.held) node = place[static_cast<std::size_t>(node)];
+  return other;
 }
 
 std::vector<double> calc_all_eigenvalues(const Network& network) {

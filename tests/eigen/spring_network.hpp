@@ -23,13 +23,16 @@ struct Network {
   std::vector<int> held;  // nodes that do not move
 };
 
-/// A network as distributed matrices, free nodes in their order, split evenly.
+/// A network as distributed matrices, free nodes in their order, split evenly over the ranks of `comm`.
 struct System {
   petsc::MatHandle stiffness;
   petsc::MatHandle mass;
   Problem problem;
 };
-System make_system(const Network& network);
+System make_system(const Network& network, MPI_Comm comm = PETSC_COMM_WORLD);
+
+/// The same network with its nodes in another order: node i becomes node place[i].
+Network reorder(const Network& network, const std::vector<int>& place);
 
 /// All eigenvalues by LAPACK's dsyev of M^-1/2 K M^-1/2, ascending, from the network itself; the same on every rank.
 std::vector<double> calc_all_eigenvalues(const Network& network);

@@ -1,0 +1,215 @@
+// What the proof says, and that ranks, partitions and rounding have no say in the modes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "precompute/eigen/block_kernels.hpp"
+#include "precompute/eigen/local_columns.hpp"
+#include "precompute/eigen/node_matrix.hpp"
+#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
+#include "tests/eigen/spring_network.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+using test::make_block;
+using test::Network;
+using test::to_hz;
+
+TEST(Proof, counts_what_dense_lapack_counts) {
+  const Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {50, 0, 0}));
+  const std::vector<double> all = test::calc_all_eigenvalues(two);
+  const test::System system = test::make_system(two);
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(0.5 * (all[90] + all[91]));
+  const Modes modes = solve_modes(system.problem, options);
+  const Proof& proof = modes.proof;
+  ASSERT_EQ(proof.counts.size(), 3u) << "both ends and the shift";
+  for (const Count& count : proof.counts) {
+    const auto below = std::count_if(all.begin(), all.end(), [&](double x) { return x < std::pow(count.freq_hz * 2 * M_PI, 2); });
+    EXPECT_EQ(count.below, below) << count.freq_hz;
+    double margin = 1e9;
+    const double lambda = std::pow(count.freq_hz * 2 * M_PI, 2);
+    for (const double found : modes.lambda) margin = std::min(margin, std::abs(found - lambda) / lambda);
+    EXPECT_NEAR(count.margin / margin, 1.0, 1e-6);
+  }
+  EXPECT_TRUE(
+      std::is_sorted(proof.counts.begin(), proof.counts.end(), [](const Count& a, const Count& b) { return a.freq_hz < b.freq_hz; }));
+  EXPECT_LE(proof.counts.front().freq_hz, options.low_hz);
+  EXPECT_GE(proof.counts.back().freq_hz, options.high_hz);
+  EXPECT_EQ(proof.found, 91 - 12);
+  EXPECT_EQ(proof.rigid_per_component, (std::vector<std::int64_t>{6, 6}));
+  EXPECT_TRUE(proof.clusters.empty());
+  EXPECT_LT(proof.factor_backward_error, 1e-10);
+  EXPECT_NE(proof.method.find("L D L^T"), std::string::npos) << proof.method;
+}
+
+TEST(Proof, counts_a_small_body_by_its_whole_spectrum) {
+  const test::System system = test::make_system(make_block(3, 3, 4));
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = 1000;
+  const Modes modes = solve_modes(system.problem, options);
+  EXPECT_NE(modes.proof.method.find("dense"), std::string::npos);
+  EXPECT_EQ(modes.proof.counts.front().below, 6);
+  EXPECT_EQ(modes.proof.counts.back().below, 6 + modes.proof.found);
+}
+
+// Shapes of all modes on every rank, (nodes, 3, modes) by the network's first order of nodes.
+std::vector<double> gather_shapes(const Modes& modes, MPI_Comm comm, const std::vector<int>& place) {
+  const LocalColumns shapes(modes.shapes);
+  const auto nodes = place.size();
+  PetscInt first = 0;
+  check(MatGetOwnershipRange(modes.shapes, &first, nullptr));
+  std::vector<double> rows(3 * nodes * modes.lambda.size(), 0.0);
+  for (std::size_t j = 0; j < modes.lambda.size(); ++j) {
+    for (PetscInt i = 0; i < shapes.rows; ++i)
+      rows[j * 3 * nodes + static_cast<std::size_t>(first + i)] = shapes.column(static_cast<PetscInt>(j))[i];
+  }
+  MPI_Allreduce(MPI_IN_PLACE, rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, MPI_SUM, comm);
+  std::vector<double> ordered(rows.size());
+  for (std::size_t j = 0; j < modes.lambda.size(); ++j) {
+    for (std::size_t i = 0; i < nodes; ++i) {
+      for (std::size_t d = 0; d < 3; ++d) ordered[(j * nodes + i) * 3 + d] = rows[(j * nodes + static_cast<std::size_t>(place[i])) * 3 + d];
+    }
+  }
+  return ordered;
+}
+
+TEST(Canonical, modes_are_the_same_for_any_ranks_and_partition) {
+  // Three equal bodies: every mode three times; one more that differs by a billionth is told apart by nobody.
+  Network network = test::join(test::join(make_block(4, 4, 6), make_block(4, 4, 6, {30, 0, 0})), make_block(4, 4, 6, {0, 40, 0}));
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(test::calc_all_eigenvalues(make_block(4, 4, 6))[36] * 1.0001);
+  std::vector<int> place(network.nodes.size());
+  std::iota(place.begin(), place.end(), 0);
+  const test::System alone = test::make_system(network, PETSC_COMM_SELF);
+  const Modes reference = solve_modes(alone.problem, options);
+  const std::vector<double> expected = gather_shapes(reference, PETSC_COMM_SELF, place);
+  ASSERT_EQ(reference.lambda.size(), 93u);
+  EXPECT_EQ(reference.proof.clusters.size(), 31u);
+
+  const auto count = static_cast<int>(place.size());
+  for (const int stride : {1, 7, 125}) {  // None divides 288.
+    if (stride == 125 && count % 5 == 0) continue;
+    for (int i = 0; i < count; ++i) place[static_cast<std::size_t>(i)] = static_cast<int>((static_cast<std::int64_t>(i) * stride) % count);
+    const test::System system = test::make_system(test::reorder(network, place));
+    const Modes modes = solve_modes(system.problem, options);
+    ASSERT_EQ(modes.lambda.size(), reference.lambda.size());
+    for (std::size_t j = 0; j < modes.lambda.size(); ++j) EXPECT_NEAR(modes.lambda[j] / reference.lambda[j], 1.0, 1e-10) << j;
+    const std::vector<double> shapes = gather_shapes(modes, PETSC_COMM_WORLD, place);
+    double largest = 0;
+    double difference = 0;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      largest = std::max(largest, std::abs(expected[i]));
+      difference = std::max(difference, std::abs(shapes[i] - expected[i]));
+    }
+    EXPECT_LT(difference, 1e-6 * largest) << "stride " << stride;
+    ASSERT_EQ(modes.proof.clusters.size(), reference.proof.clusters.size());
+    for (std::size_t c = 0; c < modes.proof.clusters.size(); ++c) EXPECT_EQ(modes.proof.clusters[c].count, 3);
+  }
+}
+
+TEST(Memory, that_does_not_suffice_is_named_before_the_work) {
+  const test::System system = test::make_system(make_block(5, 5, 10));
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = 100;
+  options.memory_limit_bytes = 1;
+  for (const auto how : {Factorisation::kAutomatic, Factorisation::kMumps}) {
+    options.factorisation = how;
+    try {
+      solve_modes(system.problem, options);
+      ADD_FAILURE();
+    } catch (const SystemError& error) {
+      EXPECT_NE(std::string(error.what()).find("GB"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("coarser mesh"), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(BlockKernels, agree_with_plain_loops_at_odd_sizes) {
+  for (const int rows : {0, 1, 7, 25, 1031, 2053}) {
+    for (const int wide : {1, 5, 6, 13, 40}) {
+      for (const int narrow : {1, 3, 16, 17}) {
+        const std::ptrdiff_t stride = rows + 3;
+        std::vector<double> a(static_cast<std::size_t>(stride * wide));
+        std::vector<double> b(static_cast<std::size_t>(stride * narrow));
+        for (std::size_t i = 0; i < a.size(); ++i) a[i] = std::sin(1.7 * static_cast<double>(i));
+        for (std::size_t i = 0; i < b.size(); ++i) b[i] = std::cos(0.9 * static_cast<double>(i));
+        const Columns wide_block{a.data(), rows, stride, wide};
+        const Columns narrow_block{b.data(), rows, stride, narrow};
+        std::vector<double> gram(static_cast<std::size_t>(wide * narrow));
+        multiply_transposed(wide_block, narrow_block, gram.data(), wide);
+        const std::vector<double> old = b;
+        subtract_product(wide_block, gram.data(), wide, narrow_block);
+        for (int j = 0; j < narrow; ++j) {
+          std::vector<double> rest(static_cast<std::size_t>(rows));
+          std::copy_n(old.data() + j * stride, rows, rest.data());
+          for (int i = 0; i < wide; ++i) {
+            double sum = 0;
+            for (int r = 0; r < rows; ++r)
+              sum += a[static_cast<std::size_t>(i * stride + r)] * old[static_cast<std::size_t>(j * stride + r)];
+            EXPECT_NEAR(gram[static_cast<std::size_t>(j * wide + i)], sum, 1e-10);
+            for (int r = 0; r < rows; ++r) rest[static_cast<std::size_t>(r)] -= a[static_cast<std::size_t>(i * stride + r)] * sum;
+          }
+          for (int r = 0; r < rows; ++r) ASSERT_NEAR(b[static_cast<std::size_t>(j * stride + r)], rest[static_cast<std::size_t>(r)], 1e-8);
+        }
+        const std::vector<double> before = a;
+        const int kept = std::min(wide, narrow);
+        combine_columns(wide_block, gram.data(), kept);
+        for (int j = 0; j < kept; ++j) {
+          for (int r = 0; r < rows; ++r) {
+            double sum = 0;
+            for (int i = 0; i < wide; ++i)
+              sum += before[static_cast<std::size_t>(i * stride + r)] * gram[static_cast<std::size_t>(j * wide + i)];
+            ASSERT_NEAR(a[static_cast<std::size_t>(j * stride + r)], sum, 1e-8);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(NodeMatrix, multiplies_as_petsc_does) {
+  const test::System system = test::make_system(make_block(4, 5, 6));
+  for (Mat matrix : {system.stiffness.get(), system.mass.get()}) {
+    const NodeMatrix blocks(matrix);
+    petsc::VecHandle x;
+    petsc::VecHandle y;
+    check(MatCreateVecs(matrix, x.out(), y.out()));
+    PetscInt first = 0;
+    PetscInt last = 0;
+    check(MatGetOwnershipRange(matrix, &first, &last));
+    const auto rows = static_cast<std::ptrdiff_t>(last - first);
+    std::vector<double> in(static_cast<std::size_t>(rows * 19));
+    std::vector<double> out(in.size());
+    for (int j = 0; j < 19; ++j) {
+      for (std::ptrdiff_t i = 0; i < rows; ++i)
+        in[static_cast<std::size_t>(j * rows + i)] = std::sin(0.3 * static_cast<double>(first + i) + 1.1 * j);
+    }
+    blocks.multiply({in.data(), rows, rows, 19}, {out.data(), rows, rows, 19});
+    for (int j = 0; j < 19; ++j) {
+      PetscScalar* values = nullptr;
+      check(VecGetArray(x, &values));
+      std::copy_n(in.data() + j * rows, rows, values);
+      check(VecRestoreArray(x, &values));
+      check(MatMult(matrix, x, y));
+      const PetscScalar* result = nullptr;
+      check(VecGetArrayRead(y, &result));
+      for (std::ptrdiff_t i = 0; i < rows; ++i) EXPECT_NEAR(out[static_cast<std::size_t>(j * rows + i)], result[i], 1e-8);
+      check(VecRestoreArrayRead(y, &result));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::eigen
