@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
 
 #include "precompute/ldlt/local_rows.hpp"
 #include "precompute/ldlt/numeric.hpp"
@@ -46,6 +45,9 @@ struct Factor::State {
   double backward_error = 0;
   bool is_allocated = false;
 
+  /// Runs work, whose only SystemError is want of memory, and says how much is needed. Collective.
+  template <typename Work>
+  void name_need(Work&& work) const;
   void allocate();
   double calc_norm() const;
   /// y = (K - sigma M) x on this rank's rows. Collective.
@@ -53,20 +55,25 @@ struct Factor::State {
   double measure_backward_error();
 };
 
-void Factor::State::allocate() {
-  if (is_allocated) return;
+template <typename Work>
+void Factor::State::name_need(Work&& work) const {
   try {
-    petsc::run_agreed(plan.comm, [&] {
-      numbers = make_numbers(plan);
-      workspace = make_workspace(plan);
-    });
+    work();
   } catch (const SystemError&) {
     throw SystemError(
-        fmt::format("Out of memory: L D L^T of K - sigma M needs {:.2f} GB, {:.2f} GB on the fullest of {} ranks. Take a coarser mesh, or "
+        fmt::format("Out of memory: L D L^T of K - sigma M needs {:.3f} GB, {:.3f} GB on the fullest of {} ranks. Take a coarser mesh, or "
                     "more machines.",
                     1e-9 * static_cast<double>(plan.analysis.peak_bytes), 1e-9 * static_cast<double>(plan.analysis.largest_peak_bytes),
                     plan.analysis.ranks.size()));
   }
+}
+
+void Factor::State::allocate() {
+  if (is_allocated) return;
+  petsc::run_agreed(plan.comm, [&] {
+    numbers = make_numbers(plan);
+    workspace = make_workspace(plan);
+  });
   is_allocated = true;
 }
 
@@ -131,10 +138,12 @@ const Analysis& Factor::get_analysis() const { return state_->plan.analysis; }
 
 bool Factor::factorise(double sigma) {
   State& s = *state_;
-  s.allocate();
   s.sigma = sigma;
   s.norm = s.calc_norm();
-  factorise_fronts(s.plan, s.stiffness, s.mass, sigma, s.numbers);
+  s.name_need([&] {
+    s.allocate();
+    factorise_fronts(s.plan, s.stiffness, s.mass, sigma, s.numbers);
+  });
   s.backward_error = std::numeric_limits<double>::infinity();
   if (!s.numbers.is_complete || s.numbers.smallest <= kVanishedPivot * s.norm) return false;
   s.backward_error = s.measure_backward_error();

@@ -2,9 +2,14 @@
 #include "precompute/ldlt/factor.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
 #include <random>
+#include <string>
 
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
@@ -225,6 +230,35 @@ TEST(factor, sees_values_that_changed_since_the_analysis) {
   const double sigma = 0.5 * (lambda[100] + lambda[101]);
   ASSERT_TRUE(factor.factorise(0.25 * sigma));
   EXPECT_EQ(factor.get_negative_pivots(), 101);
+}
+
+TEST(factor, names_the_need_when_one_rank_runs_out_of_memory) {
+  const Pencil pencil = make_lattice(16, 6, 4, 1, MassKind::kDiagonal, 12);
+  Factor factor(pencil.k, pencil.m);
+  int rank = 0;
+  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+  rlimit before{};
+  getrlimit(RLIMIT_AS, &before);
+  long pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlimit tight{static_cast<rlim_t>(pages) * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + 64 * 1024, before.rlim_max};
+  // What earlier tests have freed is still this process's: it is taken up first, all but small pieces.
+  std::vector<void*> hoard;
+  hoard.reserve(100'000);
+  if (rank == find_ranks() - 1) {
+    setrlimit(RLIMIT_AS, &tight);
+    while (void* piece = std::malloc(256 * 1024)) hoard.push_back(piece);
+  }
+  std::string message;
+  try {
+    (void)factor.factorise(1.0);
+  } catch (const SystemError& error) {
+    message = error.what();
+  }
+  setrlimit(RLIMIT_AS, &before);
+  for (void* piece : hoard) std::free(piece);
+  EXPECT_NE(message.find(" GB"), std::string::npos) << "rank " << rank << ": '" << message << "'";
+  EXPECT_TRUE(factor.factorise(1.0));  // and with memory it goes on
 }
 
 TEST(factor, refuses_rows_that_are_not_whole_nodes) {
