@@ -27,11 +27,13 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kCountTolerance = 0.10;             // promised
-constexpr double kCountAim = 0.08;                   // where the search is content
+constexpr double kCountTolerance = 0.10;  // promised
+constexpr double kCountAim = 0.08;        // where the search is content; half of it for small meshes, which cost nothing
+constexpr double kSmallTarget = 5000;
 constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kSliverDeg = 12;
+constexpr double kVisible = 0.01;    // of a linear element's edge: bulges below this are lost in its own chords
 constexpr double kRoundness = 1e-4;  // of the body's diagonal: facets that bulge less are as good as round
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
@@ -145,7 +147,8 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
   double target = asked, nearest = 0;
   for (int n = 0; n < kMostFinishes; ++n) {
     mesh::TetMesh mesh = phases.run("refining", [&] {
-      return search_edge({target, options.order, longest, kCountTolerance, kCountAim}, body.model, edge_m, report.attempts, refine);
+      return search_edge({target, options.order, longest, kCountTolerance, target < kSmallTarget ? kCountAim / 2 : kCountAim}, body.model,
+                         edge_m, report.attempts, refine);
     });
     finish(mesh);
     const double count = std::max(static_cast<double>(count_nodes(mesh, options.order)), 1.0);
@@ -286,7 +289,11 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
 
 /// Takes the smooth surface through the corners in place of the facets, unless it runs through itself where they do not.
 void round(MendedSurface& mended, const SurfaceOptions& options, SurfaceReport& report) {
-  const double tolerance = kRoundness * calc_box(mended.surface.points).diagonal();
+  double tolerance = kRoundness * calc_box(mended.surface.points).diagonal();
+  // Linear elements as coarse as these cannot tell the difference.
+  const double nodes = static_cast<double>(options.nodes.value_or(10000));
+  const double shortest = options.edge_m.value_or(std::sqrt(calc_area(mended.surface) / nodes));
+  if (options.order == 1) tolerance = std::max(tolerance, kVisible * shortest);
   TriangleSurface rounded = round_surface(mended.surface, options.sharp_angle_deg, tolerance, report.facet_pieces);
   if (report.facet_pieces == 1) return;
   if (mended.clean && !is_clean(rounded)) {
