@@ -3,11 +3,14 @@
 #include <mpi.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "precompute/io/interrupt.hpp"
 #include "precompute/io/run_job.hpp"
@@ -52,14 +55,18 @@ void print_start(const petsc::Session& session, bool quiet) {
 
 int main(int argc, char** argv) {
   try {
-    const petsc::Session session(argc, argv);
+    // What follows "--" is for PETSc and SLEPc.
+    const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
+    const std::vector<std::string> solver_options(argv + std::min(own + 1, argc), argv + argc);
+    const petsc::Session session(argc, argv, solver_options);
     io::end_on_signals(session.rank());
     petsc::pin_blas_threads();
     MPI_Comm failures = MPI_COMM_NULL;
     MPI_Comm_dup(MPI_COMM_WORLD, &failures);
     CLI::App app(
         "Computes the vibration modes of a solid body and writes them as a mode bank.\n"
-        "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json",
+        "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json\n"
+        "Options of PETSc and SLEPc follow after --: carillon-precompute JOB.json -- -eps_type krylovschur",
         "carillon-precompute");
     std::string job;
     bool quiet = false;
@@ -68,9 +75,10 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
     int code = 0;
     try {
-      app.parse(argc, argv);
+      app.parse(own, argv);
       print_start(session, quiet);
-      const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, job, quiet);
+      petsc::reserve_blas_memory(PETSC_COMM_WORLD);
+      const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, job, quiet, solver_options);
       if (session.rank() == 0 && !quiet) fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
     } catch (const CLI::ParseError& error) {
       code = error.get_exit_code() == 0 ? 0 : kExitInput;

@@ -38,6 +38,7 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   const spec::JobSpec& job = run.job;
   mesh::TetMesh mesh = job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}) : mesh::read_mesh(job.mesh);
   body.check = mesh::check_mesh(mesh, body.source);
+  body.region_names = mesh.region_names;
   for (const std::string& line : body.check.warnings) run.stations.warn(line);
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);

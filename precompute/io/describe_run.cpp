@@ -78,20 +78,25 @@ Json::Value describe_solver(const eigen::Modes& modes) {
   return solver;
 }
 
-/// Wall clock of the slowest rank by what was done, over all stations and tries: read, partition, assemble, factor, solve, orthogonalise,
-/// errors, write.
+/// Wall clock of the slowest rank by what was done: read, partition, assemble, factor, solve, orthogonalise, errors, write; and what went
+/// before the last body was read (trials of other settings).
 Json::Value describe_phases(const Run& run, const eigen::Modes& modes) {
   Json::Value phases(Json::objectValue);
-  const auto add = [&](const char* phase, double seconds) { phases[phase] = phases.get(phase, 0.0).asDouble() + seconds; };
+  const auto add = [&](const std::string& phase, double seconds) { phases[phase] = phases.get(phase, 0.0).asDouble() + seconds; };
+  const std::vector<Station>& stations = run.stations.get_all();
+  const auto is_read = [](const Station& station) { return station.name == "read"; };
+  const auto last_read = std::find_if(stations.rbegin(), stations.rend(), is_read);
+  const auto begin = last_read == stations.rend() ? stations.begin() : last_read.base() - 1;
+  for (auto station = stations.begin(); station != begin; ++station) add("trials", station->seconds);
   const eigen::Seconds& s = modes.seconds;
-  for (const Station& station : run.stations.get_all()) {
-    if (station.name != "modes") {
-      add(station.name == "collect" ? "write" : station.name.c_str(), station.seconds);
-      continue;
+  for (auto station = begin; station != stations.end(); ++station) {
+    if (station->name == "modes") {
+      add("factor", s.analyse + s.factor);
+      add("solve", s.solve);
+      add("orthogonalise", std::max(0.0, station->seconds - s.analyse - s.factor - s.solve));
+    } else {
+      add(station->name == "collect" ? "write" : station->name, station->seconds);
     }
-    add("factor", s.analyse + s.factor);
-    add("solve", s.solve);
-    add("orthogonalise", std::max(0.0, station.seconds - s.analyse - s.factor - s.solve));
   }
   return phases;
 }
@@ -177,6 +182,7 @@ Json::Value describe_run(const Run& run, const Setting& setting, const Body& bod
   }
   root["phase_seconds"] = describe_phases(run, solved.modes);
   for (const std::int64_t bytes : peak_bytes) root["peak_bytes_by_rank"].append(Json::Int64(bytes));
+  root["solver_options"] = make_list(run.solver_options);
   root["chosen"]["element"] = spec::to_text(setting.element);
   root["chosen"]["tolerance"] = setting.tolerance;
   root["mesh"] = describe_mesh(body, setting);

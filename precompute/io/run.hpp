@@ -4,6 +4,7 @@
 #include <mpi.h>
 
 #include <string>
+#include <vector>
 
 #include "jobs/spec/job_spec.hpp"
 #include "precompute/io/run_record.hpp"
@@ -20,7 +21,8 @@ struct Run {
   MPI_Comm comm;
   int rank = 0;
   int ranks = 1;
-  spec::JobSpec job;  // the same on every rank
+  spec::JobSpec job;                        // the same on every rank
+  std::vector<std::string> solver_options;  // of PETSc and SLEPc, as the user gave them
   Stations stations;
 };
 

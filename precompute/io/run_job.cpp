@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/io/accuracy.hpp"
 #include "precompute/io/bank_content.hpp"
 #include "precompute/io/body.hpp"
 #include "precompute/io/describe_run.hpp"
@@ -51,16 +52,27 @@ void check_job(const Run& run) {
   });
 }
 
+/// An option that nothing asked for is misspelt, or belongs to a solver that did not run.
+void check_options_used(MPI_Comm comm) {
+  petsc::run_agreed(comm, [] {
+    const std::vector<std::string> unused = petsc::find_unused_options();
+    if (!unused.empty())
+      throw InputError(
+          fmt::format("the solver option \"{}\" was not used: it is misspelt, or belongs to a solver that did not run", unused[0]));
+  });
+}
+
 /// The bank of the solved body; rank 0 only has it. The shapes of all nodes are gone afterwards.
-bank::Bank collect_bank(Run& run, const Setting& setting, Body& body, SolvedBody& solved) {
+bank::Bank collect_bank(Run& run, AccurateBody& found) {
+  SolvedBody& solved = found.solved;
   run.stations.begin("collect", "shapes on the surface, radiation gains");
   std::vector<double> omega;
   for (const double lambda : solved.modes.lambda) omega.push_back(std::sqrt(lambda));
-  SurfaceModes surface_modes = calc_surface_modes(run.comm, solved.modes.shapes, omega, body.surface);
+  SurfaceModes surface_modes = calc_surface_modes(run.comm, solved.modes.shapes, omega, found.body.surface);
   solved.modes.shapes.reset();
   bank::Bank bank;
   petsc::run_agreed(run.comm, [&] {
-    if (run.rank == 0) bank = make_bank(run.job, setting, body, solved, surface_modes);
+    if (run.rank == 0) bank = make_bank(run.job, found.setting, found.body, solved, surface_modes);
   });
   run.stations.end();
   return bank;
@@ -73,13 +85,15 @@ std::string describe_result(const bank::Bank& bank) {
 }
 
 /// The record in the bank cannot tell what writing the bank takes; the one beside it does.
-RunSummary write_outputs(Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, bank::Bank bank) {
+RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   RunSummary summary;
   summary.bank = run.job.bank;
   summary.resolved = spec::find_resolved_path(run.job.bank);
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const std::vector<std::int64_t>& peak_bytes) {
-    return spec::resolved_json(run.job, folder, write_json(describe_run(run, setting, body, solved, peak_bytes)));
+    Json::Value record = describe_run(run, found.setting, found.body, found.solved, peak_bytes);
+    if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
+    return spec::resolved_json(run.job, folder, write_json(record));
   };
   run.stations.begin("write", summary.bank.string());
   std::vector<std::int64_t> peak_bytes = gather_peak_bytes(run.comm);
@@ -100,15 +114,22 @@ RunSummary write_outputs(Run& run, const Setting& setting, const Body& body, con
 
 }  // namespace
 
-RunSummary run_job(MPI_Comm comm, const fs::path& job_file, bool quiet) {
+RunSummary run_job(MPI_Comm comm, const fs::path& job_file, bool quiet, const std::vector<std::string>& solver_options) {
   Run run(comm, quiet);
+  run.solver_options = solver_options;
   run.job = read_shared_job(run, job_file);
   check_job(run);
-  const Setting setting = get_setting(run.job);
-  Body body = make_body(run, setting);
-  SolvedBody solved = solve_body(run, setting, body);
-  bank::Bank bank = collect_bank(run, setting, body, solved);
-  return write_outputs(run, setting, body, solved, std::move(bank));
+  AccurateBody found;
+  if (run.job.accuracy_cents) {
+    found = solve_to_accuracy(run);
+  } else {
+    found.setting = get_setting(run.job);
+    found.body = make_body(run, found.setting);
+    found.solved = solve_body(run, found.setting, found.body);
+  }
+  check_options_used(comm);
+  bank::Bank bank = collect_bank(run, found);
+  return write_outputs(run, found, std::move(bank));
 }
 
 }  // namespace carillon::io

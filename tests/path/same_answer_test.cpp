@@ -104,8 +104,8 @@ TEST(Progress, names_the_blas_and_every_station_and_quiet_says_nothing) {
   folder.write_job({}, R"("element": "T4", "max_modes": 1,)");
   const Outcome loud = folder.run(2);
   EXPECT_EQ(loud.code, 0);
-  for (const char* word :
-       {"on 2 ranks, BLAS: ", "mesh ", "partition ", "faces cut", "halo nodes", "assembly ", "modes ", "bank ", "write ", " MB peak"})
+  for (const char* word : {"on 2 ranks, BLAS: ", "read ", "partition ", "faces cut", "halo nodes", "assemble ", "modes ", "errors ",
+                           "collect ", "write ", " MB peak", "modes in 20 .. 20000 Hz", "by inertia, 6 rigid", "of the body to about"})
     EXPECT_THAT(loud.output, HasSubstr(word));
   const Outcome quiet = folder.run(1, "--quiet job.json");
   EXPECT_EQ(quiet.code, 0);

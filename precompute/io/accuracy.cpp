@@ -1,0 +1,405 @@
+// Method:     A coarse solve gives every mode's error bar in parts whose rates of convergence are known. They say how much finer the mesh
+//             must be; its cost follows from the nodes by measured exponents. What is predicted is then solved and its own error bars
+//             decide; where they fall short the rate that was measured between two trials slows a known one that is faster.
+// Source:     estimate::predict_cents (docs/error-bars.md). Of the costs: nested dissection in three dimensions takes n^2 operations and
+//             n^(4/3) entries (George 1973; Lipton, Rose, Tarjan 1979), of which a solve of this size sees an exponent near 1.5.
+// Deviations: none.
+#include "precompute/io/accuracy.hpp"
+
+#include <fmt/core.h>
+#include <json/json.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <type_traits>
+
+#include "precompute/eigen/memory.hpp"
+#include "precompute/petsc/session.hpp"
+#include "precompute/slabs/read_parallel.hpp"
+
+namespace carillon::io {
+namespace {
+
+constexpr std::size_t kMostTrials = 7;
+constexpr std::int64_t kCoarseShapeNodes = 1500, kCoarseSurfaceNodes = 6000;
+constexpr double kGoal = 0.85;                                 // of what was asked: aimed at, so that the next trial is the last
+constexpr double kFinestStep = 0.25;                           // the rates hold for edges so much shorter, see predict_cents()
+constexpr double kLeastStep = 0.9;                             // a trial that is not finer than this tells nothing new
+constexpr double kLinearFrom = 20e3;                           // nodes of ten-node tetrahedra above which those of four are looked at too
+constexpr int kMostRefinements = 4;                            // of a mesh file: 4,096 elements of each
+constexpr double kCpuExponent = 1.5, kByteExponent = 4.0 / 3;  // of the nodes, until two trials tell
+
+/// What all ranks do next; decided on rank 0.
+struct Decision {
+  int is_done = 0;
+  Setting setting;
+};
+
+static_assert(std::is_trivially_copyable_v<Decision>, "Decisions are sent as bytes.");
+
+double calc_mean_edge(MPI_Comm comm, const fem::LocalMesh& local) {
+  std::array<double, 2> sum{};  // of lengths, of edges
+  const int width = local.nodes_per_tet();
+  for (std::int32_t e = 0; e < local.tet_count(); ++e)
+    for (const auto& [a, b] : mesh::kEdges) {
+      const mesh::Vec3 &p = local.nodes_m[local.tets[e * width + a]], &q = local.nodes_m[local.tets[e * width + b]];
+      sum[0] += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+      sum[1] += 1;
+    }
+  MPI_Allreduce(MPI_IN_PLACE, sum.data(), 2, MPI_DOUBLE, MPI_SUM, comm);
+  return sum[0] / sum[1];
+}
+
+/// The largest predicted bar on a mesh with edges `ratio` times as long. A refined mesh file keeps its facets.
+double predict_worst(const estimate::ErrorBars& bars, bool keeps_geometry, double ratio) {
+  double worst = 0.0;
+  for (std::size_t k = 0; k < bars.parts.size(); ++k) {
+    estimate::ErrorBars::Parts parts = bars.parts[k];
+    if (keeps_geometry) {
+      const double rate = std::pow(ratio, bars.kind == estimate::Kind::kT10Curved ? 4 : 2);
+      parts.geometry /= rate;
+      parts.geometry_noise /= rate;
+    }
+    // What the bar holds beyond its parts (modes that change places) shrinks with them.
+    const double beyond = bars.discretisation_cents[k] / std::max(estimate::predict_cents(bars.parts[k], bars.kind), 1e-300);
+    worst = std::max(worst, std::clamp(beyond, 1.0, 10.0) * estimate::predict_cents(parts, bars.kind, ratio));
+  }
+  return worst;
+}
+
+/// The longest edges, as a part of those now, that are predicted to meet the goal; nothing above `least` does: `least`.
+double find_ratio(const estimate::ErrorBars& bars, double goal_cents, double least) {
+  if (predict_worst(bars, false, least) > goal_cents) return least;
+  double low = least, high = 1.0;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = std::sqrt(low * high);
+    (predict_worst(bars, false, middle) <= goal_cents ? low : high) = middle;
+  }
+  return low;
+}
+
+class Search {
+ public:
+  explicit Search(Run& run) : run_(run), asked_(*run.job.accuracy_cents) {
+    report_.asked_cents = asked_;
+    tolerance_ = std::clamp(2e-8 * asked_, 1e-10, 1e-6);
+  }
+  AccurateBody solve();
+
+ private:
+  void attempt(const Setting& setting);
+  Trial judge(const Setting& setting, std::size_t first_station);
+  Decision decide();
+  Decision decide_on_body();
+  Decision decide_on_file();
+  Setting make_setting(spec::Element element, double ratio) const;
+  const Trial* find_before(const Trial& trial) const;
+  double measure_exponent(double Trial::*quantity, double fallback, double least, double most) const;
+  Forecast forecast(const Setting& setting, double ratio) const;
+  void forecast_next();
+  void check_forecast(const Setting& setting);
+  std::string describe_reached() const;
+  [[noreturn]] void give_up(const std::string& why) const;
+
+  Run& run_;
+  double asked_;
+  double tolerance_;
+  bool is_refinable_ = false;       // the mesh file can be refined: rank 0 reads it
+  std::optional<Trial> quadratic_;  // while the linear trial is looked at: what ten nodes are predicted to need
+  Forecast quadratic_forecast_;
+  AccuracyReport report_;
+  AccurateBody current_;
+};
+
+/// The trial before, of the same element.
+const Trial* Search::find_before(const Trial& trial) const {
+  for (auto before = report_.trials.rbegin(); before != report_.trials.rend(); ++before)
+    if (before->setting.element == trial.setting.element && before->nodes < trial.nodes) return &*before;
+  return nullptr;
+}
+
+double Search::measure_exponent(double Trial::*quantity, double fallback, double least, double most) const {
+  const Trial& last = report_.trials.back();
+  const Trial* before = find_before(last);
+  if (before == nullptr || static_cast<double>(last.nodes) < 1.5 * static_cast<double>(before->nodes)) return fallback;
+  const double nodes = std::log(static_cast<double>(last.nodes) / static_cast<double>(before->nodes));
+  return std::clamp(std::log(last.*quantity / before->*quantity) / nodes, least, most);
+}
+
+/// From the last trial to edges `ratio` times as long.
+Forecast Search::forecast(const Setting& setting, double ratio) const {
+  const Trial& last = report_.trials.back();
+  Forecast next;
+  next.setting = setting;
+  const double dimension = -1.0 / measure_exponent(&Trial::edge_m, -1.0 / 3, -1.0 / 2, -1.0 / 3.3);  // thin bodies refine in two directions
+  const double growth = std::pow(ratio, -dimension);
+  next.nodes = static_cast<double>(last.nodes) * growth;
+  next.worst_cents = predict_worst(current_.solved.bars, setting.refinements > 0, ratio) + last.algebraic_cents;
+  next.cpu_seconds = last.cpu_seconds * std::pow(growth, measure_exponent(&Trial::cpu_seconds, kCpuExponent, 1.0, 2.2));
+  next.bytes = static_cast<double>(last.peak_bytes) * std::pow(growth, kByteExponent);
+  return next;
+}
+
+Setting Search::make_setting(spec::Element element, double ratio) const {
+  const Trial& last = report_.trials.back();
+  Setting setting = last.setting;
+  setting.element = element;
+  setting.tolerance = tolerance_;
+  setting.nodes.reset();
+  // A mesher's edges come out longer or shorter than was asked; the last mesh tells by how much.
+  const double asked_m = last.setting.edge_m.value_or(last.edge_m);
+  setting.edge_m = asked_m * ratio;
+  return setting;
+}
+
+std::string Search::describe_reached() const {
+  std::string text = fmt::format("{:g} cents were asked for", asked_);
+  const Trial* best = nullptr;
+  for (const Trial& trial : report_.trials)
+    if (trial.modes > 0 && (best == nullptr || trial.worst_cents < best->worst_cents)) best = &trial;
+  if (best == nullptr) return text + ", and no mode was found in the band";
+  return text + fmt::format(", and {:.3g} reached (at {:.1f} Hz, {}, {} nodes, {:.1f} CPU s)", best->worst_cents, best->worst_hz,
+                            describe(best->setting), best->nodes, best->cpu_seconds);
+}
+
+void Search::give_up(const std::string& why) const {
+  throw SolveError(fmt::format("{}: key 'accuracy_cents': {}; {}", run_.job.file.string(), describe_reached(), why));
+}
+
+/// Rank 0 decides on a body that is meshed here.
+Decision Search::decide_on_body() {
+  const Trial& last = report_.trials.back();
+  const estimate::ErrorBars& bars = current_.solved.bars;
+  if (last.modes == 0) {
+    const Trial* before = find_before(last);
+    if (before != nullptr && before->modes == 0) return {1, last.setting};  // twice none: there is none
+    return {0, make_setting(last.setting.element, 0.5)};
+  }
+  if (last.setting.element == spec::Element::T4 && quadratic_) {
+    // Ten nodes were tried first; the cheaper of the two forecasts goes on.
+    const double ratio = find_ratio(bars, kGoal * asked_, kFinestStep / 4);
+    const Forecast linear = forecast(make_setting(spec::Element::T4, ratio), ratio);
+    const bool is_linear_cheaper = linear.worst_cents <= asked_ && linear.cpu_seconds < quadratic_forecast_.cpu_seconds;
+    run_.stations.say(fmt::format("T4 would take about {:.0f} nodes, T10 {:.0f}: {} it is", linear.nodes, quadratic_forecast_.nodes,
+                                  is_linear_cheaper ? "T4" : "T10"));
+    quadratic_.reset();
+    return {0, is_linear_cheaper ? linear.setting : quadratic_forecast_.setting};
+  }
+  double ratio = find_ratio(bars, kGoal * asked_, kFinestStep);
+  if (const Trial* before = find_before(last); before != nullptr && before->modes > 0 && before->worst_cents > last.worst_cents) {
+    // A rate measured on coarse meshes is slower than what follows: half way between it and the known one.
+    const double order = std::log(before->worst_cents / last.worst_cents) / std::log(before->edge_m / last.edge_m);
+    const double measured = std::pow(kGoal * asked_ / last.worst_cents, 1.0 / std::clamp(order, 0.5, 6.0));
+    if (measured < ratio) ratio = std::sqrt(measured * ratio);
+  }
+  ratio = std::clamp(ratio, kFinestStep, kLeastStep);
+  const Forecast next = forecast(make_setting(last.setting.element, ratio), ratio);
+  if (report_.trials.size() == 1 && next.nodes > kLinearFrom) {
+    quadratic_ = last;
+    quadratic_forecast_ = next;
+    Setting linear = last.setting;
+    linear.element = spec::Element::T4;
+    return {0, linear};
+  }
+  return {0, next.setting};
+}
+
+/// Rank 0 decides on a mesh file: T4, T10, T10 refined.
+Decision Search::decide_on_file() {
+  const Trial& last = report_.trials.back();
+  Setting setting = last.setting;
+  setting.tolerance = tolerance_;
+  if (last.setting.element == spec::Element::T4) {
+    setting.element = spec::Element::T10;
+    return {0, setting};
+  }
+  if (!is_refinable_) give_up("this mesh file is read by all ranks in parts and is not refined; make a finer one");
+  const estimate::ErrorBars& bars = current_.solved.bars;
+  int more = 1;
+  while (more < kMostRefinements && predict_worst(bars, true, std::pow(0.5, more)) > asked_) ++more;
+  const double facets = predict_worst(bars, true, 1e-3);
+  if (last.modes > 0 && facets > asked_)
+    give_up(
+        fmt::format("refined without end this mesh would come to {:.3g}, because its surface is not that of the body; take a finer mesh, "
+                    "one of second order on the true surface, or the surface itself (\"body\")",
+                    facets));
+  setting.refinements += more;
+  if (setting.refinements > kMostRefinements)
+    give_up(fmt::format("{} uniform refinements would not do; take a finer mesh where the body is thin or has sharp corners",
+                        kMostRefinements));
+  return {0, setting};
+}
+
+Decision Search::decide() {
+  const Trial& last = report_.trials.back();
+  if (last.modes > 0 && last.worst_cents <= asked_) return {1, last.setting};
+  if (last.modes > 0 && last.algebraic_cents > 0.2 * asked_) tolerance_ = std::max(tolerance_ * 1e-2, 1e-12);
+  if (report_.trials.size() >= kMostTrials) give_up(fmt::format("{} settings were tried; ask for less, or give the mesh", kMostTrials));
+  return run_.job.body ? decide_on_body() : decide_on_file();
+}
+
+/// Refuses what the machine cannot hold before it is begun.
+void Search::check_forecast(const Setting& setting) {
+  double bytes = 0.0;
+  if (run_.rank == 0) {
+    const Trial& last = report_.trials.back();
+    double ratio = 1.0;
+    if (setting.element == last.setting.element && setting.edge_m) ratio = *setting.edge_m / last.setting.edge_m.value_or(last.edge_m);
+    if (setting.refinements > last.setting.refinements) ratio = std::pow(0.5, setting.refinements - last.setting.refinements);
+    bytes = ratio < 1.0 ? forecast(setting, ratio).bytes - static_cast<double>(last.peak_bytes) : 0.0;
+  }
+  MPI_Bcast(&bytes, 1, MPI_DOUBLE, 0, run_.comm);
+  eigen::check_memory(run_.comm, static_cast<std::int64_t>(std::clamp(bytes, 0.0, 1e18) / run_.ranks), 0,
+                      "The next setting (" + describe(setting) + ")");
+}
+
+Trial Search::judge(const Setting& setting, std::size_t first_station) {
+  const SolvedBody& solved = current_.solved;
+  Trial trial;
+  trial.setting = setting;
+  trial.nodes = current_.body.pieces.nodes;
+  trial.tets = current_.body.pieces.tets;
+  trial.edge_m = calc_mean_edge(run_.comm, current_.body.pieces.local);
+  trial.modes = solved.modes.lambda.size();
+  for (std::size_t k = 0; k < trial.modes; ++k) {
+    const double cents = solved.bars.algebraic_cents[k] + solved.bars.discretisation_cents[k];
+    trial.algebraic_cents = std::max(trial.algebraic_cents, solved.bars.algebraic_cents[k]);
+    if (cents <= trial.worst_cents) continue;
+    trial.worst_cents = cents;
+    trial.worst_hz = std::sqrt(solved.modes.lambda[k]) / (2 * std::numbers::pi);
+  }
+  const auto& stations = run_.stations.get_all();
+  for (std::size_t i = first_station; i < stations.size(); ++i) trial.cpu_seconds += stations[i].cpu_seconds;
+  trial.peak_bytes = stations.back().peak_sum_bytes;
+  return trial;
+}
+
+void Search::attempt(const Setting& setting) {
+  current_ = {};  // before the next body needs the room
+  const std::size_t first_station = run_.stations.get_all().size();
+  current_.setting = setting;
+  current_.body = make_body(run_, setting);
+  current_.solved = solve_body(run_, setting, current_.body);
+  const Trial trial = judge(setting, first_station);
+  report_.trials.push_back(trial);
+  run_.stations.say(trial.modes == 0 ? std::string("no mode in the band")
+                                     : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz); {:g} are asked", trial.worst_cents,
+                                                   trial.worst_hz, asked_));
+}
+
+void Search::forecast_next() {
+  const Trial& last = report_.trials.back();
+  if (last.modes == 0) return;
+  if (run_.job.body) {
+    const double ratio = std::min(find_ratio(current_.solved.bars, 0.5 * last.worst_cents, kFinestStep), kLeastStep);
+    report_.next = forecast(make_setting(last.setting.element, ratio), ratio);
+    return;
+  }
+  Setting setting = last.setting;
+  if (last.setting.element == spec::Element::T4) {
+    setting.element = spec::Element::T10;
+    constexpr double kMidNodes = 7.0;  // times the nodes; twice the couplings of a row
+    report_.next = {setting, kMidNodes * static_cast<double>(last.nodes), 0.0, 2 * last.cpu_seconds * std::pow(kMidNodes, kCpuExponent),
+                    2 * static_cast<double>(last.peak_bytes) * std::pow(kMidNodes, kByteExponent)};
+    return;
+  }
+  ++setting.refinements;
+  report_.next = forecast(setting, 0.5);
+}
+
+AccurateBody Search::solve() {
+  Setting setting;
+  setting.tolerance = tolerance_;
+  if (run_.job.body) {
+    setting.element = spec::Element::T10;
+    setting.nodes = run_.job.body->shape.empty() ? kCoarseSurfaceNodes : kCoarseShapeNodes;
+  } else {
+    setting.element = spec::Element::T4;
+    petsc::run_agreed(run_.comm, [&] { is_refinable_ = run_.rank == 0 && !slabs::is_parallel_format(run_.job.mesh); });
+  }
+  for (Decision decision{0, setting}; decision.is_done == 0;) {
+    const std::string reached = report_.trials.empty() ? "" : describe_reached() + "; ";
+    try {
+      if (!report_.trials.empty()) check_forecast(decision.setting);
+      attempt(decision.setting);
+    } catch (const SystemError& error) {
+      throw SystemError(reached + error.what());
+    } catch (const SolveError& error) {
+      throw SolveError(reached + error.what());
+    } catch (const InputError& error) {
+      throw InputError(reached + error.what());
+    }
+    petsc::run_agreed(run_.comm, [&] {
+      if (run_.rank == 0) decision = decide();
+    });
+    MPI_Bcast(&decision, sizeof decision, MPI_BYTE, 0, run_.comm);
+  }
+  if (run_.rank == 0) {
+    forecast_next();
+    const Trial& last = report_.trials.back();
+    run_.stations.say(fmt::format("chosen: {}, {} nodes: error bars up to {:.3g} cents of {:g} asked, {:.1f} CPU s", describe(last.setting),
+                                  last.nodes, last.worst_cents, asked_, last.cpu_seconds));
+    if (report_.next.nodes > 0)
+      run_.stations.say(fmt::format("next stricter: {}, about {:.0f} nodes, {}, {:.1f} CPU s, {:.2g} GB", describe(report_.next.setting),
+                                    report_.next.nodes,
+                                    report_.next.worst_cents > 0 ? fmt::format("{:.2g} cents", report_.next.worst_cents)
+                                                                 : std::string("cents unknown before it is tried"),
+                                    report_.next.cpu_seconds, report_.next.bytes / 1e9));
+  }
+  current_.report = report_;
+  return std::move(current_);
+}
+
+Json::Value describe_setting(const Setting& setting) {
+  Json::Value value;
+  value["element"] = spec::to_text(setting.element);
+  value["tolerance"] = setting.tolerance;
+  if (setting.nodes) value["body_nodes"] = Json::Int64(*setting.nodes);
+  if (setting.edge_m) value["body_edge_m"] = *setting.edge_m;
+  if (setting.refinements > 0) value["refinements"] = setting.refinements;
+  return value;
+}
+
+}  // namespace
+
+AccurateBody solve_to_accuracy(Run& run) { return Search(run).solve(); }
+
+std::string describe(const Setting& setting) {
+  std::string text = spec::to_text(setting.element);
+  if (setting.nodes) text += fmt::format(", meshed with {} nodes", *setting.nodes);
+  if (setting.edge_m) text += fmt::format(", meshed with edges of {:.3g} m", *setting.edge_m);
+  if (setting.refinements > 0) text += fmt::format(", refined {} time{}", setting.refinements, setting.refinements == 1 ? "" : "s");
+  return text + fmt::format(", tolerance {:.0e}", setting.tolerance);
+}
+
+Json::Value describe_accuracy(const AccuracyReport& report) {
+  Json::Value root;
+  root["asked_cents"] = report.asked_cents;
+  for (const Trial& trial : report.trials) {
+    Json::Value entry = describe_setting(trial.setting);
+    entry["nodes"] = Json::Int64(trial.nodes);
+    entry["tets"] = Json::Int64(trial.tets);
+    entry["mean_edge_m"] = trial.edge_m;
+    entry["modes"] = Json::UInt64(trial.modes);
+    entry["worst_cents"] = trial.worst_cents;
+    entry["worst_hz"] = trial.worst_hz;
+    entry["algebraic_cents"] = trial.algebraic_cents;
+    entry["cpu_seconds"] = trial.cpu_seconds;
+    entry["peak_bytes_all_ranks"] = Json::Int64(trial.peak_bytes);
+    root["trials"].append(entry);
+  }
+  if (!report.trials.empty()) root["chosen"] = root["trials"][static_cast<Json::ArrayIndex>(report.trials.size() - 1)];
+  if (report.next.nodes > 0) {
+    Json::Value& next = root["next_stricter"] = describe_setting(report.next.setting);
+    next["nodes"] = std::round(report.next.nodes);
+    next["worst_cents"] = report.next.worst_cents > 0 ? Json::Value(report.next.worst_cents) : Json::Value();
+    next["cpu_seconds"] = report.next.cpu_seconds;
+    next["peak_bytes_all_ranks"] = std::round(report.next.bytes);
+  }
+  return root;
+}
+
+}  // namespace carillon::io

@@ -1,0 +1,63 @@
+// Accuracy as an input: "accuracy_cents" in a job instead of element, mesh size and tolerance.
+#pragma once
+
+#include <json/forwards.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "precompute/io/solve_body.hpp"
+
+namespace carillon::io {
+
+/// One setting that was solved, and what came of it.
+struct Trial {
+  Setting setting;
+  std::int64_t nodes = 0;
+  std::int64_t tets = 0;
+  double edge_m = 0.0;  // cube root of the mean volume of an element: how fine, whatever the shape
+  std::size_t modes = 0;
+  double worst_cents = 0.0;      // largest error bar, algebraic and discretisation together
+  double worst_hz = 0.0;         // of the mode that has it
+  double algebraic_cents = 0.0;  // largest of that part
+  double cpu_seconds = 0.0;      // all ranks
+  std::int64_t peak_bytes = 0;   // all ranks, the process so far
+};
+
+/// What the next stricter setting would be and cost, as far as can be told without trying.
+struct Forecast {
+  Setting setting;
+  double nodes = 0.0;
+  double worst_cents = 0.0;
+  double cpu_seconds = 0.0;
+  double bytes = 0.0;
+};
+
+struct AccuracyReport {
+  double asked_cents = 0.0;
+  std::vector<Trial> trials;  // the last one was chosen
+  Forecast next;
+};
+
+struct AccurateBody {
+  Setting setting;
+  Body body;
+  SolvedBody solved;
+  AccuracyReport report;
+};
+
+/// Solves the job's body in the cheapest setting whose largest error bar is no more than the job's accuracy_cents: a coarse one first,
+/// whose error bars tell by their rates of convergence how fine the mesh has to be, with tetrahedra of four and of ten nodes; then that
+/// one; then finer ones while they do not meet it. Bodies are meshed as fine as is needed; a mesh file is taken with either element and
+/// refined uniformly, which cannot mend the facets it was made with. Says on the way what it tries, and at the end what the next stricter
+/// setting would cost. Collective. Throws on every rank what the solve throws, and SolveError with what was reached when no setting within
+/// reach meets it.
+AccurateBody solve_to_accuracy(Run& run);
+
+/// The setting in words: "T10, body meshed with edges of 0.0021 m, tolerance 1e-07".
+std::string describe(const Setting& setting);
+
+Json::Value describe_accuracy(const AccuracyReport& report);
+
+}  // namespace carillon::io
