@@ -32,8 +32,8 @@ struct Analysis {
 /// They must outlive the factor. Every member but the get_ ones is collective and fails on all ranks alike.
 class Factor {
  public:
-  /// Orders the nodes and plans fronts, memory and messages; computes no number. Throws InputError when the rows are not whole nodes or the
-  /// patterns are not symmetric, SystemError when memory runs out.
+  /// Orders the nodes and plans fronts, memory and messages; computes no number. Symmetry is taken on trust. Throws InputError when the
+  /// rows are not whole nodes or the matrices not AIJ, SystemError when memory runs out.
   Factor(Mat stiffness, Mat mass);
   ~Factor();
   Factor(Factor&&) noexcept;

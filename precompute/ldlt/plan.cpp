@@ -1,7 +1,6 @@
 // Method:     Each rank orders its interior by METIS and eliminates it on paper; what the roots of its forest leave on the interface is
-// gathered,
-//             and every rank plans the interface alike (interface.cpp). Whatever two ranks have to agree upon follows from that common
-//             knowledge, so no message is spent on the messages to come.
+//             gathered, and every rank plans the interface alike (interface.cpp). Whatever two ranks have to agree upon follows from that
+//             common knowledge, so no message is spent on the messages to come.
 // Source:     Duff and Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution: theory and practice (stack of update
 //             matrices).
 // Deviations: two stacks, for fronts of even and odd depth: a front and its children never share one, so an update matrix can be made while
