@@ -26,9 +26,10 @@ struct Trial {
 
 /// True if edges a good deal longer gave hardly fewer nodes.
 bool is_level(const std::vector<Trial>& trials, double target) {
+  const double longer = target < kCheapTarget ? 1.6 : 1.25;  // counts of coarse meshes jump
   for (const Trial& a : trials)
     for (const Trial& b : trials)
-      if (a.count > target && b.count > target && b.edge_m > 1.25 * a.edge_m && b.count > 0.9 * a.count) return true;
+      if (a.count > target && b.count > target && b.edge_m > longer * a.edge_m && b.count > 0.9 * a.count) return true;
   return false;
 }
 

@@ -33,7 +33,7 @@ constexpr double kSmallTarget = 5000;
 constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kSliverDeg = 12;
-constexpr double kVisible = 0.01;    // of a linear element's edge: bulges below this are lost in its own chords
+constexpr double kVisible = 0.02;    // of a linear element's edge: bulges below this are lost in its own chords
 constexpr double kRoundness = 1e-4;  // of the body's diagonal: facets that bulge less are as good as round
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
