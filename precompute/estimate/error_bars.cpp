@@ -53,18 +53,19 @@ struct Room {
   std::vector<Strain> values;             // (nodes * materials); T4: the patches themselves
 };
 
-void load_displacement(const fem::LocalMesh& local, const double* shapes, std::size_t stride, std::size_t first, std::size_t count,
-                       const Solution& solution, std::vector<DoubleLanes>& displacement) {
+void load_displacement(const fem::LocalMesh& local, const std::vector<std::int32_t>& place, const double* shapes, std::size_t stride,
+                       std::size_t first, std::size_t count, const Solution& solution, std::vector<DoubleLanes>& displacement) {
   auto* to = reinterpret_cast<double*>(displacement.data());
   const std::size_t rows = 3 * static_cast<std::size_t>(local.free_nodes);
   std::fill(displacement.begin(), displacement.end(), DoubleLanes{});
-  constexpr std::size_t kTile = 64;
+  constexpr std::size_t kTile = 96;
   std::array<double, kLanes> scale{};
   for (std::size_t m = 0; m < count; ++m) scale[m] = 1 / std::sqrt(solution.lambda[first + m]);
   for (std::size_t begin = 0; begin < rows; begin += kTile)
     for (std::size_t m = 0; m < count; ++m) {
       const double* column = shapes + (first + m) * stride;
-      for (std::size_t i = begin; i < std::min(rows, begin + kTile); ++i) to[i * kLanes + m] = column[i] * scale[m];
+      for (std::size_t i = begin; i < std::min(rows, begin + kTile); ++i)
+        to[(3 * place[i / 3] + i % 3) * kLanes + m] = column[i] * scale[m];
     }
 }
 
@@ -77,7 +78,7 @@ Sums calc_block(Recovery& recovery, Room& room, spec::Mass mass_kind, const Doub
   Sums sums{};
   recovery.nodes.copy_to_halo(reinterpret_cast<double*>(room.displacement.data()), 3 * kLanes);
   std::fill(room.patches.begin(), room.patches.end(), Strain{});
-  find_strains(elements, room.displacement.data(), room.strains.data(), room.patches.data());
+  find_strains(elements, mass_kind == spec::Mass::lumped, room.displacement.data(), room.strains.data(), room.patches.data(), sums[2]);
   recovery.vertices.sum(reinterpret_cast<float*>(room.patches.data()),
                         static_cast<std::size_t>(elements.terms) * elements.materials * 6 * kLanes);
   const Strain* values = room.patches.data();
@@ -90,7 +91,6 @@ Sums calc_block(Recovery& recovery, Room& room, spec::Mass mass_kind, const Doub
     values = room.values.data();
   }
   add_energies(elements, recovery.value_of.data(), values, room.strains.data(), sums[0], sums[1]);
-  if (mass_kind == spec::Mass::lumped) add_lumping(elements, room.displacement.data(), sums[2]);
   add_shifts(recovery.shifts, values, room.displacement.data(), lambda, sums[3], sums[4]);
   sums[2] *= lambda;
   return sums;
@@ -119,7 +119,7 @@ std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recove
     const std::size_t modes = std::min<std::size_t>(kLanes, count - first);
     DoubleLanes lambda{};
     for (std::size_t m = 0; m < modes; ++m) lambda[m] = solution.lambda[first + m];
-    load_displacement(local, shapes, static_cast<std::size_t>(stride), first, modes, solution, room.displacement);
+    load_displacement(local, recovery.place, shapes, static_cast<std::size_t>(stride), first, modes, solution, room.displacement);
     const Sums sums = calc_block(recovery, room, mass_kind, lambda);
     for (std::size_t m = 0; m < modes; ++m)
       for (int s = 0; s < kSums; ++s) result[(first + m) * kSums + s] = sums[s][m];

@@ -19,9 +19,39 @@ namespace {
 
 constexpr float kGaussNear = 0.58541019662496845F, kGaussFar = 0.13819660112501052F;
 
+/// sum over directions of u^T (M_lumped - M_consistent) u per mass of the element; d: displacements relative to node 0, which the
+/// difference of the matrices, having no row sums, does not see.
+template <int nodes>
+[[gnu::always_inline]] inline Lanes calc_lumping(const Lanes (*d)[3]) {
+  Lanes sum = {};
+  for (int k = 0; k < 3; ++k) {
+    if constexpr (nodes == 4) {
+      const Lanes total = d[0][k] + d[1][k] + d[2][k];
+      sum += (4 * (d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k]) - total * total) / 20;
+    } else {
+      // Consistent mass of the straight T10 in 420ths: corners 6 and 1, corner to middle -4 or -6, middles 32, 16 or 8.
+      constexpr int kOpposite[6] = {5, 3, 4, 1, 2, 0};
+      Lanes u[10] = {};
+      for (int i = 1; i < 10; ++i) u[i] = d[i - 1][k];
+      const Lanes corners = u[0] + u[1] + u[2] + u[3], middles = u[4] + u[5] + u[6] + u[7] + u[8] + u[9];
+      Lanes lumped = {}, consistent = corners * corners + 16 * middles * middles - 12 * corners * middles;
+      for (int i = 0; i < 4; ++i) {
+        lumped += u[i] * u[i] / 36;
+        consistent += 5 * u[i] * u[i];
+      }
+      for (int m = 0; m < 6; ++m) {
+        lumped += 4 * u[4 + m] * u[4 + m] / 27;
+        consistent += u[4 + m] * (16 * u[4 + m] - 8 * u[4 + kOpposite[m]] + 4 * (u[mesh::kEdges[m][0]] + u[mesh::kEdges[m][1]]));
+      }
+      sum += lumped - consistent / 420;
+    }
+  }
+  return sum;
+}
+
 template <int nodes, int samples, int terms>
-[[gnu::always_inline]] inline void find_strains_of(const Elements& elements, const DoubleLanes* displacement, Strain* strains,
-                                                   Strain* patches) {
+[[gnu::always_inline]] inline void find_strains_of(const Elements& elements, bool lumped, const DoubleLanes* displacement, Strain* strains,
+                                                   Strain* patches, DoubleLanes& difference) {
   for (std::size_t e = 0; e < elements.count; ++e) {
     const std::int32_t* node = &elements.node[e * nodes];
     Lanes d[nodes - 1][3];
@@ -29,6 +59,9 @@ template <int nodes, int samples, int terms>
       for (int k = 0; k < 3; ++k)
         d[i - 1][k] =
             __builtin_convertvector(displacement[3 * std::size_t(node[i]) + k] - displacement[3 * std::size_t(node[0]) + k], Lanes);
+    if (lumped)
+      difference +=
+          __builtin_convertvector(calc_lumping<nodes>(d) * (elements.volume[e] * elements.density[elements.material[e]]), DoubleLanes);
     const auto& root = elements.root[elements.material[e]];
     for (int s = 0; s < samples; ++s) {
       const float* b = &elements.gradient[(e * samples + s) * (nodes - 1) * 3];
@@ -53,12 +86,14 @@ template <int nodes, int samples, int terms>
   }
 }
 
-CARILLON_WIDE void find_strains_t4(const Elements& elements, const DoubleLanes* displacement, Strain* strains, Strain* patches) {
-  find_strains_of<4, 1, 1>(elements, displacement, strains, patches);
+CARILLON_WIDE void find_strains_t4(const Elements& elements, bool lumped, const DoubleLanes* displacement, Strain* strains, Strain* patches,
+                                   DoubleLanes& difference) {
+  find_strains_of<4, 1, 1>(elements, lumped, displacement, strains, patches, difference);
 }
 
-CARILLON_WIDE void find_strains_t10(const Elements& elements, const DoubleLanes* displacement, Strain* strains, Strain* patches) {
-  find_strains_of<10, 4, 10>(elements, displacement, strains, patches);
+CARILLON_WIDE void find_strains_t10(const Elements& elements, bool lumped, const DoubleLanes* displacement, Strain* strains,
+                                    Strain* patches, DoubleLanes& difference) {
+  find_strains_of<10, 4, 10>(elements, lumped, displacement, strains, patches, difference);
 }
 
 CARILLON_WIDE void add_energies_t4(const Elements& elements, const std::int32_t* value_of, const Strain* values, const Strain* strains,
@@ -109,8 +144,9 @@ CARILLON_WIDE void add_energies_t10(const Elements& elements, const std::int32_t
 
 }  // namespace
 
-void find_strains(const Elements& elements, const DoubleLanes* displacement, Strain* strains, Strain* patches) {
-  (elements.nodes == 4 ? find_strains_t4 : find_strains_t10)(elements, displacement, strains, patches);
+void find_strains(const Elements& elements, bool lumped, const DoubleLanes* displacement, Strain* strains, Strain* patches,
+                  DoubleLanes& difference) {
+  (elements.nodes == 4 ? find_strains_t4 : find_strains_t10)(elements, lumped, displacement, strains, patches, difference);
 }
 
 CARILLON_WIDE void find_middles(const std::vector<Middle>& middles, int materials, const Strain* patches, Strain* values) {
@@ -129,37 +165,6 @@ CARILLON_WIDE void find_middles(const std::vector<Middle>& middles, int material
 void add_energies(const Elements& elements, const std::int32_t* value_of, const Strain* values, const Strain* strains, DoubleLanes& error,
                   DoubleLanes& energy) {
   (elements.nodes == 4 ? add_energies_t4 : add_energies_t10)(elements, value_of, values, strains, error, energy);
-}
-
-CARILLON_WIDE void add_lumping(const Elements& elements, const DoubleLanes* displacement, DoubleLanes& difference) {
-  const int n = elements.nodes;
-  for (std::size_t e = 0; e < elements.count; ++e) {
-    const std::int32_t* node = &elements.node[e * std::size_t(n)];
-    DoubleLanes sum = {};
-    for (int k = 0; k < 3; ++k) {
-      DoubleLanes u[10];
-      for (int i = 0; i < n; ++i) u[i] = displacement[3 * std::size_t(node[i]) + k];
-      if (n == 4) {
-        const DoubleLanes total = u[0] + u[1] + u[2] + u[3];
-        sum += (4 * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + u[3] * u[3]) - total * total) / 20;
-        continue;
-      }
-      // Consistent mass of the straight T10 in 420ths: corners 6 and 1, corner to middle -4 or -6, middles 32, 16 or 8.
-      const DoubleLanes corners = u[0] + u[1] + u[2] + u[3], middles = u[4] + u[5] + u[6] + u[7] + u[8] + u[9];
-      DoubleLanes lumped = {}, consistent = corners * corners + 16 * middles * middles - 12 * corners * middles;
-      for (int i = 0; i < 4; ++i) {
-        lumped += u[i] * u[i] / 36;
-        consistent += 5 * u[i] * u[i];
-      }
-      for (int m = 0; m < 6; ++m) {
-        const int opposite = m == 0 ? 5 : m == 1 ? 3 : m == 2 ? 4 : m == 3 ? 1 : m == 4 ? 2 : 0;
-        lumped += 4 * u[4 + m] * u[4 + m] / 27;
-        consistent += u[4 + m] * (16 * u[4 + m] - 8 * u[4 + opposite] + 4 * (u[mesh::kEdges[m][0]] + u[mesh::kEdges[m][1]]));
-      }
-      sum += lumped - consistent / 420;
-    }
-    difference += sum * double(elements.volume[e] * elements.density[elements.material[e]]);
-  }
 }
 
 CARILLON_WIDE void add_shifts(const std::vector<Shift>& shifts, const Strain* values, const DoubleLanes* displacement,

@@ -48,15 +48,15 @@ struct Shift {
   float density = 0.0F;                 // 0 where held
 };
 
-/// q of every sample, added into the patches' terms. displacement: (nodes, 3); strains: (e, s), patches: (patches, t).
-void find_strains(const Elements& elements, const DoubleLanes* displacement, Strain* strains, Strain* patches);
-/// Recovered strains at nodes from patches with ten terms. corner_node: (patch corners) node of each corner; values: (nodes * materials).
+/// q of every sample, added into the patches' terms; if `lumped`, adds phi^T (M_lumped - M_consistent) phi to `difference`.
+/// displacement: (nodes, 3); strains: (e, s), patches: (patches, t).
+void find_strains(const Elements& elements, bool lumped, const DoubleLanes* displacement, Strain* strains, Strain* patches,
+                  DoubleLanes& difference);
+/// Recovered strains at mid-side nodes from patches with ten terms. values: (nodes * materials).
 void find_middles(const std::vector<Middle>& middles, int materials, const Strain* patches, Strain* values);
 /// Adds per element the energies of recovered minus computed strain, and of the computed one.
 void add_energies(const Elements& elements, const std::int32_t* value_of, const Strain* values, const Strain* strains, DoubleLanes& error,
                   DoubleLanes& energy);
-/// Adds phi^T (M_lumped - M_consistent) phi.
-void add_lumping(const Elements& elements, const DoubleLanes* displacement, DoubleLanes& difference);
 /// Adds gap times (2 W - lambda rho |u|^2), and the sum of its magnitudes.
 void add_shifts(const std::vector<Shift>& shifts, const Strain* values, const DoubleLanes* displacement, const DoubleLanes& lambda,
                 DoubleLanes& change, DoubleLanes& magnitude);

@@ -9,7 +9,9 @@
 #include <fmt/core.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numeric>
 
@@ -126,34 +128,56 @@ class Patches {
   std::vector<double> normal_;
 };
 
-/// (nodes) a running number for corners, -1 for mid-side nodes.
-std::vector<std::int32_t> find_vertex_places(const fem::LocalMesh& local) {
+/// Elements along a curve that fills space (Morton's), so that neighbours in the arrays are neighbours in the body.
+std::vector<std::int32_t> order_elements(const fem::LocalMesh& local) {
   const int n = local.nodes_per_tet();
-  std::vector<std::int32_t> place(local.nodes_m.size(), -1);
-  for (std::size_t i = 0; i < local.tets.size(); ++i)
-    if (static_cast<int>(i % n) < 4) place[local.tets[i]] = 0;
-  std::int32_t next = 0;
-  for (std::int32_t& p : place)
-    if (p == 0) p = next++;
-  return place;
+  Vec3 low{}, high{};
+  for (int k = 0; k < 3 && !local.nodes_m.empty(); ++k) {
+    const auto [least, greatest] =
+        std::minmax_element(local.nodes_m.begin(), local.nodes_m.end(), [&](const Vec3& a, const Vec3& b) { return a[k] < b[k]; });
+    low[k] = (*least)[k];
+    high[k] = (*greatest)[k];
+  }
+  const double size = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], 1e-300});
+  std::vector<std::pair<std::uint32_t, std::int32_t>> keys;
+  for (std::int32_t e = 0; e < local.tet_count(); ++e) {
+    std::uint32_t key = 0;
+    for (int k = 0; k < 3; ++k) {
+      double x = 0;
+      for (int i = 0; i < 4; ++i) x += local.nodes_m[local.tets[static_cast<std::size_t>(e) * n + i]][k] / 4;
+      const auto cell = static_cast<std::uint32_t>(1023 * (x - low[k]) / size);
+      for (int bit = 0; bit < 10; ++bit) key |= (cell >> bit & 1U) << (3 * bit + k);
+    }
+    keys.emplace_back(key, e);
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::int32_t> order;
+  for (const auto& [key, e] : keys) order.push_back(e);
+  return order;
 }
 
-std::vector<std::int32_t> count_up(std::size_t count) {
-  std::vector<std::int32_t> all(count);
-  std::iota(all.begin(), all.end(), 0);
-  return all;
+/// (nodes) a running number for the nodes in the order in which the elements touch them; corners_only: -1 for mid-side nodes.
+std::vector<std::int32_t> find_places(const fem::LocalMesh& local, const std::vector<std::int32_t>& order, bool corners_only) {
+  const int n = local.nodes_per_tet();
+  std::vector<std::int32_t> place(local.nodes_m.size(), -1);
+  std::int32_t next = 0;
+  for (const std::int32_t e : order)
+    for (int i = 0; i < (corners_only ? 4 : n); ++i) {
+      std::int32_t& p = place[local.tets[static_cast<std::size_t>(e) * n + i]];
+      if (p < 0) p = next++;
+    }
+  return place;
 }
 
 void fill_elements(const fem::LocalMesh& local, std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet,
                    Recovery& recovery) {
   Elements& elements = recovery.elements;
   const int n = elements.nodes, s = elements.samples;
-  elements.node = local.tets;
+  elements.node.resize(elements.count * n);
   for (const Solid& solid : solids) {
     elements.root.push_back(calc_root(solid));
     elements.density.push_back(static_cast<float>(solid.density_kg_m3));
   }
-  elements.material.assign(material_of_tet.begin(), material_of_tet.end());
   elements.material.resize(elements.count, 0);
   elements.gradient.resize(elements.count * s * (n - 1) * 3);
   elements.volume.resize(elements.count);
@@ -161,7 +185,9 @@ void fill_elements(const fem::LocalMesh& local, std::span<const Solid> solids, s
   recovery.value_of.resize(elements.count * n);
   std::vector<Vec3> x(n);
   for (std::size_t e = 0; e < elements.count; ++e) {
-    for (int i = 0; i < n; ++i) x[i] = local.nodes_m[local.tets[e * n + i]];
+    const std::int32_t* tet = &local.tets[static_cast<std::size_t>(recovery.order[e]) * n];
+    for (int i = 0; i < n; ++i) x[i] = local.nodes_m[tet[i]];
+    if (!material_of_tet.empty()) elements.material[e] = material_of_tet[recovery.order[e]];
     double volume = 0;
     for (int k = 0; k < s; ++k) {
       const Sample sample = calc_sample(x, find_place(s, k));
@@ -169,21 +195,25 @@ void fill_elements(const fem::LocalMesh& local, std::span<const Solid> solids, s
       for (int i = 1; i < n; ++i)
         for (int d = 0; d < 3; ++d) elements.gradient[((e * s + k) * (n - 1) + i - 1) * 3 + d] = static_cast<float>(sample.gradient[i][d]);
     }
-    if (!(volume > 0)) throw InputError(fmt::format("element {} of the mesh has no volume; remesh there", local.tet_in_mesh[e] + 1));
+    if (!(volume > 0))
+      throw InputError(fmt::format("element {} of the mesh has no volume; remesh there", local.tet_in_mesh[recovery.order[e]] + 1));
     elements.volume[e] = static_cast<float>(volume);
-    for (int v = 0; v < 4; ++v)
-      elements.patch[4 * e + v] = recovery.vertex_place[local.tets[e * n + v]] * elements.materials + elements.material[e];
-    for (int i = 0; i < n; ++i) recovery.value_of[e * n + i] = local.tets[e * n + i] * elements.materials + elements.material[e];
+    for (int v = 0; v < 4; ++v) elements.patch[4 * e + v] = recovery.vertex_place[tet[v]] * elements.materials + elements.material[e];
+    for (int i = 0; i < n; ++i) {
+      elements.node[e * n + i] = recovery.place[tet[i]];
+      recovery.value_of[e * n + i] = recovery.place[tet[i]] * elements.materials + elements.material[e];
+    }
   }
 }
 
 /// Calls use(element, corner, sample, patch, monomials) for every sample of every element and corner.
 template <typename Use>
-void for_each_sample(const fem::LocalMesh& local, const Elements& elements, const Patches& patches, const Use& use) {
+void for_each_sample(const fem::LocalMesh& local, const Recovery& recovery, const Patches& patches, const Use& use) {
+  const Elements& elements = recovery.elements;
   const int n = elements.nodes, s = elements.samples;
   std::vector<Vec3> x(n);
   for (std::size_t e = 0; e < elements.count; ++e) {
-    for (int i = 0; i < n; ++i) x[i] = local.nodes_m[local.tets[e * n + i]];
+    for (int i = 0; i < n; ++i) x[i] = local.nodes_m[local.tets[static_cast<std::size_t>(recovery.order[e]) * n + i]];
     for (int k = 0; k < s; ++k) {
       const Vec3 at = calc_sample(x, find_place(s, k)).at;
       for (int v = 0; v < 4; ++v) use(e, v, k, static_cast<std::size_t>(elements.patch[4 * e + v]), patches.monomials(at, x[v]));
@@ -195,12 +225,13 @@ void find_middles(const fem::LocalMesh& local, const Patches& patches, Recovery&
   std::vector<char> done(local.nodes_m.size(), 0);
   for (std::size_t e = 0; e < recovery.elements.count; ++e)
     for (int m = 0; m < 6; ++m) {
-      const std::int32_t node = local.tets[10 * e + 4 + m];
+      const std::int32_t* tet = &local.tets[static_cast<std::size_t>(recovery.order[e]) * 10];
+      const std::int32_t node = tet[4 + m];
       if (done[node]++ != 0) continue;
       Middle middle;
-      middle.node = node;
+      middle.node = recovery.place[node];
       for (int end = 0; end < 2; ++end) {
-        const std::int32_t vertex = local.tets[10 * e + mesh::kEdges[m][end]];
+        const std::int32_t vertex = tet[mesh::kEdges[m][end]];
         middle.patch[end] = recovery.vertex_place[vertex];
         const auto p = patches.monomials(local.nodes_m[node], local.nodes_m[vertex]);
         for (int t = 0; t < 10; ++t) middle.monomials[end][t] = static_cast<float>(p[t]);
@@ -210,19 +241,29 @@ void find_middles(const fem::LocalMesh& local, const Patches& patches, Recovery&
     }
 }
 
-void find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& local, Recovery& recovery) {
+/// Both faces of an edge in one entry, in the order of the elements.
+void find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& local, std::span<const std::int32_t> material_of_tet,
+                 Recovery& recovery) {
   const Elements& elements = recovery.elements;
+  std::map<std::array<std::int32_t, 3>, double> volumes;  // by nodes, material and whether it is held
   for (const SurfaceEdge& edge : edges) {
     const std::size_t first = static_cast<std::size_t>(edge.tet) * elements.nodes;
     std::array<int, 2> at = mesh::kEdges[edge.edge];
     if (elements.nodes == 10) at = {4 + edge.edge, 4 + edge.edge};
+    const std::int32_t a = recovery.place[local.tets[first + at[0]]], b = recovery.place[local.tets[first + at[1]]];
+    const std::int32_t material = material_of_tet.empty() ? 0 : material_of_tet[edge.tet];
+    volumes[{std::min(a, b), std::max(a, b), 2 * material + (edge.held ? 1 : 0)}] += edge.gap_m * edge.third_m2;
+  }
+  for (const auto& [key, volume] : volumes) {
+    const std::int32_t material = key[2] / 2;
+    const bool held = key[2] % 2 == 1;
     Shift shift;
     for (int end = 0; end < 2; ++end) {
-      shift.node[end] = local.tets[first + at[end]];
-      shift.value[end] = recovery.value_of[first + at[end]];
+      shift.node[end] = key[end];
+      shift.value[end] = key[end] * elements.materials + material;
     }
-    shift.volume_m3 = static_cast<float>((edge.held ? -1 : 1) * edge.gap_m * edge.third_m2);
-    shift.density = edge.held ? 0.0F : elements.density[elements.material[edge.tet]];
+    shift.volume_m3 = static_cast<float>(held ? -volume : volume);
+    shift.density = held ? 0.0F : elements.density[material];
     recovery.shifts.push_back(shift);
   }
 }
@@ -231,8 +272,10 @@ void find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& lo
 
 Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
                        std::span<const std::int32_t> material_of_tet) {
-  const std::vector<std::int32_t> place = find_vertex_places(local);
-  Recovery recovery{{}, place, {}, {}, {}, {}, NodeExchange(comm, local, count_up(local.nodes_m.size())), NodeExchange(comm, local, place)};
+  const std::vector<std::int32_t> order = order_elements(local), place = find_places(local, order, false),
+                                  vertex_place = find_places(local, order, true);
+  Recovery recovery{
+      {}, order, place, vertex_place, {}, {}, {}, {}, NodeExchange(comm, local, place), NodeExchange(comm, local, vertex_place)};
   Elements& elements = recovery.elements;
   elements.nodes = local.nodes_per_tet();
   elements.samples = local.order == 1 ? 1 : 4;
@@ -241,8 +284,9 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
   elements.count = static_cast<std::size_t>(local.tet_count());
   std::array<double, 2> size{0.0, static_cast<double>(elements.count)};  // volume, elements
   petsc::run_agreed(comm, [&] {
+    recovery.vertex_node.resize(static_cast<std::size_t>(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1));
     for (std::size_t n = 0; n < place.size(); ++n)
-      if (place[n] >= 0) recovery.vertex_node.push_back(static_cast<std::int32_t>(n));
+      if (vertex_place[n] >= 0) recovery.vertex_node[vertex_place[n]] = place[n];
     fill_elements(local, solids, material_of_tet, recovery);
     for (const float volume : elements.volume) size[0] += volume;
   });
@@ -252,19 +296,19 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
   petsc::run_agreed(comm, [&] {
     patches =
         std::make_unique<Patches>(local.order == 1 ? 4 : 10, recovery.vertex_node.size() * solids.size(), std::cbrt(size[0] / size[1]));
-    for_each_sample(local, elements, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
+    for_each_sample(local, recovery, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
   });
   patches->sum(recovery.vertices, elements.materials);
   const std::vector<SurfaceEdge> edges = find_surface_edges(comm, local);
   petsc::run_agreed(comm, [&] {
     patches->invert();
     elements.weight.resize(elements.count * 4 * elements.samples * elements.terms);
-    for_each_sample(local, elements, *patches, [&](std::size_t e, int v, int s, std::size_t patch, const auto& p) {
+    for_each_sample(local, recovery, *patches, [&](std::size_t e, int v, int s, std::size_t patch, const auto& p) {
       float* weight = &elements.weight[((e * 4 + v) * elements.samples + s) * elements.terms];
       for (int t = 0; t < elements.terms; ++t) weight[t] = static_cast<float>(patches->weight(patch, p, t));
     });
     if (local.order == 2) find_middles(local, *patches, recovery);
-    find_shifts(edges, local, recovery);
+    find_shifts(edges, local, material_of_tet, recovery);
   });
   return recovery;
 }

@@ -17,8 +17,10 @@ namespace carillon::estimate {
 /// vertex place p and material m has number p * materials + m, the recovered value of node n likewise n * materials + m.
 struct Recovery {
   Elements elements;
+  std::vector<std::int32_t> order;         // (e) the local element that `elements` has at each place
+  std::vector<std::int32_t> place;         // (nodes) where the arrays of the estimate have a local node
   std::vector<std::int32_t> vertex_place;  // (nodes) place among the vertices, -1 for mid-side nodes
-  std::vector<std::int32_t> vertex_node;   // (vertices) its node
+  std::vector<std::int32_t> vertex_node;   // (vertices) its place among the nodes
   std::vector<Middle> middles;             // T10 only
   std::vector<std::int32_t> value_of;      // (e, n) where the recovered value of an element's node is
   std::vector<Shift> shifts;

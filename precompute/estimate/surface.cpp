@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <unordered_map>
 
 #include "precompute/estimate/exchange.hpp"
@@ -58,15 +57,16 @@ FaceKey find_key(const fem::LocalMesh& local, const Face& face) {
 std::vector<Face> find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
   int ranks = 1;
   MPI_Comm_size(comm, &ranks);
-  std::unordered_map<FaceKey, Face, FaceHash> open;
-  open.reserve(static_cast<std::size_t>(local.tet_count()));
+  std::vector<std::pair<FaceKey, Face>> all;
+  all.reserve(4 * static_cast<std::size_t>(local.tet_count()));
   for (std::int32_t e = 0; e < local.tet_count(); ++e)
-    for (int f = 0; f < 4; ++f) {
-      const auto [found, is_new] = open.try_emplace(find_key(local, {e, f}), Face{e, f});
-      if (!is_new) open.erase(found);
-    }
+    for (int f = 0; f < 4; ++f) all.emplace_back(find_key(local, {e, f}), Face{e, f});
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Face> faces;
-  for (const auto& [key, face] : open) faces.push_back(face);
+  for (std::size_t i = 0, next; i < all.size(); i = next) {
+    for (next = i + 1; next < all.size() && all[next].first == all[i].first;) ++next;
+    if (next == i + 1) faces.push_back(all[i].second);
+  }
   std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.tet != b.tet ? a.tet < b.tet : a.face < b.face; });
   if (ranks == 1) return faces;
   std::vector<std::vector<FaceKey>> asked(ranks);
