@@ -1,5 +1,5 @@
 // Method:     Cholesky of M, tridiagonal QR of L^-1 K L^-T. Every rank solves the same gathered matrices and keeps its rows.
-// Source:     Golub, Van Loan, Matrix Computations, section 8.7; LAPACK's dsygvd.
+// Source:     Golub, Van Loan, Matrix Computations, section 8.7; LAPACK's dsygv.
 // Deviations: none.
 #include "precompute/eigen/dense_modes.hpp"
 
@@ -14,7 +14,7 @@ namespace {
 
 using petsc::check;
 
-// The whole matrix, column-major, on every rank. Rank 0's sum is broadcast so that all work on the same bits.
+// The whole matrix, column-major, on every rank.
 std::vector<double> gather_dense(Mat matrix, PetscInt n) {
   std::vector<double> dense(static_cast<std::size_t>(n) * static_cast<std::size_t>(n), 0.0);
   PetscInt first = 0;
@@ -56,6 +56,9 @@ DensePairs solve_dense(Mat stiffness, Mat mass) {
   }
   MPI_Comm comm = MPI_COMM_NULL;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
+  // All keep their rows of the same bits, whatever their processors make of the same input.
+  for (PetscInt j = 0; j < n; ++j) MPI_Bcast(k.data() + static_cast<std::ptrdiff_t>(j) * n, n, MPI_DOUBLE, 0, comm);
+  MPI_Bcast(pairs.lambda.data(), n, MPI_DOUBLE, 0, comm);
   PetscInt first = 0;
   PetscInt last = 0;
   check(MatGetOwnershipRange(stiffness, &first, &last));

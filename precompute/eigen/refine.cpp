@@ -26,7 +26,7 @@ using petsc::check;
 // Highest lambda of a group over its lowest, pass by pass. An error in the direction of a mode just outside the group's far end decays
 // slowly; the passes end with groups of one.
 constexpr std::array<double, 6> kSpread{10, 3, 1.3, 1.05, 1.005, 1.0001};
-constexpr double kOrthonormal = 1e-11;  // Good enough without another orthonormalisation.
+constexpr double kOrthonormal = 5e-11;  // Good enough without another orthonormalisation.
 
 using Group = std::vector<std::size_t>;
 

@@ -20,7 +20,7 @@ double calc_cut(double low, double high, double part) {
 Slice cut_to_lowest(const Slice& band, std::int64_t wanted, const CountBelow& count_below) {
   if (wanted >= band.count()) return band;
   constexpr int kTrials = 8;
-  const std::int64_t enough = wanted + std::max<std::int64_t>(10, wanted / 4);
+  const std::int64_t enough = wanted + std::max<std::int64_t>(10, wanted / 16);
   Slice cut = band;
   double too_low = band.low;
   std::int64_t below_too_low = band.below_low;

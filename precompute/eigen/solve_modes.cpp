@@ -246,7 +246,7 @@ void BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sig
   request.position = &problem_.nodes.position;
   request.round = round;
   // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be held away.
-  const double margin = 0.02 * (slice.high - slice.low);
+  const double margin = 0.1 * (slice.high - slice.low);
   const petsc::MatHandle locked = found_.copy_between(slice.low - margin, slice.high + margin, rigid_);
   request.locked = locked;
   const auto before = static_cast<std::int64_t>(found_.lambda.size());
