@@ -1,3 +1,4 @@
+// One iteration and what SLEPc needs to call it: longer than most files, as every part works on the same basis.
 // Method:     V_{j+1} R_j = A^-1 M V_j - V_j alpha_j - V_{j-1} R_{j-1}^T in the M inner product, A = K - sigma M, blocks of b columns. The
 //             recurrence is followed by one projection against the whole basis; the block is orthonormalised by Cholesky QR, twice if it
 //             is badly conditioned, and column by column, with random columns for dependent ones, if it is singular. The projected matrix

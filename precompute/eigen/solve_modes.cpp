@@ -1,3 +1,4 @@
+// The band from count to proof: one object, one state; longer than most files.
 // Method:     1. The rigid modes are built in closed form and deflated. 2. The inertia of K - lambda M at both ends of the band says how
 //             many modes it holds; many are cut into slices by further counts. 3. Block Lanczos with a shift inside the slice finds them;
 //             copies of repeated eigenvalues that a run leaves out are sought again with everything found deflated. 4. Every count, those
