@@ -49,6 +49,18 @@ template <int nodes>
   return sum;
 }
 
+/// As fem assembles nearly incompressible T10: the bulk modulus is met by the mean of the dilatation, less by its variation.
+[[gnu::always_inline]] inline void damp_dilatation(float part, Lanes (*strain)[6]) {
+  if (part >= 1.0F) return;
+  Lanes trace[4], mean = {};
+  for (int s = 0; s < 4; ++s) {
+    trace[s] = strain[s][0] + strain[s][1] + strain[s][2];
+    mean += trace[s] * 0.25F;
+  }
+  for (int s = 0; s < 4; ++s)
+    for (int k = 0; k < 3; ++k) strain[s][k] += (mean - trace[s]) * ((1.0F - part) / 3.0F);
+}
+
 template <int nodes, int samples, int terms>
 [[gnu::always_inline]] inline void find_strains_of(const Elements& elements, bool lumped, const DoubleLanes* displacement, Strain* strains,
                                                    Strain* patches, DoubleLanes& difference) {
@@ -63,17 +75,24 @@ template <int nodes, int samples, int terms>
       difference +=
           __builtin_convertvector(calc_lumping<nodes>(d) * (elements.volume[e] * elements.density[elements.material[e]]), DoubleLanes);
     const auto& root = elements.root[elements.material[e]];
+    Lanes strain[samples][6];
     for (int s = 0; s < samples; ++s) {
       const float* b = &elements.gradient[(e * samples + s) * (nodes - 1) * 3];
       Lanes g[3][3] = {};
       for (int i = 0; i < nodes - 1; ++i)
         for (int k = 0; k < 3; ++k)
           for (int l = 0; l < 3; ++l) g[k][l] += d[i][k] * b[3 * i + l];
-      const Lanes strain[6] = {g[0][0], g[1][1], g[2][2], g[1][2] + g[2][1], g[0][2] + g[2][0], g[0][1] + g[1][0]};
+      for (int k = 0; k < 3; ++k) strain[s][k] = g[k][k];
+      strain[s][3] = g[1][2] + g[2][1];
+      strain[s][4] = g[0][2] + g[2][0];
+      strain[s][5] = g[0][1] + g[1][0];
+    }
+    if constexpr (samples > 1) damp_dilatation(elements.dilatation[elements.material[e]], strain);
+    for (int s = 0; s < samples; ++s) {
       Strain q;
       for (int r = 0; r < 6; ++r) {
-        q[r] = strain[r] * root[7 * r];
-        for (int c = r + 1; c < 6; ++c) q[r] += strain[c] * root[6 * r + c];
+        q[r] = strain[s][r] * root[7 * r];
+        for (int c = r + 1; c < 6; ++c) q[r] += strain[s][c] * root[6 * r + c];
       }
       strains[e * samples + s] = q;
       for (int v = 0; v < 4; ++v) {

@@ -30,7 +30,8 @@ struct Elements {
   std::vector<float> weight;                // (e, 4, s, t) what a sample adds to the terms of the patches
   std::vector<float> volume;                // (e) [m^3]
   std::vector<std::array<float, 36>> root;  // (materials) U with U^T U = C, row-major, upper triangular
-  std::vector<float> density;               // (materials) [kg/m^3]
+  std::vector<float> dilatation;  // (materials) what counts of a T10's dilatation beyond its mean; 1, less when nearly incompressible
+  std::vector<float> density;     // (materials) [kg/m^3]
 };
 
 /// A mid-side node: the mean of what the patches at both ends of its edge say there.

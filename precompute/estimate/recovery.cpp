@@ -87,6 +87,17 @@ std::array<float, 36> calc_root(const Solid& solid) {
   return root;
 }
 
+/// sqrt(K_full / K) of the bulk moduli that the variation and the mean of the dilatation of a T10 meet; fem::Solid::full_lambda_pa.
+float find_dilatation(const Solid& solid) {
+  constexpr double kFullLambda = 10.0;  // that of precompute/fem/element.hpp
+  const auto& c = solid.elasticity_pa;
+  const double lambda = c[1], mu = c[35], scale = 1e-9 * c[0];
+  const Solid isotropic = make_isotropic(mu * (3 * lambda + 2 * mu) / (lambda + mu), lambda / (2 * (lambda + mu)), 1.0);
+  for (int i = 0; i < 36; ++i)
+    if (!(std::abs(isotropic.elasticity_pa[i] - c[i]) <= 1e3 * scale)) return 1.0F;
+  return lambda > kFullLambda * mu ? static_cast<float>(std::sqrt((kFullLambda + 2.0 / 3) * mu / (lambda + 2 * mu / 3))) : 1.0F;
+}
+
 /// The normal matrices of all patches, summed over the ranks, then their regularised inverses.
 class Patches {
  public:
@@ -176,6 +187,7 @@ void fill_elements(const fem::LocalMesh& local, std::span<const Solid> solids, s
   elements.node.resize(elements.count * n);
   for (const Solid& solid : solids) {
     elements.root.push_back(calc_root(solid));
+    elements.dilatation.push_back(find_dilatation(solid));
     elements.density.push_back(static_cast<float>(solid.density_kg_m3));
   }
   elements.material.resize(elements.count, 0);
