@@ -47,38 +47,46 @@ void check_arguments(MPI_Comm comm, const fem::LocalMesh& local, std::span<const
 
 /// What the blocks of modes work in.
 struct Room {
-  std::vector<DoubleLanes> displacement;  // (nodes, 3), divided by omega
-  std::vector<Strain> strains;            // (e, s)
-  std::vector<Strain> patches;            // (vertices * materials, t)
-  std::vector<Strain> values;             // (nodes * materials); T4: the patches themselves
+  std::vector<FloatLanes> displacement;    // (nodes, 3), divided by omega; T4
+  std::vector<DoubleLanes> displacement2;  // the same of T10
+  std::vector<Strain> strains;             // (e, s); T10
+  std::vector<Strain> patches;             // (vertices * materials, t)
+  std::vector<Strain> values;              // (nodes * materials); T4: the patches themselves
 };
 
+/// to: (nodes, 3, kLanes).
+template <typename Number>
 void load_displacement(const fem::LocalMesh& local, const std::vector<std::int32_t>& place, const double* shapes, std::size_t stride,
-                       std::size_t first, std::size_t count, const Solution& solution, std::vector<DoubleLanes>& displacement) {
-  auto* to = reinterpret_cast<double*>(displacement.data());
-  const std::size_t rows = 3 * static_cast<std::size_t>(local.free_nodes);
-  std::fill(displacement.begin(), displacement.end(), DoubleLanes{});
-  constexpr std::size_t kTile = 96;
-  std::array<double, kLanes> scale{};
-  for (std::size_t m = 0; m < count; ++m) scale[m] = 1 / std::sqrt(solution.lambda[first + m]);
-  for (std::size_t begin = 0; begin < rows; begin += kTile)
-    for (std::size_t m = 0; m < count; ++m) {
-      const double* column = shapes + (first + m) * stride;
-      for (std::size_t i = begin; i < std::min(rows, begin + kTile); ++i)
-        to[(3 * place[i / 3] + i % 3) * kLanes + m] = column[i] * scale[m];
-    }
+                       std::size_t first, std::size_t count, const Solution& solution, Number* to) {
+  std::array<const double*, kLanes> column{};
+  std::array<double, kLanes> scale{};  // 0: an empty lane
+  for (std::size_t m = 0; m < kLanes; ++m) {
+    column[m] = shapes + (first + std::min(m, count - 1)) * stride;
+    if (m < count) scale[m] = 1 / std::sqrt(solution.lambda[first + m]);
+  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(local.free_nodes); ++i) {
+    Number* row = to + 3 * static_cast<std::size_t>(place[i]) * kLanes;
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k, row += kLanes)
+      for (std::size_t m = 0; m < kLanes; ++m) row[m] = static_cast<Number>(column[m][k] * scale[m]);
+  }
 }
 
 /// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude.
 constexpr int kSums = 5;
 using Sums = std::array<DoubleLanes, kSums>;
 
-Sums calc_block(Recovery& recovery, Room& room, spec::Mass mass_kind, const DoubleLanes& lambda) {
+Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, spec::Mass mass_kind, const DoubleLanes& lambda) {
   const Elements& elements = recovery.elements;
   Sums sums{};
-  recovery.nodes.copy_to_halo(reinterpret_cast<double*>(room.displacement.data()), 3 * kLanes);
+  const void* displacement = room.displacement.data();
+  if (elements.terms > 1) {
+    recovery.nodes.copy_to_halo(room.displacement2.data()->lane, 3 * kLanes);
+    displacement = room.displacement2.data();
+  } else {
+    recovery.nodes.copy_to_halo(reinterpret_cast<float*>(room.displacement.data()), 3 * kLanes);
+  }
   std::fill(room.patches.begin(), room.patches.end(), Strain{});
-  find_strains(elements, mass_kind == spec::Mass::lumped, room.displacement.data(), room.strains.data(), room.patches.data(), sums[2]);
+  kernels.add_strains(elements, mass_kind == spec::Mass::lumped, displacement, room.strains.data(), room.patches.data(), sums[2]);
   recovery.vertices.sum(reinterpret_cast<float*>(room.patches.data()),
                         static_cast<std::size_t>(elements.terms) * elements.materials * 6 * kLanes);
   const Strain* values = room.patches.data();
@@ -87,12 +95,12 @@ Sums calc_block(Recovery& recovery, Room& room, spec::Mass mass_kind, const Doub
       for (int m = 0; m < elements.materials; ++m)
         room.values[static_cast<std::size_t>(recovery.vertex_node[v]) * elements.materials + m] =
             room.patches[(v * elements.materials + m) * elements.terms];
-    find_middles(recovery.middles, elements.materials, room.patches.data(), room.values.data());
+    kernels.find_middles(recovery.middles, elements.materials, room.patches.data(), room.values.data());
     values = room.values.data();
   }
-  add_energies(elements, recovery.value_of.data(), values, room.strains.data(), sums[0], sums[1]);
-  add_shifts(recovery.shifts, values, room.displacement.data(), lambda, sums[3], sums[4]);
-  sums[2] *= lambda;
+  kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[1]);
+  kernels.add_shifts(recovery.shifts, values, displacement, lambda, sums[3], sums[4]);
+  for (int m = 0; m < kLanes; ++m) sums[2].lane[m] *= lambda.lane[m];
   return sums;
 }
 
@@ -104,13 +112,18 @@ std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recove
   Room room;
   std::vector<double> result(count * kSums, 0.0);
   petsc::run_agreed(comm, [&] {
-    room.displacement.resize(3 * local.nodes_m.size());
-    room.strains.resize(elements.count * elements.samples);
+    if (elements.terms > 1) {
+      room.displacement2.resize(3 * local.nodes_m.size());
+      room.strains.resize(elements.count * elements.samples);
+    } else {
+      room.displacement.resize(3 * local.nodes_m.size());
+    }
     room.patches.resize(recovery.vertex_node.size() * materials * elements.terms);
     if (elements.terms > 1) room.values.resize(local.nodes_m.size() * materials);
     recovery.nodes.reserve(3 * kLanes);
     recovery.vertices.reserve(static_cast<std::size_t>(elements.terms) * materials * 6 * kLanes);
   });
+  const Kernels& kernels = *list_kernels(elements.nodes).front();
   PetscInt stride = 0;
   const PetscScalar* shapes = nullptr;
   petsc::check(MatDenseGetLDA(solution.shapes, &stride));
@@ -118,11 +131,14 @@ std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recove
   for (std::size_t first = 0; first < count; first += kLanes) {
     const std::size_t modes = std::min<std::size_t>(kLanes, count - first);
     DoubleLanes lambda{};
-    for (std::size_t m = 0; m < modes; ++m) lambda[m] = solution.lambda[first + m];
-    load_displacement(local, recovery.place, shapes, static_cast<std::size_t>(stride), first, modes, solution, room.displacement);
-    const Sums sums = calc_block(recovery, room, mass_kind, lambda);
+    for (std::size_t m = 0; m < modes; ++m) lambda.lane[m] = solution.lambda[first + m];
+    const auto load = [&](auto* to) {
+      load_displacement(local, recovery.place, shapes, static_cast<std::size_t>(stride), first, modes, solution, to);
+    };
+    elements.terms > 1 ? load(room.displacement2.data()->lane) : load(reinterpret_cast<float*>(room.displacement.data()));
+    const Sums sums = calc_block(kernels, recovery, room, mass_kind, lambda);
     for (std::size_t m = 0; m < modes; ++m)
-      for (int s = 0; s < kSums; ++s) result[(first + m) * kSums + s] = sums[s][m];
+      for (int s = 0; s < kSums; ++s) result[(first + m) * kSums + s] = sums[s].lane[m];
   }
   petsc::check(MatDenseRestoreArrayRead(solution.shapes, &shapes));
   MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);

@@ -10,10 +10,21 @@ namespace carillon::estimate {
 
 inline constexpr int kLanes = 16;  // modes of a block
 using Lanes = float __attribute__((vector_size(4 * kLanes)));
-using DoubleLanes = double __attribute__((vector_size(8 * kLanes)));
+// The alignment of a bare vector depends on the instruction set, and memory goes from one to another: hence structs.
+struct alignas(64) FloatLanes {
+  Lanes lane;
+};
+/// Doubles of a block.
+struct alignas(64) DoubleLanes {
+  double lane[kLanes];
+};
 
 /// The scaled strain q of a point: six numbers with q . q = strain^T C strain, twice the density of the elastic energy.
-using Strain = std::array<Lanes, 6>;
+struct alignas(64) Strain {
+  Lanes part[6];
+  Lanes& operator[](int r) { return part[r]; }
+  const Lanes& operator[](int r) const { return part[r]; }
+};
 
 /// What is known of the elements before any mode. n = 4 or 10 nodes; s = 1 or 4 points where an element's strain is taken; t = 1 or 10
 /// terms of a patch's polynomial that are kept.
@@ -49,17 +60,26 @@ struct Shift {
   float density = 0.0F;                 // 0 where held
 };
 
-/// q of every sample, added into the patches' terms; if `lumped`, adds phi^T (M_lumped - M_consistent) phi to `difference`.
-/// displacement: (nodes, 3); strains: (e, s), patches: (patches, t).
-void find_strains(const Elements& elements, bool lumped, const DoubleLanes* displacement, Strain* strains, Strain* patches,
-                  DoubleLanes& difference);
-/// Recovered strains at mid-side nodes from patches with ten terms. values: (nodes * materials).
-void find_middles(const std::vector<Middle>& middles, int materials, const Strain* patches, Strain* values);
-/// Adds per element the energies of recovered minus computed strain, and of the computed one.
-void add_energies(const Elements& elements, const std::int32_t* value_of, const Strain* values, const Strain* strains, DoubleLanes& error,
-                  DoubleLanes& energy);
-/// Adds gap times (2 W - lambda rho |u|^2), and the sum of its magnitudes.
-void add_shifts(const std::vector<Shift>& shifts, const Strain* values, const DoubleLanes* displacement, const DoubleLanes& lambda,
-                DoubleLanes& change, DoubleLanes& magnitude);
+/// The loops for one kind of element and one instruction set. displacement: (nodes, 3), of T4 FloatLanes, of T10 DoubleLanes (their error
+/// energies are smaller than what the differences of single precision leave).
+struct Kernels {
+  /// q of every sample, added into the patches' terms; if `lumped`, adds phi^T (M_lumped - M_consistent) phi to `difference`.
+  /// strains: (e, s), of T10 only; patches: (patches, t).
+  void (*add_strains)(const Elements& elements, bool lumped, const void* displacement, Strain* strains, Strain* patches,
+                      DoubleLanes& difference);
+  /// Recovered strains at mid-side nodes from patches with ten terms. values: (nodes * materials).
+  void (*find_middles)(const std::vector<Middle>& middles, int materials, const Strain* patches, Strain* values);
+  /// Adds per element the energies of recovered minus computed strain, and of the computed one. T4 find their strains anew: that costs less
+  /// than to read what add_strains would have to write.
+  void (*add_energies)(const Elements& elements, const std::int32_t* value_of, const Strain* values, const void* displacement,
+                       const Strain* strains, DoubleLanes& error, DoubleLanes& energy);
+  /// Adds gap times (2 W - lambda rho |u|^2), and the sum of its magnitudes.
+  void (*add_shifts)(const std::vector<Shift>& shifts, const Strain* values, const void* displacement, const DoubleLanes& lambda,
+                     DoubleLanes& change, DoubleLanes& magnitude);
+  const char* name;
+};
+
+/// The tables that this processor can run, the fastest first. nodes: 4 or 10.
+std::vector<const Kernels*> list_kernels(int nodes);
 
 }  // namespace carillon::estimate

@@ -31,25 +31,21 @@ std::array<double, 10> calc_monomials(const Vec3& at, const Vec3& vertex, double
   return {1, x, y, z, x * x, y * y, z * z, x * y, y * z, x * z};
 }
 
-/// Gradients of the shape functions, place and volume share of one sample.
+/// Gradients of the shape functions and volume of one sample.
 struct Sample {
   std::array<Vec3, 10> gradient{};
-  Vec3 at{};
   double volume_m3 = 0.0;
 };
 
 /// One sample of an element: T4 ignores `l`.
 Sample calc_sample(std::span<const Vec3> x, const std::array<double, 4>& l) {
   const int n = static_cast<int>(x.size());
-  std::array<double, 10> value{};
   std::array<std::array<double, 4>, 10> by_l{};  // d N_i / d L_j
   for (int i = 0; i < 4; ++i) {
-    value[i] = n == 4 ? l[i] : l[i] * (2 * l[i] - 1);
     by_l[i][i] = n == 4 ? 1 : 4 * l[i] - 1;
   }
   for (int m = 4; m < n; ++m) {
     const auto [a, b] = mesh::kEdges[m - 4];
-    value[m] = 4 * l[a] * l[b];
     by_l[m][a] = 4 * l[b];
     by_l[m][b] = 4 * l[a];
   }
@@ -57,7 +53,6 @@ Sample calc_sample(std::span<const Vec3> x, const std::array<double, 4>& l) {
   Eigen::Matrix3d jacobian = Eigen::Matrix3d::Zero();  // d x_k / d L_d, d = 1 2 3
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k) {
-      sample.at[k] += value[i] * x[i][k];
       for (int d = 0; d < 3; ++d) jacobian(k, d) += x[i][k] * (by_l[i][d + 1] - by_l[i][0]);
     }
   const Eigen::Matrix3d inverse = jacobian.inverse();
@@ -66,6 +61,17 @@ Sample calc_sample(std::span<const Vec3> x, const std::array<double, 4>& l) {
     for (int k = 0; k < 3; ++k)
       for (int d = 0; d < 3; ++d) sample.gradient[i][k] += (by_l[i][d + 1] - by_l[i][0]) * inverse(d, k);
   return sample;
+}
+
+/// Where a sample is: calc_sample's `at` alone.
+Vec3 calc_place(std::span<const Vec3> x, const std::array<double, 4>& l) {
+  Vec3 at{};
+  const auto add = [&](const Vec3& node, double value) {
+    for (int k = 0; k < 3; ++k) at[k] += value * node[k];
+  };
+  for (int i = 0; i < 4; ++i) add(x[i], x.size() == 4 ? l[i] : l[i] * (2 * l[i] - 1));
+  for (std::size_t m = 4; m < x.size(); ++m) add(x[m], 4 * l[mesh::kEdges[m - 4][0]] * l[mesh::kEdges[m - 4][1]]);
+  return at;
 }
 
 constexpr double kNear = 0.58541019662496845, kFar = 0.13819660112501052;
@@ -227,7 +233,7 @@ void for_each_sample(const fem::LocalMesh& local, const Recovery& recovery, cons
   for (std::size_t e = 0; e < elements.count; ++e) {
     for (int i = 0; i < n; ++i) x[i] = local.nodes_m[local.tets[static_cast<std::size_t>(recovery.order[e]) * n + i]];
     for (int k = 0; k < s; ++k) {
-      const Vec3 at = calc_sample(x, find_place(s, k)).at;
+      const Vec3 at = calc_place(x, find_place(s, k));
       for (int v = 0; v < 4; ++v) use(e, v, k, static_cast<std::size_t>(elements.patch[4 * e + v]), patches.monomials(at, x[v]));
     }
   }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <unordered_map>
 
 #include "precompute/estimate/exchange.hpp"
@@ -57,15 +58,38 @@ FaceKey find_key(const fem::LocalMesh& local, const Face& face) {
 std::vector<Face> find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
   int ranks = 1;
   MPI_Comm_size(comm, &ranks);
-  std::vector<std::pair<FaceKey, Face>> all;
-  all.reserve(4 * static_cast<std::size_t>(local.tet_count()));
+  // Faces fall into buckets by their lowest corner: a face then meets its twin among the few faces of one node.
+  struct Sided {
+    std::array<std::int32_t, 2> rest;  // of its corners, ascending
+    Face face;
+  };
+  const auto sort_corners = [&](std::int32_t e, int f) {
+    FaceKey key;
+    for (int i = 0; i < 3; ++i) key[i] = get_node(local, e, mesh::kFaces[f][i]);
+    if (key[1] < key[0]) std::swap(key[0], key[1]);
+    if (key[2] < key[1]) std::swap(key[1], key[2]);
+    if (key[1] < key[0]) std::swap(key[0], key[1]);
+    return key;
+  };
+  std::vector<std::size_t> end(local.nodes_m.size() + 1, 0);
   for (std::int32_t e = 0; e < local.tet_count(); ++e)
-    for (int f = 0; f < 4; ++f) all.emplace_back(find_key(local, {e, f}), Face{e, f});
-  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (int f = 0; f < 4; ++f) ++end[sort_corners(e, f)[0] + 1];
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<Sided> all(end.back());
+  for (std::int32_t e = 0; e < local.tet_count(); ++e)
+    for (int f = 0; f < 4; ++f) {
+      const FaceKey key = sort_corners(e, f);
+      all[end[key[0]]++] = {{key[1], key[2]}, {e, f}};
+    }
   std::vector<Face> faces;
-  for (std::size_t i = 0, next; i < all.size(); i = next) {
-    for (next = i + 1; next < all.size() && all[next].first == all[i].first;) ++next;
-    if (next == i + 1) faces.push_back(all[i].second);
+  std::size_t first = 0;
+  for (std::size_t n = 0; n < local.nodes_m.size(); ++n) {
+    for (std::size_t i = first; i < end[n]; ++i) {
+      int times = 0;
+      for (std::size_t j = first; j < end[n]; ++j) times += all[j].rest == all[i].rest ? 1 : 0;
+      if (times == 1) faces.push_back(all[i].face);
+    }
+    first = end[n];
   }
   std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.tet != b.tet ? a.tet < b.tet : a.face < b.face; });
   if (ranks == 1) return faces;
