@@ -355,12 +355,9 @@ void BandSolver::prove() {
 
 void BandSolver::describe_proof() {
   Proof& proof = modes_.proof;
-  const double top = found_.lambda.empty() ? high_ : *std::max_element(found_.lambda.begin(), found_.lambda.end());
-  for (const Inertia& taken : sort_counts(counter_->get_taken())) {
+  for (const Inertia& taken : sort_counts(counter_->get_taken()))
     proof.counts.push_back({to_hz(taken.lambda), taken.below, find_margin(taken.lambda)});
-    if (options_.max_modes && taken.lambda > top) break;
-  }
-  proof.found = proof.counts.back().below - proof.counts.front().below;
+  proof.found = static_cast<std::int64_t>(found_.lambda.size());
   proof.factor_backward_error = counter_->get_worst_backward_error();
   proof.method = fmt::format("signs of the pivots of K - lambda M = L D L^T ({})", modes_.factor.solver);
 }

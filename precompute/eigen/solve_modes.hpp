@@ -110,10 +110,10 @@ struct Cluster {
 struct Proof {
   std::vector<Count> counts;                      // ascending in frequency: both ends of the band, every cut and every shift
   std::vector<std::int64_t> rigid_per_component;  // (components) rigid modes of each, in the count below the band
-  std::int64_t found = 0;                         // modes between the first count and the last
-  std::string method;                             // how the counts were taken, in words
-  double factor_backward_error = 0;               // largest relative residual of a solve with the factors; 0 if not measured
-  std::vector<Cluster> clusters;                  // ascending; single modes are not listed
+  std::int64_t found = 0;            // modes found; fewer than lie between the first count and the last only if max_modes cut the search
+  std::string method;                // how the counts were taken, in words
+  double factor_backward_error = 0;  // largest relative residual of a solve with the factors; 0 if not measured
+  std::vector<Cluster> clusters;     // ascending; single modes are not listed
 };
 
 struct Modes {
