@@ -1,8 +1,10 @@
 // One answer whatever the ranks, the pieces and the way back from a resolved job.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <json/json.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "precompute/shapes/shapes.hpp"
 #include "tests/path/run_program.hpp"
@@ -37,13 +39,22 @@ TEST(Ranks, give_one_answer_on_1_2_and_3) {
   }
 }
 
+/// The job of a resolved JSON, without what its run took.
+Json::Value find_job(const std::string& text) {
+  Json::Value root;
+  std::istringstream(text) >> root;
+  Json::Value run;
+  EXPECT_TRUE(root.removeMember("run", &run));
+  return root;
+}
+
 TEST(ResolvedJob, beside_the_bank_runs_again_and_gives_the_same_bank) {
   Folder folder;
   mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {8, 2, 1}), folder / "mesh.msh");
   folder.write_job({}, R"("element": "T4", "mass": "lumped",)");
   const bank::Bank first = folder.solve();
   const std::string resolved = folder.read("out.bank.resolved.json");
-  EXPECT_EQ(first.provenance, resolved);
+  EXPECT_EQ(find_job(first.provenance), find_job(resolved));  // the record beside the bank has the writing of the bank, too
   for (const char* word : {"\"petsc\"", "\"slepc\"", "\"metis\"", "\"hdf5\"", "\"mpi\"", "\"blas\"", "\"git\"", "\"ranks\"", "\"seconds\"",
                            "\"peak_bytes_largest_rank\"", "\"edge_cut\"", "\"halo_nodes\"", "\"tolerance\"", "\"band_hz\""})
     EXPECT_THAT(resolved, HasSubstr(word));
