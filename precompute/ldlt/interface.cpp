@@ -3,8 +3,8 @@
 //             the pairs of ranks before have covered are left out. (The nodes of one side alone, a simpler cover, are up to twice as many.)
 //             So interior nodes of different ranks are never neighbours, and each rank eliminates its own without a message. Interface
 //             nodes that touch the same ranks form a group; eliminating an interior makes a clique of its boundary, so groups are ordered
-//             by minimum weighted degree in the graph where groups near a common rank are neighbours. Supernodes of the interface go to the
-//             least loaded rank of those below them in the tree.
+//             by minimum weighted degree in the graph where groups near a common rank are neighbours. Wide supernodes of the interface
+//             are cut into chains, and each link goes to that of the ranks below it in the tree which keeps the fewest entries.
 // Source:     Koenig 1931 (cover from matching); Pothen, Simon, Liou 1990, Partitioning sparse matrices with eigenvectors of graphs (vertex
 //             from edge separators). Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear equations. George
 //             and Liu 1989, The evolution of the minimum degree ordering algorithm. Geist and Ng 1989, Task scheduling for parallel sparse
@@ -192,8 +192,33 @@ void set_positions(Interface& interface, const Ints& position) {
   for (std::size_t i = 0; i < position.size(); ++i) interface.index[position[i]] = static_cast<std::int32_t>(i);
 }
 
-/// Each supernode to the least loaded of the ranks whose work lies below it.
-void choose_owners(Interface& interface, std::vector<double> load) {
+/// Cuts wide supernodes into chains: each link is a front of its own, which may lie on any rank.
+void cut_supernodes(Interface& interface) {
+  constexpr std::int32_t kLinkNodes = 256;
+  Forest& forest = interface.forest;
+  std::vector<Supernode> links;
+  Ints link_of(interface.nodes.size());
+  for (const Supernode& node : forest.supernodes) {
+    const std::int32_t count = (node.width + kLinkNodes - 1) / kLinkNodes;
+    for (std::int32_t k = 0; k < count; ++k) {
+      Supernode& link = links.emplace_back();
+      const std::int32_t begin = node.width * k / count;
+      const std::int32_t end = node.width * (k + 1) / count;
+      link.first = node.first + begin;
+      link.width = end - begin;
+      for (std::int32_t p = node.first + end; p < node.first + node.width; ++p) link.rows.push_back(p);
+      link.rows.insert(link.rows.end(), node.rows.begin(), node.rows.end());
+      for (std::int32_t p = link.first; p < link.first + link.width; ++p) link_of[p] = static_cast<std::int32_t>(links.size()) - 1;
+    }
+  }
+  for (Supernode& link : links) link.parent = link.rows.empty() ? -1 : link_of[link.rows.front()];
+  for (std::int32_t h = 0; h < interface.hubs.count(); ++h)
+    if (forest.hub_parents[h] >= 0) forest.hub_parents[h] = link_of[*interface.hubs.begin(h)];
+  forest.supernodes = std::move(links);
+}
+
+/// Each supernode to that of the ranks whose work lies below it which keeps the fewest entries.
+void choose_owners(Interface& interface, std::vector<double> entries) {
   const std::vector<Supernode>& supernodes = interface.forest.supernodes;
   std::vector<std::set<std::int32_t>> below(supernodes.size());
   for (std::int32_t h = 0; h < interface.hubs.count(); ++h)
@@ -202,8 +227,8 @@ void choose_owners(Interface& interface, std::vector<double> load) {
   for (std::size_t s = 0; s < supernodes.size(); ++s) {
     const Supernode& node = supernodes[s];
     if (below[s].empty()) below[s].insert(find_rank(interface.first_of_rank, interface.index[node.first]));
-    interface.owner[s] = *std::min_element(below[s].begin(), below[s].end(), [&](int a, int b) { return load[a] < load[b]; });
-    load[interface.owner[s]] += calc_cost_ns(node.width, node.size());
+    interface.owner[s] = *std::min_element(below[s].begin(), below[s].end(), [&](int a, int b) { return entries[a] < entries[b]; });
+    entries[interface.owner[s]] += static_cast<double>(count_entries(node.width, node.size()));
     if (node.parent >= 0) below[node.parent].insert(below[s].begin(), below[s].end());
     below[s].clear();
   }
@@ -265,7 +290,7 @@ void order_interface(Interface& interface) {
   for (std::int32_t p = 0; p < interface.count(); ++p) interface.position[interface.index[p]] = p;
 }
 
-void plan_interface(Interface& interface, std::vector<double> load) {
+void plan_interface(Interface& interface, std::vector<double> entries) {
   interface.forest = find_supernodes(make_graph(interface), interface.hubs.count(), interface.count());
   const Ints& moved = interface.forest.position;
   for (std::int32_t& row : interface.hubs.items) row = moved[row];
@@ -274,7 +299,8 @@ void plan_interface(Interface& interface, std::vector<double> load) {
   Ints position = interface.position;
   for (std::int32_t& p : position) p = moved[p];
   set_positions(interface, position);
-  choose_owners(interface, std::move(load));
+  cut_supernodes(interface);
+  choose_owners(interface, std::move(entries));
 }
 
 Ints find_touched_positions(const Interface& interface, int rank) {

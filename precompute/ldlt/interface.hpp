@@ -55,9 +55,9 @@ void find_separator(MPI_Comm comm, const Lists& edges, const Ints& rank_starts, 
 /// Local, and the same on every rank.
 void order_interface(Interface& interface);
 
-/// Eliminates the interface on paper: supernodes (which refines the order) and their ranks. hubs hold first positions; load: what each rank
-/// has to do already [ns]. Local, and the same on every rank.
-void plan_interface(Interface& interface, std::vector<double> load);
+/// Eliminates the interface on paper: supernodes (which refines the order) and their ranks. hubs hold first positions; entries: what each
+/// rank keeps of L already. Local, and the same on every rank.
+void plan_interface(Interface& interface, std::vector<double> entries);
 
 /// The positions with which a rank has to do: its own interface nodes with their neighbours, the boundary of its interior, and the fronts
 /// that it owns. Ascending.

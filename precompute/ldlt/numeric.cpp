@@ -63,8 +63,8 @@ class Factoriser {
     remote_.resize(plan.fronts.size());
     for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
       const Front& front = plan.fronts[s];
-      if (!is_stacked(front)) loose_[s] = Buffer(count_update(front));
-      for (const Edge& edge : front.remote_children) remote_[s].emplace_back(count_packed(3 * static_cast<std::int64_t>(edge.rows.size())));
+      if (!is_stacked(front)) loose_[s] = Buffer(count_update(count_rows(front.rows)));
+      for (const Edge& edge : front.remote_children) remote_[s].emplace_back(count_update(count_rows(edge.rows)));
     }
     for (const BlockList& list : plan.sent) sent_.emplace_back(9 * list.columns.size());
     for (const BlockList& list : plan.received) received_.emplace_back(9 * list.columns.size());
@@ -76,17 +76,17 @@ class Factoriser {
     start_blocks();
     for (std::int32_t s = 0; s < plan_.interior_fronts; ++s) process(s);
     finish_blocks();
-    for (std::int32_t s = plan_.interior_fronts; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s);
+    for (Buffer& stack : stack_) stack = Buffer();
+    for (std::int32_t s = plan_.interior_fronts; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) {
+      release_sent();
+      process(s);
+    }
     MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
     reduce();
   }
 
  private:
-  static std::int64_t count_update(const Front& front) {
-    const auto r = 3 * static_cast<std::int64_t>(front.rows.size());
-    return r * r;
-  }
-  static std::int64_t count_packed(std::int64_t r) { return r * (r + 1) / 2; }
+  static std::int64_t count_rows(const Ints& nodes) { return 3 * static_cast<std::int64_t>(nodes.size()); }
   bool is_stacked(const Front& front) const { return front.parent >= 0 && front.parent < plan_.interior_fronts; }
 
   void process(std::int32_t s) {
@@ -95,7 +95,7 @@ class Factoriser {
     r_ = 3 * static_cast<int>(front.rows.size());
     f_ = w_ + r_;
     update_ = is_stacked(front) ? stack_[front.depth % 2].data() + used_[front.depth % 2] : loose_[s].data();
-    if (is_stacked(front)) used_[front.depth % 2] += count_update(front);
+    if (is_stacked(front)) used_[front.depth % 2] += count_update(r_);
     clear();
     for (std::int32_t i = 0; i < front.width; ++i) where_[front.first + i] = i;
     for (std::size_t i = 0; i < front.rows.size(); ++i) where_[front.rows[i]] = front.width + static_cast<std::int32_t>(i);
@@ -108,7 +108,7 @@ class Factoriser {
 
   void clear() {
     std::memset(columns_.data(), 0, sizeof(double) * static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_));
-    for (std::ptrdiff_t j = 0; j < r_; ++j) std::memset(update_ + j * r_ + j, 0, sizeof(double) * static_cast<std::size_t>(r_ - j));
+    std::memset(update_, 0, sizeof(double) * static_cast<std::size_t>(count_update(r_)));
   }
 
   /// Adds factor times this rank's row 3 v + d of a matrix to column `target` of the front; `first`: its first pivot.
@@ -212,8 +212,8 @@ class Factoriser {
     const int r = row_runs_[j];
     const Run whole = runs_[r];
     const int column = whole.to + j - whole.from;
-    double* target = column < w_ ? columns_.data() + static_cast<std::ptrdiff_t>(column) * f_
-                                 : update_ + static_cast<std::ptrdiff_t>(column - w_) * r_ - w_;
+    double* target =
+        column < w_ ? columns_.data() + static_cast<std::ptrdiff_t>(column) * f_ : update_ + find_update_column(r_, column - w_) - w_;
     runs_[r] = {j, column, whole.length - (j - whole.from)};
     kernels_.add_runs(source, runs_.data() + r, static_cast<int>(runs_.size()) - r, target);
     runs_[r] = whole;
@@ -222,11 +222,11 @@ class Factoriser {
   void add_child(std::int32_t s) {
     const Front& child = plan_.fronts[s];
     locate(child.rows);
-    const std::ptrdiff_t r = 3 * static_cast<std::ptrdiff_t>(child.rows.size());
+    const std::int64_t r = count_rows(child.rows);
     const bool stacked = is_stacked(child);
-    if (stacked) used_[child.depth % 2] -= r * r;
+    if (stacked) used_[child.depth % 2] -= count_update(r);
     const double* source = child_update(child, s);
-    for (std::ptrdiff_t j = 0; j < r; ++j) add_column(source + j * r, static_cast<int>(j));
+    for (std::int64_t j = 0; j < r; ++j) add_column(source + find_update_column(r, j), static_cast<int>(j));
     if (!stacked) loose_[s] = Buffer();
   }
 
@@ -235,27 +235,29 @@ class Factoriser {
     return is_stacked(child) ? stack_[child.depth % 2].data() + used_[child.depth % 2] : loose_[s].data();
   }
 
-  void add_remote_child(const Edge& edge, Buffer& packed) {
-    MPI_Recv(packed.data(), static_cast<int>(packed.size()), MPI_DOUBLE, edge.rank, kUpdateTag + edge.tag, plan_.comm, MPI_STATUS_IGNORE);
+  void add_remote_child(const Edge& edge, Buffer& update) {
+    MPI_Recv(update.data(), static_cast<int>(update.size()), MPI_DOUBLE, edge.rank, kUpdateTag + edge.tag, plan_.comm, MPI_STATUS_IGNORE);
     locate(edge.rows);
-    const int r = 3 * static_cast<int>(edge.rows.size());
-    const double* source = packed.data();
-    for (int j = 0; j < r; ++j) {
-      add_column(source, j);
-      source += r - j - 1;
-    }
-    packed = Buffer();
+    const std::int64_t r = count_rows(edge.rows);
+    for (std::int64_t j = 0; j < r; ++j) add_column(update.data() + find_update_column(r, j), static_cast<int>(j));
+    update = Buffer();
   }
 
-  /// Packs the lower triangle in place, column after column, and sends it.
   void send_update(const Front& front, std::int32_t s) {
-    double* packed = update_;
-    for (std::ptrdiff_t j = 0; j < r_; ++j) {
-      std::memmove(packed, update_ + j * r_ + j, sizeof(double) * static_cast<std::size_t>(r_ - j));
-      packed += r_ - j;
-    }
-    MPI_Isend(loose_[s].data(), static_cast<int>(count_packed(r_)), MPI_DOUBLE, front.to_parent.rank, kUpdateTag + front.to_parent.tag,
+    MPI_Isend(loose_[s].data(), static_cast<int>(loose_[s].size()), MPI_DOUBLE, front.to_parent.rank, kUpdateTag + front.to_parent.tag,
               plan_.comm, &requests_.emplace_back());
+    sent_fronts_.push_back(s);
+  }
+
+  /// Gives back what has arrived. Nothing is waited for: the receiver may need this rank's next front first.
+  void release_sent() {
+    for (std::size_t i = 0; i < requests_.size(); ++i) {
+      int is_sent = 0;
+      if (sent_fronts_[i] >= 0) MPI_Test(&requests_[i], &is_sent, MPI_STATUS_IGNORE);
+      if (is_sent == 0) continue;
+      loose_[sent_fronts_[i]] = Buffer();
+      sent_fronts_[i] = -1;
+    }
   }
 
   void eliminate(const Front& front, double* packed) {
@@ -287,10 +289,10 @@ class Factoriser {
       multiply('T', f_ - from, width, n, -1.0, below + (from - end), f_, product + (from - end), m, 1.0,
                columns_.data() + static_cast<std::ptrdiff_t>(from) * f_ + from, f_);
     }
-    for (int j = 0; j < r_; j += kUpdateColumns) {
+    for (int j = 0; j < r_; j += kStripColumns) {
       const int from = w_ - end + j;
-      multiply('T', r_ - j, std::min(kUpdateColumns, r_ - j), n, -1.0, below + from, f_, product + from, m, 1.0,
-               update_ + static_cast<std::ptrdiff_t>(j) * r_ + j, r_);
+      multiply('T', r_ - j, std::min<int>(kStripColumns, r_ - j), n, -1.0, below + from, f_, product + from, m, 1.0,
+               update_ + find_strip(r_, j / kStripColumns), r_ - j);
     }
     return packed + static_cast<std::ptrdiff_t>(m) * n;
   }
@@ -326,7 +328,6 @@ class Factoriser {
     numbers_.is_complete = extremes[2] == 0;
   }
 
-  static constexpr int kUpdateColumns = 96;
   static constexpr int kBlockTag = 1;
   static constexpr int kUpdateTag = 2;
 
@@ -359,6 +360,7 @@ class Factoriser {
   Ints own_of_local_;
   std::vector<MPI_Request> block_requests_;
   std::vector<MPI_Request> requests_;
+  Ints sent_fronts_;  // (requests) whose update matrix it sends, -1: it has arrived
 
   std::int64_t negative_ = 0;
   double smallest_ = std::numeric_limits<double>::infinity();

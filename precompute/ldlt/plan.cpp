@@ -27,9 +27,9 @@ bool leaves_rows(const Supernode& node) { return node.parent < 0 && !node.rows.e
 void plan_common(MPI_Comm comm, const Interior& interior, Interface& interface) {
   const auto count = static_cast<std::int32_t>(interior.own_node.size());
   Lists roots;
-  double work = 0;
+  double entries = 0;
   for (const Supernode& node : interior.forest.supernodes) {
-    work += calc_cost_ns(node.width, node.size());
+    entries += static_cast<double>(count_entries(node.width, node.size()));
     if (!leaves_rows(node)) continue;
     for (const std::int32_t row : node.rows) roots.items.push_back(interior.boundary[row - count]);
     roots.close();
@@ -39,9 +39,9 @@ void plan_common(MPI_Comm comm, const Interior& interior, Interface& interface) 
   for (std::size_t rank = 0; rank + 1 < first_of_rank.size(); ++rank)
     interface.hub_rank.insert(interface.hub_rank.end(), static_cast<std::size_t>(first_of_rank[rank + 1] - first_of_rank[rank]),
                               static_cast<std::int32_t>(rank));
-  std::vector<double> load(first_of_rank.size() - 1);
-  MPI_Allgather(&work, 1, MPI_DOUBLE, load.data(), 1, MPI_DOUBLE, comm);
-  plan_interface(interface, std::move(load));
+  std::vector<double> kept(first_of_rank.size() - 1);
+  MPI_Allgather(&entries, 1, MPI_DOUBLE, kept.data(), 1, MPI_DOUBLE, comm);
+  plan_interface(interface, std::move(kept));
 }
 
 /// Makes a rank's own plan of the common one.
@@ -210,35 +210,40 @@ class PlanMaker {
 Analysis::Rank measure(Plan& plan) {
   Analysis::Rank own;
   std::int64_t factor = 0;
-  std::int64_t loose = 0;  // update matrices outside the stacks
+  std::int64_t loose = 0;  // update matrices outside the stacks; those on their way to others may stay to the end
+  std::int64_t interior_loose = 0;
   std::int64_t loose_peak = 0;
   std::int64_t scratch = 0;
+  std::int64_t columns = 0;
   std::int64_t used[2] = {0, 0};
-  const auto square = [](std::size_t nodes) { return 9 * static_cast<std::int64_t>(nodes) * static_cast<std::int64_t>(nodes); };
+  const auto count = [](const Ints& rows) { return count_update(3 * static_cast<std::int64_t>(rows.size())); };
   for (const Front& front : plan.fronts) {
     own.entries += count_entries(front.width, front.size());
     own.flops += count_flops(front.width, front.size());
     factor += count_stored(front.width, front.size());
     scratch = std::max(scratch, std::int64_t{9} * front.size() * kPanelNodes);
+    columns = std::max(columns, std::int64_t{9} * front.size() * front.width);
     const bool is_stacked = front.parent >= 0 && front.parent < plan.interior_fronts;
     std::int64_t& room = is_stacked ? used[front.depth % 2] : loose;
-    room += square(front.rows.size());
-    for (const Edge& edge : front.remote_children) loose += square(edge.rows.size());
-    loose_peak = std::max(loose_peak, loose);
+    room += count(front.rows);
+    std::int64_t remote = 0;  // they come one after the other
+    for (const Edge& edge : front.remote_children) remote = std::max(remote, count(edge.rows));
+    loose_peak = std::max(loose_peak, loose + remote);
+    if (!front.is_interface) interior_loose = std::max(interior_loose, loose);
     for (int parity = 0; parity < 2; ++parity) plan.stack_entries[parity] = std::max(plan.stack_entries[parity], used[parity]);
-    for (const Edge& edge : front.remote_children) loose -= square(edge.rows.size());
     for (const std::int32_t child : front.children)
-      (front.is_interface ? loose : used[plan.fronts[child].depth % 2]) -= square(plan.fronts[child].rows.size());
+      (front.is_interface ? loose : used[plan.fronts[child].depth % 2]) -= count(plan.fronts[child].rows);
   }
   const std::int64_t blocks = [&] {
-    std::int64_t count = 0;
+    std::int64_t entries = 0;
     for (const auto* lists : {&plan.sent, &plan.received})
-      for (const BlockList& list : *lists) count += 9 * static_cast<std::int64_t>(list.columns.size());
-    return count;
+      for (const BlockList& list : *lists) entries += 9 * static_cast<std::int64_t>(list.columns.size());
+    return entries;
   }();
   constexpr std::int64_t kSolveColumns = 32;
-  own.peak_bytes =
-      8 * (factor + plan.stack_entries[0] + plan.stack_entries[1] + loose_peak + scratch + blocks + 3 * kSolveColumns * plan.local_nodes);
+  // The stacks are given back before the first front of the interface.
+  const std::int64_t updates = std::max(plan.stack_entries[0] + plan.stack_entries[1] + interior_loose, loose_peak);
+  own.peak_bytes = 8 * (factor + updates + columns + scratch + blocks + 3 * kSolveColumns * plan.local_nodes);
   return own;
 }
 

@@ -83,4 +83,20 @@ inline std::int32_t find_panel_start(std::int32_t width, std::int32_t p) {
 /// Numbers stored of a front: each panel in full columns from its own first row on.
 std::int64_t count_stored(std::int32_t width, std::int32_t size);
 
+/// An update matrix of r rows is stored as strips of kStripColumns columns, each in full columns from its own first row on.
+inline constexpr std::int64_t kStripColumns = 96;
+/// Where strip b begins.
+inline std::int64_t find_strip(std::int64_t r, std::int64_t b) { return kStripColumns * (b * r - kStripColumns * (b * (b - 1) / 2)); }
+/// Numbers stored of it.
+inline std::int64_t count_update(std::int64_t r) {
+  const std::int64_t whole = r / kStripColumns;
+  const std::int64_t rest = r - whole * kStripColumns;
+  return find_strip(r, whole) + rest * rest;
+}
+/// Where row 0 of column j would be.
+inline std::int64_t find_update_column(std::int64_t r, std::int64_t j) {
+  const std::int64_t first = j / kStripColumns * kStripColumns;
+  return find_strip(r, j / kStripColumns) + (j - first) * (r - first) - first;
+}
+
 }  // namespace carillon::ldlt
