@@ -1,14 +1,13 @@
 // One iteration and what SLEPc needs to call it: longer than most files, as every part works on the same basis.
 // Method:     V_{j+1} R_j = A^-1 M V_j - V_j alpha_j - V_{j-1} R_{j-1}^T in the M inner product, A = K - sigma M, blocks of b columns. The
-//             recurrence is followed by one projection against the whole basis; the block is orthonormalised by Cholesky QR, twice if it
-//             is badly conditioned, and column by column, with random columns for dependent ones, if it is singular. The projected matrix
-//             is block tridiagonal; ||R_j s_i||, s_i the last block row of its eigenvector, is the residual of a Ritz pair. A full basis
-//             is restarted with its best Ritz vectors.
+//             recurrence is followed by one projection, against the whole basis only where orthogonality is about to be lost
+//             (orthogonality.cpp); the block is orthonormalised by Cholesky QR, twice if it is badly conditioned, and column by column,
+//             with random columns for dependent ones, if it is singular. The projected matrix is block tridiagonal; ||R_j s_i||, s_i the
+//             last block row of its eigenvector, is the residual of a Ritz pair. A full basis is restarted with its best Ritz vectors.
 // Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994. Wu, Simon, Thick-restart
 //             Lanczos, SIAM J. Matrix Anal. Appl. 22(2), 2000. Yamamoto et al., Roundoff error analysis of the CholeskyQR2 algorithm, ETNA
 //             44, 2015.
-// Deviations: the whole basis is projected out at every step, as its kernels make that cheap, where Grimes et al. watch orthogonality and
-//             project now and then.
+// Deviations: Ritz vectors go through the operator once more by the recurrence, and are cleared of the pairs nearest the shift.
 #include "precompute/eigen/block_lanczos.hpp"
 
 #include <petscblaslapack.h>
@@ -23,6 +22,8 @@
 
 #include "precompute/eigen/block_kernels.hpp"
 #include "precompute/eigen/local_columns.hpp"
+#include "precompute/eigen/noise.hpp"
+#include "precompute/eigen/orthogonality.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
 
@@ -44,6 +45,7 @@ constexpr double kDependent = 1e-11;       // and smallest that Cholesky QR is t
 constexpr double kTaken = 1e-2;            // A projection that takes more of a column's square is done once more.
 constexpr double kAngle = 1e-7;            // Ritz vectors must be told apart from their neighbours to this angle,
 constexpr double kSmallest = 1e-14;        // as far as residuals, relative to theta, can say.
+constexpr int kNearest = 32;               // Converged pairs that the others are cleared of at the end.
 constexpr double kSame = 1e-9;             // Closer Ritz values are one.
 constexpr double kSeen = 1e-3;             // A Ritz value with this error is no phantom.
 
@@ -56,14 +58,6 @@ struct Settings {
 Settings& get_settings(EPS eps) { return *static_cast<Settings*>(eps->data); }
 
 using Small = std::vector<double>;  // column-major
-
-// Numbers in (-1/2, 1/2) that depend on the arguments alone.
-double make_noise(std::uint64_t a, std::uint64_t b) {
-  std::uint64_t x = a * 0x9E3779B97F4A7C15ull + b * 0xD1B54A32D192ED03ull + 0x8CB92BA72F3D8DD7ull;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
-  return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1.0p-53 - 0.5;
-}
 
 class Iteration {
  public:
@@ -85,6 +79,8 @@ class Iteration {
   void multiply_mass();
   void invert();
   void project(bool is_first, Small& alpha);
+  bool agree(bool opinion) const;
+  Orthogonality::State get_state() const { return {t_.data(), room_, size_, width_, previous_}; }
   int orthonormalise(Small& r);
   bool orthonormalise_by_cholesky(Small& r);
   int orthonormalise_by_columns(Small& r);
@@ -101,6 +97,7 @@ class Iteration {
   bool report(const Ritz& ritz);
   void restart(Ritz& ritz);
   void finish(Ritz& ritz);
+  void clear_nearest(const Ritz& ritz, int count);
   double& t(int i, int j) { return t_[static_cast<std::size_t>(j) * static_cast<std::size_t>(room_) + static_cast<std::size_t>(i)]; }
 
   EPS eps_;
@@ -125,6 +122,8 @@ class Iteration {
   int last_size_ = 0;
   std::size_t last_converged_ = 0;
   std::uint64_t noise_ = 0;
+  Orthogonality orthogonality_;
+  bool is_spared_ = false;  // the step did without the projection against the whole basis
 };
 
 Columns view(Mat dense) {
@@ -230,8 +229,8 @@ void Iteration::start() {
   previous_ = 0;
 }
 
-// w -= (everything so far) (everything so far)^T M w, after the recurrence has taken the bulk away. alpha: (width, width) the diagonal
-// block.
+// w -= (everything so far) (everything so far)^T M w, after the recurrence has taken the bulk away; where little is foreseen to be left,
+// only the blocks that the recurrence couples to. alpha: (width, width) the diagonal block.
 void Iteration::project(bool is_first, Small& alpha) {
   const Columns next = w_.part(0, is_first ? block_ : width_);
   const Columns next_mass = z_.part(0, next.count);
@@ -247,23 +246,33 @@ void Iteration::project(bool is_first, Small& alpha) {
     }
     subtract_product(basis_.part(previous_, coupled), local.data(), coupled, next);
   }
-  const Columns all = everything_.part(0, fixed_.count + size_);
+  is_spared_ = !is_first && agree(orthogonality_.is_good(get_state(), alpha.data()));
+  const Columns against = is_spared_ ? basis_.part(previous_, size_ - previous_) : everything_.part(0, fixed_.count + size_);
   for (int pass = 0; pass < 3; ++pass) {
     multiply_mass();
-    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, next_mass).data(), locked_.count, next);
-    const Small c = sum_products(all, next_mass);
     const std::vector<double> square = sum_squares(next, next_mass);
-    subtract_product(all, c.data(), all.count, next);
+    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, next_mass).data(), locked_.count, next);
+    if (is_spared_ && fixed_.count > 0) subtract_product(fixed_, sum_products(fixed_, next_mass).data(), fixed_.count, next);
+    const Small c = sum_products(against, next_mass);
+    subtract_product(against, c.data(), against.count, next);
+    if (pass == 0 && !is_first && !is_spared_) orthogonality_.learn(get_state(), c.data() + fixed_.count, against.count);
     double taken = 0;  // largest part of a column that this pass took away; its rounding is what it leaves behind
     for (int j = 0; j < next.count; ++j) {
-      const double* column = c.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(all.count);
+      const double* column = c.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(against.count);
       if (!is_first) {
-        for (int i = 0; i < width_; ++i) alpha[static_cast<std::size_t>(j * width_ + i)] += column[all.count - width_ + i];
+        for (int i = 0; i < width_; ++i) alpha[static_cast<std::size_t>(j * width_ + i)] += column[against.count - width_ + i];
       }
-      taken = std::max(taken, std::inner_product(column, column + all.count, column, 0.0) / square[static_cast<std::size_t>(j)]);
+      taken = std::max(taken, std::inner_product(column, column + against.count, column, 0.0) / square[static_cast<std::size_t>(j)]);
     }
     if (taken < kTaken) break;
   }
+}
+
+// The first rank's opinion.
+bool Iteration::agree(bool opinion) const {
+  int value = opinion ? 1 : 0;
+  MPI_Bcast(&value, 1, MPI_INT, 0, comm_);
+  return value != 0;
 }
 
 // Makes the columns of w M-orthonormal: w <- w R^-1, z <- M w. Returns how many are left; fewer than there were when the space is
@@ -393,6 +402,7 @@ bool Iteration::step() {
     }
   }
   next_width_ = orthonormalise(coupling_);
+  orthogonality_.advance(get_state(), coupling_, next_width_, is_spared_);
   for (int j = next_width_; j < block_; ++j) {
     std::fill_n(w_.column(j), w_.rows, 0.0);
     std::fill_n(z_.column(j), z_.rows, 0.0);
@@ -576,6 +586,7 @@ void Iteration::restart(Ritz& ritz) {
   coupling_ = coupling;
   size_ = width_ = kept;
   last_size_ = size_;
+  orthogonality_.forget();
 }
 
 // The Ritz vectors once through the operator, y + V_next R s / theta, which costs next to nothing as V_next is at hand: what is left of
@@ -601,6 +612,29 @@ void Iteration::finish(Ritz& ritz) {
     }
   }
   combine_columns(basis_.part(0, static_cast<int>(all)), purified.data(), static_cast<int>(count));
+  clear_nearest(ritz, static_cast<int>(count));
+}
+
+// What a spared projection leaves standing is rounding along the pairs nearest the shift, by their large theta. These are the most exact
+// ones, so it is the others that are made orthogonal to them, block by block.
+void Iteration::clear_nearest(const Ritz& ritz, int count) {
+  std::vector<int> order(static_cast<std::size_t>(count));
+  std::iota(order.begin(), order.end(), 0);
+  const auto theta = [&](int j) { return std::abs(ritz.theta[static_cast<std::size_t>(ritz.order[static_cast<std::size_t>(j)])]); };
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return theta(a) > theta(b); });
+  const Columns found = basis_.part(0, count);
+  for (int first = 0; first < std::min(count, kNearest); first += block_) {
+    const int width = std::min(block_, count - first);
+    const Columns nearest = w_.part(0, width);
+    for (int j = 0; j < width; ++j) std::copy_n(found.column(order[static_cast<std::size_t>(first + j)]), w_.rows, nearest.column(j));
+    multiply_mass();
+    Small products = sum_products(z_.part(0, width), found);
+    for (int place = 0; place < std::min(first + width, count); ++place) {  // Nearer ones stay as they are.
+      double* column = products.data() + static_cast<std::ptrdiff_t>(order[static_cast<std::size_t>(place)]) * width;
+      std::fill(column + std::max(place - first, 0), column + width, 0.0);
+    }
+    subtract_product(nearest, products.data(), width, found);
+  }
 }
 
 void Iteration::run() {

@@ -33,7 +33,8 @@ void InertiaCounter::make_factor() {
 bool InertiaCounter::try_factorise(double sigma) {
   const Timer timer(seconds_.factor);
   ++statistics_.factorisations;
-  if (!factor_->factorise(sigma)) return false;
+  stands_ = factor_->factorise(sigma);
+  if (!stands_) return false;
   statistics_.entries = factor_->get_entries();
   statistics_.flops = factor_->get_flops();
   worst_backward_error_ = std::max(worst_backward_error_, factor_->get_backward_error());
@@ -52,7 +53,7 @@ Inertia InertiaCounter::take(double lambda, double reach) {
     }
     if (uses_mumps_ || options_.factorisation == Factorisation::kLdlt) break;
     uses_mumps_ = true;  // It pivots across fronts: slower, and stable where ours is not.
-    factor_.reset();
+    release();
   }
   throw SolveError(
       fmt::format("K - sigma M is singular all around {:.6g} Hz: the mesh has nodes without mass or stiffness, or the mass matrix is "

@@ -31,8 +31,13 @@ class InertiaCounter {
 
   /// The factor of the last take; one that is analysed only if there was none, or it was released. Collective.
   ShiftedFactor& get_factor();
+  /// The factor where the last take left it; null if none stands.
+  ShiftedFactor* find_standing() { return stands_ ? factor_.get() : nullptr; }
   /// Frees the factor; the next take makes another. Collective.
-  void release() { factor_.reset(); }
+  void release() {
+    factor_.reset();
+    stands_ = false;
+  }
 
   const std::vector<Inertia>& get_taken() const { return taken_; }
   /// Forgets counts that were taken too near an eigenvalue.
@@ -51,6 +56,7 @@ class InertiaCounter {
   MPI_Comm comm_ = MPI_COMM_NULL;
   bool uses_mumps_ = false;
   std::unique_ptr<ShiftedFactor> factor_;
+  bool stands_ = false;  // factor_ holds the values of the last take
   std::vector<Inertia> taken_;
   double worst_backward_error_ = 0;
 };

@@ -1,7 +1,9 @@
-// Method:     Bad modes are taken in groups of neighbours. One step of inverse iteration, (K - sigma M)^-1 M phi with sigma just below the
-//             group, damps everything farther from sigma than the group is; Rayleigh-Ritz within the group parts its members; Gram-Schmidt
-//             from the lowest mode up makes the whole set M-orthonormal again. What is still bad is tried again in narrower groups, whose
-//             shifts are nearer; the narrowest hold a single mode.
+// Method:     A few bad modes go through the operator at hand once more, (K - sigma M)^-1 M phi, and are made orthogonal to the others:
+// that
+//             mends what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration, (K -
+//             sigma M)^-1 M phi with sigma just below the group, damps everything farther from sigma than the group is; Rayleigh-Ritz
+//             within the group parts its members; Gram-Schmidt from the lowest mode up makes the whole set M-orthonormal again. What is
+//             still bad is tried again in narrower groups, whose shifts are nearer; the narrowest hold a single mode.
 // Source:     Parlett, The symmetric eigenvalue problem, 1998, sections 4.2 (inverse iteration), 11.3 (Rayleigh-Ritz).
 // Deviations: none.
 #include "precompute/eigen/refine.hpp"
@@ -118,6 +120,61 @@ void improve_group(const RefineRequest& request, const Group& group, double near
   }
 }
 
+// The modes once through the operator at hand, whatever its shift; what that brings in of the others is taken out again. Modes that it does
+// not improve stay as they were. The other modes do not move, so nothing else needs to be measured anew.
+void polish(const RefineRequest& request, const Group& bad, std::vector<double>& lambda, Mat shapes, ModeErrors& errors, RefineCost& cost) {
+  const Operators& operators = *request.operators;
+  const LocalColumns access(shapes);
+  const Columns all = access.view();
+  PetscInt n = 0;
+  check(MatGetSize(shapes, &n, nullptr));
+  petsc::MatHandle polished;
+  check(MatCreateDense(operators.comm, access.rows, PETSC_DECIDE, n, static_cast<PetscInt>(bad.size()), nullptr, polished.out()));
+  check(MatAssemblyBegin(polished, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(polished, MAT_FINAL_ASSEMBLY));
+  std::vector<double> ritz;
+  double overlap = 0;  // with the other modes, in the end
+  {
+    const LocalColumns own(polished);
+    const Columns x = own.view();
+    std::vector<double> space(static_cast<std::size_t>(x.rows) * bad.size());
+    const Columns work{space.data(), x.rows, x.rows, x.count};
+    for (std::size_t j = 0; j < bad.size(); ++j)
+      operators.mass.multiply(all.part(static_cast<int>(bad[j]), 1), x.part(static_cast<int>(j), 1));
+    request.at_hand->solve(x.values, x.stride, x.count);
+    cost.solves += x.count;
+    for (int pass = 0; pass < 3; ++pass) {
+      normalise(operators, x, work);
+      operators.mass.multiply(x, work);
+      std::vector<double> products(static_cast<std::size_t>(all.count) * bad.size());
+      multiply_transposed(all, work, products.data(), all.count);
+      MPI_Allreduce(MPI_IN_PLACE, products.data(), static_cast<int>(products.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
+      for (std::size_t c = 0; c < bad.size(); ++c) {
+        for (const std::size_t j : bad) products[c * static_cast<std::size_t>(all.count) + j] = 0;
+      }
+      overlap = 0;
+      for (const double product : products) overlap = std::max(overlap, std::abs(product));
+      if (pass < 2) subtract_product(all, products.data(), all.count, x);
+    }
+    ritz = calc_ritz(operators, x, work);
+  }
+  const ModeErrors mended = normalise_and_measure(operators, ritz, polished);
+  double before = 0, after = 0;
+  for (std::size_t j = 0; j < bad.size(); ++j) {
+    before = std::max(before, errors.residual[bad[j]] / std::max(request.tolerance, errors.floor[bad[j]]));
+    after = std::max(after, mended.residual[j] / std::max(request.tolerance, mended.floor[j]));
+  }
+  if (!(after < before) || std::max(overlap, mended.orthonormality) > kOrthonormal) return;
+  const LocalColumns own(polished);
+  for (std::size_t j = 0; j < bad.size(); ++j) {
+    std::copy_n(own.column(static_cast<PetscInt>(j)), own.rows, all.column(static_cast<int>(bad[j])));
+    lambda[bad[j]] = ritz[j];
+    errors.residual[bad[j]] = mended.residual[j];
+    errors.floor[bad[j]] = mended.floor[j];
+  }
+  errors.orthonormality = std::max({errors.orthonormality, overlap, mended.orthonormality});
+}
+
 // Gram-Schmidt must go upwards in lambda, and refined values may have passed their neighbours.
 ModeErrors measure_orthonormal(const RefineRequest& request, std::vector<double>& lambda, Mat shapes) {
   ModeErrors errors = normalise_and_measure(*request.operators, lambda, shapes);
@@ -139,6 +196,15 @@ bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance) {
 RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
   RefineCost cost;
   errors = measure_orthonormal(request, lambda, shapes);
+  constexpr std::size_t kFew = 32;
+  Group above;
+  for (std::size_t j = 0; j < lambda.size(); ++j) {
+    if (errors.residual[j] > request.tolerance) above.push_back(j);
+  }
+  if (request.at_hand != nullptr && !above.empty() && above.size() <= kFew) {
+    polish(request, above, lambda, shapes, errors, cost);
+    sort_modes(lambda, shapes, errors);
+  }
   for (std::size_t pass = 0; pass < kSpread.size(); ++pass) {
     std::vector<std::size_t> bad;
     for (std::size_t j = 0; j < lambda.size(); ++j) {

@@ -15,6 +15,7 @@ namespace carillon::eigen {
 struct RefineRequest {
   const Operators* operators = nullptr;
   double tolerance = 1e-8;                     // of the relative residual
+  ShiftedFactor* at_hand = nullptr;            // a factor that stands, of any shift in or near the band: tried first; may be null
   std::function<ShiftedFactor&()> get_factor;  // L D L^T of any shift; asked for only when a mode needs it
 };
 

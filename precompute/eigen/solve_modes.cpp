@@ -403,6 +403,7 @@ void BandSolver::refine(ModeErrors& errors) {
   RefineRequest request;
   request.operators = operators_.get();
   request.tolerance = options_.tolerance;
+  if (counter_ != nullptr) request.at_hand = counter_->find_standing();
   request.get_factor = [&]() -> ShiftedFactor& {
     if (counter_ == nullptr) make_counter();
     return counter_->get_factor();
