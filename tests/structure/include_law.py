@@ -25,7 +25,6 @@ LIBRARIES = {
     "mumps": ["dmumps_c.h"],
     "cholmod": ["cholmod.h", "suitesparse/"],
     "cgal": ["CGAL/", "boost/"],
-    "openvdb": ["openvdb/", "tbb/"],
     "xml": ["pugixml.hpp"],
     "zlib": ["zlib.h"],
 }
@@ -33,27 +32,26 @@ LIBRARIES = {
 LAW = {
     "runtime/config": ([], ["json", "fmt"]),
     "runtime/bank": (["runtime/config"], ["json", "fmt", "hdf5", "openssl", "cli"]),
-    "runtime/synth": (["runtime/config", "runtime/bank"], ["fmt", "eigen"]),
-    "runtime/contact": (["runtime/config", "runtime/bank"], ["fmt", "eigen", "simbody"]),
-    "runtime/host": (["runtime/config", "runtime/bank", "runtime/synth", "runtime/contact"], ["fmt", "json", "cli", "eigen", "sndfile", "cairo"]),
+    "runtime/synth": (["runtime/config", "runtime/bank"], []),
+    "runtime/contact": (["runtime/config", "runtime/bank"], ["fmt", "simbody"]),
+    "runtime/host": (["runtime/config", "runtime/bank", "runtime/synth", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
-    "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "json", "cli", "eigen", "cgal", "openvdb"]),
+    "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),
     "precompute/petsc": (["runtime/config"], ["fmt", "mpi", "petsc"]),
-    "precompute/fem": (["runtime/config", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc"], ["fmt", "mpi", "petsc", "eigen"]),
+    "precompute/fem": (["runtime/config", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc"], ["fmt", "mpi", "petsc"]),
     "precompute/estimate": (["runtime/config", "jobs/spec", "precompute/mesh", "precompute/petsc", "precompute/fem"], ["fmt", "mpi", "petsc", "eigen"]),
     "precompute/slabs": (["runtime/config", "precompute/mesh", "precompute/petsc", "precompute/fem"], ["fmt", "mpi", "hdf5", "eigen"]),
     "precompute/ldlt": (["runtime/config", "partition", "precompute/petsc"], ["fmt", "mpi", "petsc"]),
-    "precompute/eigen": (["runtime/config", "partition", "precompute/petsc", "precompute/ldlt"], ["fmt", "mpi", "petsc", "mumps", "cholmod", "eigen"]),
+    "precompute/eigen": (["runtime/config", "precompute/petsc", "precompute/ldlt"], ["fmt", "mpi", "petsc", "mumps", "eigen"]),
     "precompute/io": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/shapes", "precompute/petsc", "precompute/fem", "precompute/slabs", "precompute/estimate", "precompute/eigen"],
                       ["fmt", "json", "mpi", "petsc", "hdf5"]),
-    "precompute": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/petsc", "precompute/fem", "precompute/estimate", "precompute/eigen", "precompute/io"],
-                   ["fmt", "cli", "mpi"]),
+    "precompute": (["runtime/config", "precompute/petsc", "precompute/io"], ["fmt", "cli", "mpi"]),
 }
 # Finer than folders: the only files that may include these.
-ONLY_IN = {"hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/io/[a-z0-9_]+\.cpp|precompute/slabs/layout\.cpp)$"), "simbody": re.compile(r"^runtime/contact/[a-z0-9_]+\.(cpp|hpp)$"),
+ONLY_IN = {"hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/io/run_record\.cpp|precompute/slabs/layout\.cpp)$"), "simbody": re.compile(r"^runtime/contact/[a-z0-9_]+\.(cpp|hpp)$"),
            "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
