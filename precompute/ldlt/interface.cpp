@@ -3,17 +3,17 @@
 //             the pairs of ranks before have covered are left out. (The nodes of one side alone, a simpler cover, are up to twice as many.)
 //             So interior nodes of different ranks are never neighbours, and each rank eliminates its own without a message. Interface
 //             nodes that touch the same ranks form a group; eliminating an interior makes a clique of its boundary, so groups are ordered
-//             by minimum weighted degree in the graph where groups near a common rank are neighbours. Wide supernodes of the interface
-//             are cut into chains, and each link goes to that of the ranks below it in the tree which keeps the fewest entries.
+//             by approximate minimum degree, weighted by their nodes, in a graph where those near a common rank are a clique. Wide
+//             supernodes of the interface are cut into chains, and each link goes to that of the ranks below it in the tree which keeps the
+//             fewest entries.
 // Source:     Koenig 1931 (cover from matching); Pothen, Simon, Liou 1990, Partitioning sparse matrices with eigenvectors of graphs (vertex
-//             from edge separators). Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear equations. George
-//             and Liu 1989, The evolution of the minimum degree ordering algorithm. Geist and Ng 1989, Task scheduling for parallel sparse
-//             Cholesky factorization (subtree to rank).
+//             from edge separators). Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear equations. Geist
+//             and Ng 1989, Task scheduling for parallel sparse Cholesky factorization (subtree to rank).
+//             Amestoy, Davis, Duff 1996, An approximate minimum degree ordering algorithm.
 // Deviations: the interface is planned on every rank, in memory that grows with the whole interface (not with the whole graph).
 #include "precompute/ldlt/interface.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
@@ -101,14 +101,15 @@ void cover_edges(const Bipartite& graph, std::set<std::int32_t>& cover) {
 }
 
 /// Interface nodes near the same ranks.
-struct GroupGraph {
-  Ints group_of;                     // by index
-  std::vector<std::int64_t> weight;  // nodes
-  std::vector<std::set<std::int32_t>> links;
+struct Groups {
+  Ints group_of;              // by index
+  Ints weight;                // nodes
+  std::vector<Ints> links;    // by group, besides those near a common rank
+  std::vector<Ints> cliques;  // groups near a rank
 };
 
-GroupGraph make_groups(const Interface& interface) {
-  GroupGraph groups;
+Groups make_groups(const Interface& interface) {
+  Groups groups;
   std::map<Ints, std::int32_t> known;
   std::map<std::int32_t, Ints> near;  // groups by rank
   for (std::int32_t i = 0; i < interface.count(); ++i) {
@@ -121,46 +122,115 @@ GroupGraph make_groups(const Interface& interface) {
     ++groups.weight[at->second];
     groups.group_of.push_back(at->second);
   }
+  for (auto& [rank, members] : near) groups.cliques.push_back(std::move(members));
   groups.links.resize(groups.weight.size());
-  const auto link = [&](std::int32_t a, std::int32_t b) {
-    if (a != b) groups.links[a].insert(b);
-  };
-  for (const auto& [rank, members] : near)
-    for (const std::int32_t a : members)
-      for (const std::int32_t b : members) link(a, b);
   for (std::int32_t i = 0; i < interface.count(); ++i)
     for (const std::int32_t* j = interface.links.begin(i); j != interface.links.end(i); ++j) {
-      link(groups.group_of[i], groups.group_of[*j]);
-      link(groups.group_of[*j], groups.group_of[i]);
+      const std::int32_t a = groups.group_of[i];
+      const std::int32_t b = groups.group_of[*j];
+      if (a == b) continue;
+      groups.links[a].push_back(b);
+      groups.links[b].push_back(a);
     }
+  for (Ints& list : groups.links) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  }
   return groups;
 }
 
-/// Groups in the order of elimination.
-Ints order_groups(GroupGraph& groups) {
-  Ints order;
-  std::vector<bool> is_gone(groups.weight.size(), false);
-  while (order.size() < groups.weight.size()) {
-    std::int32_t best = -1;
-    std::int64_t best_degree = std::numeric_limits<std::int64_t>::max();
-    for (std::size_t g = 0; g < is_gone.size(); ++g) {
-      if (is_gone[g]) continue;
-      std::int64_t degree = groups.weight[g];
-      for (const std::int32_t h : groups.links[g]) degree += groups.weight[h];
-      if (degree >= best_degree) continue;
-      best_degree = degree;
-      best = static_cast<std::int32_t>(g);
+/// Approximate minimum degree on the quotient graph: who lies in a common clique are neighbours, and eliminating a group merges its cliques
+/// into one.
+class GroupOrder {
+ public:
+  explicit GroupOrder(const Groups& groups)
+      : weight_(groups.weight), links_(groups.links), cliques_(groups.cliques), cliques_of_(weight_.size()), mark_(weight_.size(), -1) {
+    for (std::size_t c = 0; c < cliques_.size(); ++c) {
+      for (const std::int32_t g : cliques_[c]) cliques_of_[g].push_back(static_cast<std::int32_t>(c));
+      clique_weight_.push_back(add_weights(cliques_[c]));
     }
-    is_gone[best] = true;
-    order.push_back(best);
-    for (const std::int32_t a : groups.links[best]) {
-      groups.links[a].erase(best);
-      for (const std::int32_t b : groups.links[best])
-        if (a != b) groups.links[a].insert(b);
+    outside_.resize(cliques_.size());
+    seen_.assign(cliques_.size(), -1);
+    for (std::int32_t g = 0; g < static_cast<std::int32_t>(weight_.size()); ++g) {
+      degree_.push_back(weight_[g] + add_weights(find_neighbours(g, g)));
+      queue_.emplace(degree_[g], g);
     }
+    mark_.assign(weight_.size(), -1);
   }
-  return order;
-}
+
+  Ints find() {
+    Ints order;
+    while (!queue_.empty()) {
+      order.push_back(queue_.begin()->second);
+      queue_.erase(queue_.begin());
+      eliminate(order.back(), static_cast<std::int32_t>(order.size()));
+    }
+    return order;
+  }
+
+ private:
+  std::int64_t add_weights(const Ints& groups) const {
+    std::int64_t sum = 0;
+    for (const std::int32_t g : groups) sum += weight_[g];
+    return sum;
+  }
+
+  Ints find_neighbours(std::int32_t group, std::int32_t stamp) {
+    Ints found;
+    const auto add = [&](const Ints& list) {
+      for (const std::int32_t g : list) {
+        if (g == group || mark_[g] == stamp) continue;
+        mark_[g] = stamp;
+        found.push_back(g);
+      }
+    };
+    add(links_[group]);
+    for (const std::int32_t c : cliques_of_[group]) add(cliques_[c]);
+    return found;
+  }
+
+  void eliminate(std::int32_t group, std::int32_t stamp) {
+    Ints members = find_neighbours(group, stamp);
+    const auto clique = static_cast<std::int32_t>(cliques_.size());
+    for (const std::int32_t c : cliques_of_[group]) {
+      cliques_[c].clear();
+      clique_weight_[c] = 0;
+    }
+    const std::int64_t weight = add_weights(members);
+    // What the other cliques have outside the new one.
+    for (const std::int32_t g : members)
+      for (const std::int32_t c : cliques_of_[g]) {
+        if (seen_[c] != stamp) outside_[c] = clique_weight_[c];
+        seen_[c] = stamp;
+        outside_[c] -= weight_[g];
+      }
+    for (const std::int32_t g : members) {
+      std::erase_if(cliques_of_[g], [&](std::int32_t c) { return outside_[c] <= 0; });
+      std::erase_if(links_[g], [&](std::int32_t h) { return h == group || mark_[h] == stamp; });
+      std::int64_t degree = weight + add_weights(links_[g]);
+      for (const std::int32_t c : cliques_of_[g]) degree += outside_[c];
+      cliques_of_[g].push_back(clique);
+      queue_.erase({degree_[g], g});
+      degree_[g] = degree;
+      queue_.emplace(degree, g);
+    }
+    cliques_.push_back(std::move(members));
+    clique_weight_.push_back(weight);
+    outside_.push_back(0);
+    seen_.push_back(-1);
+  }
+
+  const Ints& weight_;
+  std::vector<Ints> links_;
+  std::vector<Ints> cliques_;
+  std::vector<Ints> cliques_of_;  // by group
+  Ints mark_;                     // by group
+  Ints seen_;                     // by clique
+  std::vector<std::int64_t> clique_weight_;
+  std::vector<std::int64_t> outside_;
+  std::vector<std::int64_t> degree_;
+  std::set<std::pair<std::int64_t, std::int32_t>> queue_;
+};
 
 /// The interface in elimination order behind its hubs.
 Graph make_graph(const Interface& interface) {
@@ -278,8 +348,8 @@ std::int32_t Interface::find(std::int32_t global_node) const {
 }
 
 void order_interface(Interface& interface) {
-  GroupGraph groups = make_groups(interface);
-  const Ints order = order_groups(groups);
+  const Groups groups = make_groups(interface);
+  const Ints order = GroupOrder(groups).find();
   Ints rank_of_group(order.size());
   for (std::size_t k = 0; k < order.size(); ++k) rank_of_group[order[k]] = static_cast<std::int32_t>(k);
   interface.index.resize(interface.nodes.size());

@@ -51,8 +51,8 @@ struct Interface {
 /// nodes and first_of_rank. Collective.
 void find_separator(MPI_Comm comm, const Lists& edges, const Ints& rank_starts, Interface& interface);
 
-/// A first elimination order: nodes between the same ranks stay together, such groups go by minimum degree. Fills position and index.
-/// Local, and the same on every rank.
+/// A first elimination order: nodes between the same ranks stay together, such groups go by approximate minimum degree. Fills position and
+/// index. Local, and the same on every rank.
 void order_interface(Interface& interface);
 
 /// Eliminates the interface on paper: supernodes (which refines the order) and their ranks. hubs hold first positions; entries: what each

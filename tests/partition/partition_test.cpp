@@ -2,10 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <csignal>
 #include <numeric>
 #include <random>
 #include <set>
+#include <thread>
 
 #include "tests/support/box_mesh.hpp"
 
@@ -139,6 +143,23 @@ TEST(NestedDissection, is_a_permutation_with_far_less_fill_than_a_random_order) 
   std::shuffle(random.begin(), random.end(), std::mt19937(7));
   EXPECT_LT(2 * count_factor_entries(graph, position), count_factor_entries(graph, random));
   EXPECT_LT(count_factor_entries(graph, position), count_factor_entries(graph, natural));
+}
+
+TEST(NestedDissection, that_is_stopped_from_outside_ends_as_the_program_wants_it) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto box = tests::make_box({28, 28, 28}, {1, 1, 1});
+  const Graph graph = make_node_graph(box.tets, 4, static_cast<std::int32_t>(box.nodes.size()));
+  EXPECT_EXIT(
+      {
+        std::signal(SIGTERM, [](int) { _exit(42); });
+        std::thread killer([] {
+          std::this_thread::sleep_for(std::chrono::milliseconds(60));
+          kill(getpid(), SIGTERM);
+        });
+        killer.detach();
+        for (int repeat = 0; repeat < 100; ++repeat) (void)order_nested_dissection(graph);
+      },
+      testing::ExitedWithCode(42), "");
 }
 
 TEST(NestedDissection, of_a_graph_without_edges_is_the_identity) {

@@ -74,9 +74,7 @@ def interrupt(folder, job, ranks, station, delay_s, number, at_rank):
     name = f"{signal.Signals(number).name} to {'mpirun' if at_rank is None else f'rank {at_rank}'} in \"{station}\""
     assert run.returncode != 0, f"{name}: the run ended as if nothing had happened:\n{text}"
     if at_rank is not None:
-        # METIS catches SIGTERM by itself and comes back with an error, which ends the run as any other.
-        is_metis = run.returncode == 4 and text.count("carillon-precompute: error: METIS failed") == 1
-        assert run.returncode == 128 + number or is_metis, f"{name}: exit code {run.returncode}:\n{text}"
+        assert run.returncode == 128 + number, f"{name}: exit code {run.returncode}:\n{text}"
     for _ in range(100):
         if not any(map(is_running, processes)):
             break
