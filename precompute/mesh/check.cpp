@@ -235,17 +235,8 @@ void find_components(const TetMesh& mesh, CheckReport& report) {
 }
 
 void collect_warnings(CheckReport& report) {
+  warn_of_size_and_slivers(report);
   const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
-  const double diagonal =
-      std::hypot(report.box_high[0] - report.box_low[0], report.box_high[1] - report.box_low[1], report.box_high[2] - report.box_low[2]);
-  if (diagonal > 50.0) add(fmt::format("the body measures {:.4g} m across: were millimetres given as metres?", diagonal));
-  if (diagonal < 1e-3) add(fmt::format("the body measures only {:.3g} m across: coordinates are taken as metres", diagonal));
-  if (report.slivers > 0)
-    add(
-        fmt::format("{} slivers (a dihedral angle under 5 or over 175 degrees; the worst {:.2f} and {:.2f}): frequencies near them are too "
-                    "high, and the "
-                    "solver may lose digits",
-                    report.slivers, report.min_dihedral_deg, report.max_dihedral_deg));
   if (report.welded > 0) add(fmt::format("{} repeated nodes were joined with their twins, closing cracks in the mesh", report.welded));
   if (report.touching_nodes > 0)
     add(fmt::format(
@@ -259,6 +250,19 @@ void collect_warnings(CheckReport& report) {
 }
 
 }  // namespace
+
+void warn_of_size_and_slivers(CheckReport& report) {
+  const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
+  const double diagonal =
+      std::hypot(report.box_high[0] - report.box_low[0], report.box_high[1] - report.box_low[1], report.box_high[2] - report.box_low[2]);
+  if (diagonal > 50.0) add(fmt::format("the body measures {:.4g} m across: were millimetres given as metres?", diagonal));
+  if (diagonal < 1e-3) add(fmt::format("the body measures only {:.3g} m across: coordinates are taken as metres", diagonal));
+  if (report.slivers > 0)
+    add(
+        fmt::format("{} slivers (a dihedral angle under 5 or over 175 degrees; the worst {:.2f} and {:.2f}): frequencies near them are too "
+                    "high, and the solver may lose digits",
+                    report.slivers, report.min_dihedral_deg, report.max_dihedral_deg));
+}
 
 std::string list_elements(const std::vector<std::int64_t>& elements) {
   constexpr std::size_t kShown = 10;

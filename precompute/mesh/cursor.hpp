@@ -28,7 +28,6 @@ class Cursor {
   }
   void set_comment(char mark) { comment_ = mark; }
 
-  bool is_binary() const { return binary_; }
   std::size_t place() const { return at_; }
   std::size_t remaining() const { return bytes_.size() - at_; }
   const std::string& name() const { return name_; }

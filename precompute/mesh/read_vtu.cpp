@@ -11,6 +11,7 @@
 #include <pugixml.hpp>
 
 #include "precompute/mesh/assemble.hpp"
+#include "precompute/mesh/read.hpp"
 #include "precompute/mesh/vtu_data.hpp"
 
 namespace carillon::mesh {
@@ -183,10 +184,7 @@ std::vector<std::int64_t> VtuReader::read_regions(const Piece& piece) {
   for (const pugi::xml_node& array : piece.node.child("CellData").children("DataArray")) {
     if (!is_integer(array.attribute("type").as_string()) || array.attribute("NumberOfComponents").as_int(1) != 1) continue;
     arrays.push_back(array);
-    std::string name = array.attribute("Name").as_string();
-    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
-    for (const char* word : {"region", "material", "physical", "ref", "entity", "domain", "zone", "block", "marker"})
-      if (!chosen && name.find(word) != std::string::npos) chosen = array;
+    if (!chosen && is_region_name(array.attribute("Name").as_string())) chosen = array;
   }
   if (!chosen && arrays.size() == 1) chosen = arrays[0];
   return chosen ? read_array<std::int64_t>(chosen, piece.cells) : std::vector<std::int64_t>(piece.cells, 0);
@@ -285,6 +283,12 @@ TetMesh VtuReader::read() {
 }
 
 }  // namespace
+
+bool is_region_name(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  constexpr std::array kWords{"region", "material", "physical", "ref", "entity", "domain", "zone", "block", "marker"};
+  return std::any_of(kWords.begin(), kWords.end(), [&](const char* word) { return name.find(word) != std::string::npos; });
+}
 
 TetMesh parse_vtu(std::string_view bytes, const std::string& name) { return VtuReader(bytes, name).read(); }
 

@@ -171,14 +171,6 @@ std::int64_t get_peak_memory_bytes() {
   return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes.
 }
 
-PeakMemory find_peak_memory(MPI_Comm comm) {
-  const std::int64_t mine = get_peak_memory_bytes();
-  PeakMemory peak;
-  MPI_Allreduce(&mine, &peak.sum_bytes, 1, MPI_INT64_T, MPI_SUM, comm);
-  MPI_Allreduce(&mine, &peak.max_bytes, 1, MPI_INT64_T, MPI_MAX, comm);
-  return peak;
-}
-
 std::string petsc_version() { return fmt::format("PETSc {}.{}.{}", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR); }
 
 std::string slepc_version() { return fmt::format("SLEPc {}.{}.{}", SLEPC_VERSION_MAJOR, SLEPC_VERSION_MINOR, SLEPC_VERSION_SUBMINOR); }

@@ -68,12 +68,6 @@ PetscInt to_petsc_int(std::int64_t value);
 
 /// Highest resident memory of this process so far [byte]. Local.
 std::int64_t get_peak_memory_bytes();
-/// Its sum and its maximum over the ranks [byte]. Collective.
-struct PeakMemory {
-  std::int64_t sum_bytes = 0;
-  std::int64_t max_bytes = 0;
-};
-PeakMemory find_peak_memory(MPI_Comm comm);
 
 /// The BLAS behind dgemm in this process: "OpenBLAS 0.3.21 ... (/usr/lib/...)", "reference BLAS (/usr/lib/...)". Local.
 std::string blas_name();

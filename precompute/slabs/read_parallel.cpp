@@ -93,22 +93,11 @@ void find_quality(MPI_Comm comm, const fem::LocalMesh& local, mesh::CheckReport&
 }
 
 void collect_warnings(mesh::CheckReport& report) {
-  const double diagonal =
-      std::hypot(report.box_high[0] - report.box_low[0], report.box_high[1] - report.box_low[1], report.box_high[2] - report.box_low[2]);
-  const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
-  if (diagonal > 50.0) add(fmt::format("the body measures {:.4g} m across: were millimetres given as metres?", diagonal));
-  if (diagonal < 1e-3) add(fmt::format("the body measures only {:.3g} m across: coordinates are taken as metres", diagonal));
-  if (report.slivers > 0)
-    add(
-        fmt::format("{} slivers (a dihedral angle under 5 or over 175 degrees; the worst {:.2f} and {:.2f}): frequencies near them are too "
-                    "high, and the solver "
-                    "may lose digits",
-                    report.slivers, report.min_dihedral_deg, report.max_dihedral_deg));
+  mesh::warn_of_size_and_slivers(report);
   if (report.touching_nodes > 0)
-    add(
+    report.warnings.push_back(
         fmt::format("{} nodes of the boundary lie in the place of another: cracks are not closed in meshes that are read in parallel, so "
-                    "the body may be in more "
-                    "parts than it seems ({} here)",
+                    "the body may be in more parts than it seems ({} here)",
                     report.touching_nodes, report.components));
 }
 

@@ -16,6 +16,7 @@
 #include <cstring>
 #include <limits>
 
+#include "precompute/mesh/read.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/error.hpp"
 
@@ -186,12 +187,8 @@ void read_elements(MPI_Comm comm, const Source& source, const std::string& name,
 }
 
 const Array* find_region_array(const Layout& layout) {
-  for (const Array& array : layout.cell_data) {
-    std::string name = array.name;
-    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
-    for (const char* word : {"region", "material", "physical", "ref", "entity", "domain", "zone", "block", "marker"})
-      if (name.find(word) != std::string::npos) return &array;
-  }
+  for (const Array& array : layout.cell_data)
+    if (mesh::is_region_name(array.name)) return &array;
   return layout.cell_data.size() == 1 ? &layout.cell_data.front() : nullptr;
 }
 

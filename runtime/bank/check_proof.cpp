@@ -245,12 +245,12 @@ std::string describe_completeness(const Bank& bank) {
 }
 
 std::string describe_accuracy(const Bank& bank) {
-  const auto find_worst = [](const std::vector<double>& cents) { return *std::max_element(cents.begin(), cents.end()); };
-  const auto tell = [&](const std::vector<double>& cents, const char* known, const char* unknown) {
-    return cents.empty() ? std::string(unknown) : fmt::format("{} {:.2g} cent", known, find_worst(cents));
+  const auto tell = [](const std::vector<double>& cents, const char* known, const char* kind, const char* unknown) {
+    return cents.empty() ? std::string(unknown)
+                         : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
-  return tell(bank.algebraic_error_cents, "frequencies are those of the mesh to", "no bounds against the mesh") +
-         tell(bank.discretisation_error_cents, " (a bound) and those of the body to about", ", no estimates against the body");
+  return tell(bank.algebraic_error_cents, "frequencies are those of the mesh to", "a bound", "no bounds against the mesh") +
+         tell(bank.discretisation_error_cents, " and those of the body to about", "an estimate", ", no estimates against the body");
 }
 
 }  // namespace carillon::bank

@@ -29,7 +29,7 @@ class Faults {
   std::size_t count_ = 0;
 };
 
-/// Error bars: not negative, and as wide as the residuals ask for at least.
+/// Error bars: none is negative.
 Check check_error_bars(const Bank& bank);
 
 /// The proof that the band is complete, one check for each of its parts; a bank without one gets a single line that says so, and no fault.

@@ -340,8 +340,6 @@ std::filesystem::path Object::path(std::string_view key) {
   return std::filesystem::absolute(named.is_absolute() ? named : data_->file.parent_path() / named).lexically_normal();
 }
 
-std::optional<std::filesystem::path> Object::path_if(std::string_view key) { return has(key) ? std::optional(path(key)) : std::nullopt; }
-
 void Object::ignore(std::string_view key) { has(key); }
 
 std::vector<std::string> Object::keys() const {

@@ -82,7 +82,6 @@ class Object {
 
   /// A file named by `key`, made absolute: relative paths start at the document's folder. The file need not exist.
   std::filesystem::path path(std::string_view key);
-  std::optional<std::filesystem::path> path_if(std::string_view key);
 
   /// Marks `key` as known and skips whatever it holds (recorded facts that are not input).
   void ignore(std::string_view key);

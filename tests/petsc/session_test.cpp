@@ -115,15 +115,12 @@ TEST(ToPetscInt, refuses_what_does_not_fit) {
   }
 }
 
-TEST(PeakMemory, grows_with_what_is_touched_and_sums_over_ranks) {
+TEST(PeakMemory, grows_with_what_is_touched) {
   const std::int64_t before = get_peak_memory_bytes();
   constexpr std::size_t kBytes = 64u << 20;
   std::vector<char> block(kBytes);
   for (std::size_t i = 0; i < kBytes; i += 512) block[i] = static_cast<char>(i);
   EXPECT_GE(get_peak_memory_bytes(), std::max<std::int64_t>(before, kBytes));
-  const PeakMemory peak = find_peak_memory(MPI_COMM_WORLD);
-  EXPECT_GE(peak.sum_bytes, find_size() * static_cast<std::int64_t>(kBytes));
-  EXPECT_LE(peak.max_bytes, peak.sum_bytes);
 }
 
 TEST(Blas, has_a_name_that_agrees_with_its_verdict) {
