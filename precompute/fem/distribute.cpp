@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "partition/partition.hpp"
+#include "precompute/mesh/faces.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::fem {
@@ -35,24 +36,23 @@ struct Piece {
   std::vector<double> positions;
 };
 
+/// Components in the order of their first nodes; -1: no element uses the node.
 std::vector<std::int32_t> find_components(const mesh::TetMesh& mesh, std::int32_t& count) {
-  std::vector<std::int32_t> parent(mesh.nodes.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](std::int32_t v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
+  mesh::Parts parts(mesh.nodes.size());
   std::vector<bool> used(mesh.nodes.size(), false);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (const std::int32_t node : mesh.tet(e)) {
       used[node] = true;
-      const std::int32_t a = root(mesh.tet(e)[0]), b = root(node);
-      parent[std::max(a, b)] = std::min(a, b);
+      parts.join(mesh.tet(e)[0], node);
     }
-  std::vector<std::int32_t> component(mesh.nodes.size(), -1);
+  std::vector<std::int32_t> component(mesh.nodes.size(), -1), of_part(mesh.nodes.size(), -1);
   count = 0;
-  for (std::size_t v = 0; v < component.size(); ++v)
-    if (used[v]) component[v] = root(v) == static_cast<std::int32_t>(v) ? count++ : component[root(v)];
+  for (std::size_t v = 0; v < component.size(); ++v) {
+    if (!used[v]) continue;
+    std::int32_t& part = of_part[parts.find(static_cast<std::int32_t>(v))];
+    if (part < 0) part = count++;
+    component[v] = part;
+  }
   return component;
 }
 
