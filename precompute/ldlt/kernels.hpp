@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 namespace carillon::ldlt {
 
@@ -48,7 +49,10 @@ struct Kernels {
   const char* name;
 };
 
-/// The fastest that this processor runs.
+/// Those that this processor runs, the fastest first.
+std::vector<const Kernels*> list_kernels();
+/// The fastest of them, unless set_kernels has chosen another (for tests; before any factorisation, on all ranks alike).
 const Kernels& get_kernels();
+void set_kernels(const Kernels* kernels);
 
 }  // namespace carillon::ldlt

@@ -5,12 +5,14 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <random>
 #include <string>
 
+#include "precompute/ldlt/kernels.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 #include "tests/ldlt/pencil.hpp"
@@ -259,6 +261,57 @@ TEST(factor, names_the_need_when_one_rank_runs_out_of_memory) {
   for (void* piece : hoard) std::free(piece);
   EXPECT_NE(message.find(" GB"), std::string::npos) << "rank " << rank << ": '" << message << "'";
   EXPECT_TRUE(factor.factorise(1.0));  // and with memory it goes on
+}
+
+TEST(factor, counts_and_solves_alike_with_every_instruction_set_of_this_processor) {
+  Pencil pencil = make_lattice(13, 7, 5, 1, MassKind::kConsistent, 14);
+  const Eigen::VectorXd lambda = calc_eigenvalues(pencil);
+  EXPECT_GE(list_kernels().size(), 1U);
+  for (const Kernels* kernels : list_kernels()) {
+    set_kernels(kernels);
+    Factor factor(pencil.k, pencil.m);
+    for (const double sigma : pick_shifts(lambda, 4)) {
+      ASSERT_TRUE(factor.factorise(sigma)) << kernels->name << " " << sigma;
+      EXPECT_EQ(factor.get_negative_pivots(), count_below(lambda, sigma)) << kernels->name;
+      for (const int columns : {1, 8, 13, 32}) EXPECT_LT(solve_and_measure(factor, pencil, sigma, columns), 1e-12) << kernels->name;
+    }
+  }
+  set_kernels(nullptr);
+}
+
+TEST(kernels, of_every_instruction_set_multiply_tiles_as_the_definition_says) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> value;
+  for (const Kernels* kernels : list_kernels())
+    for (const int m : {3, 6, 9, 12, 15, 39})
+      for (const int n : {3, 21, 72})
+        for (const int vectors : {1, 2}) {
+          const int width = 8 * vectors;
+          Eigen::MatrixXd a(m, n), x(n, width), y(m, width);
+          for (Eigen::MatrixXd* matrix : {&a, &x, &y})
+            for (double& entry : matrix->reshaped()) entry = value(random);
+          std::vector<double> tiles;
+          for (int i = 0; i < m; i += kTileRows)
+            for (int k = 0; k < n; ++k)
+              for (int r = i; r < std::min(m, i + kTileRows); ++r) tiles.push_back(a(r, k));
+          tiles.resize(tiles.size() + 2048);  // memory is called ahead
+          alignas(64) double in[72 * 16], out[72 * 16];
+          const auto check = [&](const auto& product, const Eigen::MatrixXd& from, const Eigen::MatrixXd& to,
+                                 const Eigen::MatrixXd& expected) {
+            for (int i = 0; i < from.rows(); ++i)
+              for (int c = 0; c < width; ++c) in[i * width + c] = from(i, c);
+            for (int i = 0; i < to.rows(); ++i)
+              for (int c = 0; c < width; ++c) out[i * width + c] = to(i, c);
+            product(tiles.data(), m, n, vectors, in, out);
+            for (int i = 0; i < to.rows(); ++i)
+              for (int c = 0; c < width; ++c)
+                ASSERT_NEAR(out[i * width + c], expected(i, c), 1e-12) << kernels->name << " " << m << " " << n;
+          };
+          check(kernels->set_product, x, y, a * x);
+          check(kernels->subtract_product, x, y, y - a * x);
+          check(kernels->add_transposed, y, x, x + a.transpose() * y);
+          check(kernels->subtract_transposed, y, x, x - a.transpose() * y);
+        }
 }
 
 TEST(factor, refuses_rows_that_are_not_whole_nodes) {
