@@ -10,6 +10,7 @@
 
 #include "precompute/fem/energy.hpp"
 #include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
 
 namespace carillon::io {
 namespace {
@@ -85,6 +86,14 @@ eigen::Method find_method(spec::Method wanted) {
   }
 }
 
+/// LAPACK takes all eigenvalues of what eigen solves densely by itself; more unknowns would go to another method than the one asked for.
+void check_method(const Run& run, std::int64_t unknowns) {
+  constexpr std::int64_t kDenseUnknowns = 300;
+  if (run.job.method != spec::Method::dense || unknowns <= kDenseUnknowns) return;
+  throw InputError(fmt::format("{}: \"solver.method\": \"dense\" solves up to {} unknowns, and the body has {}; take \"automatic\"",
+                               run.job.file.string(), kDenseUnknowns, unknowns));
+}
+
 eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, eigen::NodeLayout layout) {
   eigen::Options options;
   options.low_hz = run.job.band_hz[0];
@@ -126,6 +135,7 @@ void warn_of_oddities(Run& run, const eigen::Modes& modes) {
 
 SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   SolvedBody solved;
+  check_method(run, 3 * body.pieces.free_nodes);
   const bool is_linear = setting.element == spec::Element::T4;
   run.stations.begin("assemble", fmt::format("{} unknowns, {}, {} mass", 3 * body.pieces.free_nodes, spec::to_text(setting.element),
                                              spec::to_text(run.job.mass)));

@@ -66,6 +66,13 @@ INSTANTIATE_TEST_SUITE_P(
                 },
                 {"mesh.msh"}},
         BadCase{"more_ranks_than_elements", 7, [](const Folder&) {}, {"mesh.msh: ", "6 tetrahedra", "7 ranks", "at most 6"}},
+        BadCase{"dense_beyond_its_size",
+                2,
+                [](const Folder& f) {
+                  mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {12, 2, 2}), f / "mesh.msh");
+                  f.write_job({}, R"("element": "T4", "solver": {"method": "dense"},)");
+                },
+                {"job.json", "solver.method", "300 unknowns", "351", "automatic"}},
         BadCase{"unknown_node_set",
                 2,
                 [](const Folder& f) { f.write_job({}, R"("fixed": "x-mim",)"); },
