@@ -18,6 +18,8 @@
 #include <numeric>
 #include <set>
 
+#include "precompute/petsc/session.hpp"
+
 namespace carillon::ldlt {
 namespace {
 
@@ -31,7 +33,8 @@ Ints gather_ints(MPI_Comm comm, const Ints& own, std::vector<int>& counts) {
   MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
   std::vector<int> offsets(size, 0);
   std::partial_sum(counts.begin(), counts.end() - 1, offsets.begin() + 1);
-  Ints all(static_cast<std::size_t>(offsets.back()) + static_cast<std::size_t>(counts.back()));
+  Ints all;
+  petsc::run_agreed(comm, [&] { all.resize(static_cast<std::size_t>(offsets.back()) + static_cast<std::size_t>(counts.back())); });
   MPI_Allgatherv(own.data(), mine, MPI_INT32_T, all.data(), counts.data(), offsets.data(), MPI_INT32_T, comm);
   return all;
 }
@@ -98,6 +101,24 @@ void cover_edges(const Bipartite& graph, std::set<std::int32_t>& cover) {
     if (reached_from[r] >= 0) cover.insert(graph.right[r]);
     if (reached_from[r] < 0 && partner_of_right[r] >= 0) cover.insert(graph.left[partner_of_right[r]]);
   }
+}
+
+/// Fills the separator's nodes from the edges between ranks.
+void cover_all(const Lists& all, const Ints& rank_starts, Interface& interface) {
+  std::map<std::pair<int, int>, std::vector<std::pair<std::int32_t, std::int32_t>>> by_ranks;
+  for (std::int32_t i = 0; i < all.count(); ++i)
+    for (const std::int32_t* b = all.begin(i) + 1; b != all.end(i); ++b)
+      by_ranks[{find_rank(rank_starts, *all.begin(i)), find_rank(rank_starts, *b)}].emplace_back(*all.begin(i), *b);
+  std::set<std::int32_t> cover;
+  for (auto& [ranks, pairs] : by_ranks) {
+    std::erase_if(pairs, [&](const auto& edge) { return cover.contains(edge.first) || cover.contains(edge.second); });
+    cover_edges(make_bipartite(pairs), cover);
+  }
+  interface.nodes.assign(cover.begin(), cover.end());
+  interface.first_of_rank.clear();
+  for (const std::int32_t start : rank_starts)
+    interface.first_of_rank.push_back(
+        static_cast<std::int32_t>(std::lower_bound(interface.nodes.begin(), interface.nodes.end(), start) - interface.nodes.begin()));
 }
 
 /// Interface nodes near the same ranks.
@@ -326,20 +347,7 @@ Lists gather_lists(MPI_Comm comm, const Lists& own, Ints& first_of_rank) {
 void find_separator(MPI_Comm comm, const Lists& edges, const Ints& rank_starts, Interface& interface) {
   Ints first_of_rank;
   const Lists all = gather_lists(comm, edges, first_of_rank);
-  std::map<std::pair<int, int>, std::vector<std::pair<std::int32_t, std::int32_t>>> by_ranks;
-  for (std::int32_t i = 0; i < all.count(); ++i)
-    for (const std::int32_t* b = all.begin(i) + 1; b != all.end(i); ++b)
-      by_ranks[{find_rank(rank_starts, *all.begin(i)), find_rank(rank_starts, *b)}].emplace_back(*all.begin(i), *b);
-  std::set<std::int32_t> cover;
-  for (auto& [ranks, pairs] : by_ranks) {
-    std::erase_if(pairs, [&](const auto& edge) { return cover.contains(edge.first) || cover.contains(edge.second); });
-    cover_edges(make_bipartite(pairs), cover);
-  }
-  interface.nodes.assign(cover.begin(), cover.end());
-  interface.first_of_rank.clear();
-  for (const std::int32_t start : rank_starts)
-    interface.first_of_rank.push_back(
-        static_cast<std::int32_t>(std::lower_bound(interface.nodes.begin(), interface.nodes.end(), start) - interface.nodes.begin()));
+  petsc::run_agreed(comm, [&] { cover_all(all, rank_starts, interface); });
 }
 
 std::int32_t Interface::find(std::int32_t global_node) const {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::ldlt {
@@ -95,44 +96,48 @@ NodeLinks find_links(const LocalRows& k, const LocalRows& m) {
 Interface gather_interface(MPI_Comm comm, const NodeLinks& nodes, const Ints& rank_starts, std::vector<bool>& is_interface) {
   const auto global = [&](std::int32_t v) { return v < nodes.own_nodes ? nodes.first_node + v : nodes.ghosts[v - nodes.own_nodes]; };
   Lists edges;
-  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
-    Ints higher;
-    for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
-      if (global(*u) >= nodes.first_node + nodes.own_nodes) higher.push_back(global(*u));
-    if (higher.empty()) continue;
-    edges.items.push_back(global(v));
-    edges.items.insert(edges.items.end(), higher.begin(), higher.end());
-    edges.close();
-  }
+  petsc::run_agreed(comm, [&] {
+    for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+      Ints higher;
+      for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
+        if (global(*u) >= nodes.first_node + nodes.own_nodes) higher.push_back(global(*u));
+      if (higher.empty()) continue;
+      edges.items.push_back(global(v));
+      edges.items.insert(edges.items.end(), higher.begin(), higher.end());
+      edges.close();
+    }
+  });
   Interface interface;
   find_separator(comm, edges, rank_starts, interface);
-  is_interface.assign(static_cast<std::size_t>(nodes.own_nodes) + nodes.ghosts.size(), false);
-  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) is_interface[v] = interface.find(global(v)) >= 0;
-  for (std::size_t g = 0; g < nodes.ghosts.size(); ++g)
-    is_interface[static_cast<std::size_t>(nodes.own_nodes) + g] = interface.find(nodes.ghosts[g]) >= 0;
-
   Lists links;
   Lists near;
-  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
-    if (!is_interface[v]) continue;
-    Ints ranks;
-    for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u) {
-      const std::int32_t node = global(*u);
-      if (is_interface[*u]) {
-        links.items.push_back(interface.find(node));
-      } else {
-        ranks.push_back(find_rank(rank_starts, node));
+  petsc::run_agreed(comm, [&] {
+    is_interface.assign(static_cast<std::size_t>(nodes.own_nodes) + nodes.ghosts.size(), false);
+    for (std::int32_t v = 0; v < nodes.own_nodes; ++v) is_interface[v] = interface.find(global(v)) >= 0;
+    for (std::size_t g = 0; g < nodes.ghosts.size(); ++g)
+      is_interface[static_cast<std::size_t>(nodes.own_nodes) + g] = interface.find(nodes.ghosts[g]) >= 0;
+
+    for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+      if (!is_interface[v]) continue;
+      Ints ranks;
+      for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u) {
+        const std::int32_t node = global(*u);
+        if (is_interface[*u]) {
+          links.items.push_back(interface.find(node));
+        } else {
+          ranks.push_back(find_rank(rank_starts, node));
+        }
       }
+      std::sort(ranks.begin(), ranks.end());
+      ranks.erase(std::unique(ranks.begin(), ranks.end()), ranks.end());
+      near.items.insert(near.items.end(), ranks.begin(), ranks.end());
+      links.close();
+      near.close();
     }
-    std::sort(ranks.begin(), ranks.end());
-    ranks.erase(std::unique(ranks.begin(), ranks.end()), ranks.end());
-    near.items.insert(near.items.end(), ranks.begin(), ranks.end());
-    links.close();
-    near.close();
-  }
+  });
   interface.links = gather_lists(comm, links, interface.first_of_rank);
   interface.near_ranks = gather_lists(comm, near, interface.first_of_rank);
-  order_interface(interface);
+  petsc::run_agreed(comm, [&] { order_interface(interface); });
   return interface;
 }
 

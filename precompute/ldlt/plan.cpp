@@ -41,7 +41,7 @@ void plan_common(MPI_Comm comm, const Interior& interior, Interface& interface) 
                               static_cast<std::int32_t>(rank));
   std::vector<double> kept(first_of_rank.size() - 1);
   MPI_Allgather(&entries, 1, MPI_DOUBLE, kept.data(), 1, MPI_DOUBLE, comm);
-  plan_interface(interface, std::move(kept));
+  petsc::run_agreed(comm, [&] { plan_interface(interface, std::move(kept)); });
 }
 
 /// Makes a rank's own plan of the common one.
