@@ -34,7 +34,7 @@ double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio
   if (lumping > 0.0 && kind == Kind::kT4)
     mesh = enlarge(std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
   else if (lumping > 0.0)  // the estimate of interpolation is two to four times too large for most T10
-    mesh = std::max(enlarge(interpolation - 0.5 * lumping), 1.3 * lumping - 0.25 * interpolation);
+    mesh = std::max(enlarge(interpolation - 0.5 * lumping), 1.75 * lumping - 0.25 * interpolation);
   const double geometry =
       (kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise) * (kind == Kind::kT10Curved ? fourth : second);
   return 600.0 * std::log2(1.0 + mesh + geometry);
