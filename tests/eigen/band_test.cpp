@@ -198,6 +198,38 @@ TEST(SolveModes, stops_at_the_lowest_max_modes) {
   }
 }
 
+TEST(SolveModes, lets_slepc_options_choose_the_eigensolver_and_its_basis) {
+  const test::System system = test::make_system(get_block());
+  const Options options = make_options();
+  const std::vector<double> expected = pick(get_block_eigenvalues(), options.low_hz, options.high_hz);
+  check(PetscOptionsSetValue(nullptr, "-eps_type", "krylovschur"));
+  check(PetscOptionsSetValue(nullptr, "-eps_ncv", "90"));
+  const Modes narrow = solve_modes(system.problem, options);
+  check(PetscOptionsSetValue(nullptr, "-eps_ncv", "200"));
+  check(PetscOptionsSetValue(nullptr, "-eps_mpd", "200"));
+  const Modes wide = solve_modes(system.problem, options);
+  for (const char* name : {"-eps_type", "-eps_ncv", "-eps_mpd"}) check(PetscOptionsClearValue(nullptr, name));
+  expect_eigenvalues(narrow, expected);
+  expect_eigenvalues(wide, expected);
+  EXPECT_NE(narrow.factor.solves, wide.factor.solves) << "the size of the basis went unheeded";
+  EXPECT_NE(narrow.factor.solves % 16, 0) << "blocks of 16 columns: the type went unheeded";
+}
+
+TEST(SolveModes, proves_the_lowest_max_modes_up_to_a_count_above_the_last) {
+  const test::System system = test::make_system(get_block());
+  Options options = make_options();
+  options.max_modes = 20;
+  const Modes modes = solve_modes(system.problem, options);
+  const std::vector<Count>& counts = modes.proof.counts;
+  EXPECT_GT(counts.back().freq_hz, to_hz(modes.lambda.back()));
+  EXPECT_LE(counts.front().freq_hz, options.low_hz);
+  EXPECT_GE(counts.back().below - counts.front().below, 20);
+  for (const Count& count : counts) {
+    const auto& all = get_block_eigenvalues();
+    EXPECT_EQ(count.below, std::count_if(all.begin(), all.end(), [&](double x) { return x < std::pow(2 * M_PI * count.freq_hz, 2); }));
+  }
+}
+
 TEST(SolveModes, needs_no_lower_end_to_leave_the_rigid_modes_out) {
   const test::System system = test::make_system(get_block());
   Options options = make_options();
