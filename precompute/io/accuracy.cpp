@@ -340,8 +340,9 @@ AccurateBody Search::solve() {
   if (run_.rank == 0) {
     forecast_next();
     const Trial& last = report_.trials.back();
-    run_.stations.say(fmt::format("chosen: {}, {} nodes: error bars up to {:.3g} cents of {:g} asked, {:.1f} CPU s", describe(last.setting),
-                                  last.nodes, last.worst_cents, asked_, last.cpu_seconds));
+    const std::string reached = last.modes == 0 ? std::string("no mode in the band, and none on the coarser meshes")
+                                                : fmt::format("error bars up to {:.3g} cents of {:g} asked", last.worst_cents, asked_);
+    run_.stations.say(fmt::format("chosen: {}, {} nodes: {}, {:.1f} CPU s", describe(last.setting), last.nodes, reached, last.cpu_seconds));
     if (report_.next.nodes > 0)
       run_.stations.say(fmt::format("next stricter: {}, about {:.0f} nodes, {}, {:.1f} CPU s, {:.2g} GB", describe(report_.next.setting),
                                     report_.next.nodes,

@@ -77,4 +77,8 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     text = run(folder, "facets", {"mesh": "facets.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
     assert "accuracy_cents" in text and "reached" in text and "surface" in text, text
     assert not (folder / "facets.hdf").exists()
+
+    # Where no mode is, none is said to be right to 0 cents.
+    text = run(folder, "silent", {**bar, "band_hz": [20, 300], "accuracy_cents": 10})
+    assert "no mode in the band" in text.split("chosen:")[1] and "error bars up to" not in text, text
     print("as right as was asked, each time")
