@@ -179,7 +179,7 @@ void set_goal(EPS eps, const KrylovRequest& request) {
     const PetscInt wanted = std::min(request.count, room);
     check(EPSSetWhichEigenpairs(eps, EPS_ALL));
     check(EPSSetInterval(eps, request.low, request.high));
-    check(EPSSetDimensions(eps, wanted, std::min(n, 9 * wanted / 4 + 6 * kBlock), PETSC_DEFAULT));
+    check(EPSSetDimensions(eps, wanted, std::min(n, 5 * wanted / 2 + 6 * kBlock), PETSC_DEFAULT));
     return;
   }
   // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the

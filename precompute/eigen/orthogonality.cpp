@@ -22,7 +22,7 @@ extern "C" void dtrtri_(const char* half, const char* diagonal, const int* n, do
 namespace carillon::eigen {
 namespace {
 
-constexpr double kGoodEnough = 5e-9;                                       // largest entry of V^T M V_j that is left standing
+constexpr double kGoodEnough = 2e-8;                                       // largest entry of V^T M V_j that is left standing
 constexpr double kRounding = 10 * std::numeric_limits<double>::epsilon();  // the same after a projection
 
 }  // namespace
