@@ -43,6 +43,7 @@ constexpr PetscInt kDenseRows = 300;       // Smaller problems are solved densel
 constexpr PetscInt kDenseRowsFull = 3000;  // and up to here when the band holds more than a quarter of the spectrum.
 constexpr std::int64_t kSliceModes = 320;  // Beyond, orthogonalisation costs more than another factorisation.
 constexpr double kEdgeNudge = 1e-6;        // Counts are taken this far outside the band, relative to lambda.
+constexpr double kSurelyApart = 1e-6;      // Modes farther apart than this, relative to lambda, are no group.
 constexpr double kEdgeTolerance = 1e-9;    // A mode this close to an end of the band (relative to lambda) is in it.
 constexpr double kSafeMargin = 1e-7;       // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
@@ -72,11 +73,13 @@ class BandSolver {
   std::int64_t count_found(double low, double high) const;
   double find_margin(double lambda) const;
   void move_doubtful_counts();
+  double find_end_of_search() const;
   void prove();
   void describe_proof();
   void take_found();
   void collect(const DensePairs& dense);
   void check_range(std::vector<std::size_t>& order, const std::vector<double>& lambda);
+  void drop_beyond_limit();
   void finish();
   void refine(ModeErrors& errors);
   void report(Phase phase, std::int64_t done) const;
@@ -92,6 +95,7 @@ class BandSolver {
   Scaling scaling_;
   double low_ = 0;  // scaled lambda, the band's ends
   double high_ = 0;
+  double sought_to_ = 0;  // the end of the last slice
   std::vector<petsc::VecHandle> rigid_;
   std::unique_ptr<Operators> operators_;
   std::unique_ptr<InertiaCounter> counter_;
@@ -207,6 +211,7 @@ void BandSolver::solve_sparse_band() {
     return solve_dense_band();
   }
   const std::vector<Slice> slices = cut(band);
+  sought_to_ = slices.back().high;
   const std::int64_t wanted = slices.back().below_high - slices.front().below_low;
   std::int64_t widest = 0;
   for (const Slice& slice : slices) widest = std::max(widest, slice.count());
@@ -328,16 +333,24 @@ std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
   return counts;
 }
 
+// Beyond it max_modes asks for nothing: the last mode wanted, or the end of the last slice while that is not found.
+double BandSolver::find_end_of_search() const {
+  if (!options_.max_modes || static_cast<std::int64_t>(found_.lambda.size()) < *options_.max_modes) return sought_to_;
+  std::vector<double> sorted = found_.lambda;
+  const auto last = sorted.begin() + (*options_.max_modes - 1);
+  std::nth_element(sorted.begin(), last, sorted.end());
+  return *last;
+}
+
 // Compares every count with the modes found; what is missing between two of them is sought there once more.
 void BandSolver::prove() {
   move_doubtful_counts();
-  const double top = *std::max_element(found_.lambda.begin(), found_.lambda.end());
   for (int attempt = 0;; ++attempt) {
     const std::vector<Inertia> counts = sort_counts(counter_->get_taken());
     bool is_complete = true;
     for (std::size_t i = 1; i < counts.size(); ++i) {
       const Slice part{counts[i - 1].lambda, counts[i - 1].below, counts[i].lambda, counts[i].below};
-      if (options_.max_modes && part.low > top) break;  // beyond what was sought
+      if (part.low >= find_end_of_search()) break;
       const std::int64_t found = count_found(part.low, part.high);
       if (found == part.count()) continue;
       is_complete = false;
@@ -369,7 +382,12 @@ void BandSolver::check_range(std::vector<std::size_t>& order, const std::vector<
   // The counts were taken a little outside the band.
   const auto within = static_cast<std::int64_t>(order.size());
   if (!options_.max_modes || within < std::min(modes_.band_count, *options_.max_modes)) modes_.band_count = within;
-  if (options_.max_modes && within > *options_.max_modes) order.resize(static_cast<std::size_t>(*options_.max_modes));
+  // Of equal modes all are kept until their basis is made: part of a group would depend on how it was found.
+  if (options_.max_modes && within > *options_.max_modes) {
+    auto kept = static_cast<std::size_t>(*options_.max_modes);
+    while (kept < order.size() && lambda[order[kept]] <= lambda[order[kept - 1]] * (1 + kSurelyApart)) ++kept;
+    order.resize(kept);
+  }
   for (const std::size_t i : order) modes_.lambda.push_back(lambda[i]);
 }
 
@@ -423,6 +441,23 @@ void BandSolver::refine(ModeErrors& errors) {
   }
 }
 
+// Equal modes past max_modes have served to make the basis of their group.
+void BandSolver::drop_beyond_limit() {
+  const std::int64_t limit = options_.max_modes.value_or(std::numeric_limits<PetscInt>::max());
+  if (static_cast<std::int64_t>(modes_.lambda.size()) <= limit) return;
+  modes_.lambda.resize(static_cast<std::size_t>(limit));
+  modes_.residual.resize(static_cast<std::size_t>(limit));
+  std::vector<Cluster>& clusters = modes_.proof.clusters;
+  for (Cluster& cluster : clusters) cluster.count = std::min(cluster.count, limit - cluster.first);
+  std::erase_if(clusters, [](const Cluster& cluster) { return cluster.count < 2; });
+  petsc::MatHandle kept;
+  Mat view = nullptr;
+  check(MatDenseGetSubMatrix(modes_.shapes, PETSC_DECIDE, PETSC_DECIDE, 0, petsc::to_petsc_int(limit), &view));
+  check(MatDuplicate(view, MAT_COPY_VALUES, kept.out()));
+  check(MatDenseRestoreSubMatrix(modes_.shapes, &view));
+  modes_.shapes = std::move(kept);
+}
+
 void BandSolver::finish() {
   if (modes_.lambda.empty()) return;
   ModeErrors errors;
@@ -434,10 +469,11 @@ void BandSolver::finish() {
     errors = normalise_and_measure(*operators_, quotients, modes_.shapes);
   }
   modes_.residual = errors.residual;
-  modes_.above_tolerance_count =
-      std::count_if(errors.residual.begin(), errors.residual.end(), [&](double residual) { return residual > options_.tolerance; });
   modes_.orthonormality_error = errors.orthonormality;
   orient_shapes(modes_.shapes, problem_.nodes.position);
+  drop_beyond_limit();
+  modes_.above_tolerance_count =
+      std::count_if(modes_.residual.begin(), modes_.residual.end(), [&](double residual) { return residual > options_.tolerance; });
   check(MatScale(modes_.shapes, scaling_.get_shape_factor()));
   for (double& lambda : modes_.lambda) lambda = scaling_.from_scaled(lambda);
 }
