@@ -98,6 +98,7 @@ class Search {
   Setting make_setting(spec::Element element, double ratio) const;
   const Trial* find_before(const Trial& trial) const;
   double measure_exponent(double Trial::*quantity, double fallback, double least, double most) const;
+  double find_dimension() const;
   Forecast forecast(const Setting& setting, double ratio) const;
   void forecast_next();
   void check_forecast(const Setting& setting);
@@ -129,13 +130,15 @@ double Search::measure_exponent(double Trial::*quantity, double fallback, double
   return std::clamp(std::log(last.*quantity / before->*quantity) / nodes, least, most);
 }
 
+/// The power of 1 / edges by which nodes grow: thin bodies refine in two directions.
+double Search::find_dimension() const { return -1.0 / measure_exponent(&Trial::edge_m, -1.0 / 3, -1.0 / 2, -1.0 / 3.3); }
+
 /// From the last trial to edges `ratio` times as long.
 Forecast Search::forecast(const Setting& setting, double ratio) const {
   const Trial& last = report_.trials.back();
   Forecast next;
   next.setting = setting;
-  const double dimension = -1.0 / measure_exponent(&Trial::edge_m, -1.0 / 3, -1.0 / 2, -1.0 / 3.3);  // thin bodies refine in two directions
-  const double growth = std::pow(ratio, -dimension);
+  const double growth = std::pow(ratio, -find_dimension());
   next.nodes = static_cast<double>(last.nodes) * growth;
   next.worst_cents = predict_worst(current_.solved.bars, setting.refinements > 0, ratio) + last.algebraic_cents;
   next.cpu_seconds = last.cpu_seconds * std::pow(growth, measure_exponent(&Trial::cpu_seconds, kCpuExponent, 1.0, 2.2));
@@ -148,10 +151,7 @@ Setting Search::make_setting(spec::Element element, double ratio) const {
   Setting setting = last.setting;
   setting.element = element;
   setting.tolerance = tolerance_;
-  setting.nodes.reset();
-  // A mesher's edges come out longer or shorter than was asked; the last mesh tells by how much.
-  const double asked_m = last.setting.edge_m.value_or(last.edge_m);
-  setting.edge_m = asked_m * ratio;
+  setting.nodes = std::llround(static_cast<double>(last.nodes) * std::pow(ratio, -find_dimension()));
   return setting;
 }
 
@@ -189,7 +189,9 @@ Decision Search::decide_on_body() {
     return {0, is_linear_cheaper ? linear.setting : quadratic_forecast_.setting};
   }
   double ratio = find_ratio(bars, kGoal * asked_, kFinestStep);
-  if (const Trial* before = find_before(last); before != nullptr && before->modes > 0 && before->worst_cents > last.worst_cents) {
+  constexpr double kTellingStep = 4.0 / 3;  // of edges: less says nothing of a rate
+  if (const Trial* before = find_before(last);
+      before != nullptr && before->modes > 0 && before->worst_cents > last.worst_cents && before->edge_m > kTellingStep * last.edge_m) {
     // A rate measured on coarse meshes is slower than what follows: half way between it and the known one.
     const double order = std::log(before->worst_cents / last.worst_cents) / std::log(before->edge_m / last.edge_m);
     const double measured = std::pow(kGoal * asked_ / last.worst_cents, 1.0 / std::clamp(order, 0.5, 6.0));
@@ -247,7 +249,8 @@ void Search::check_forecast(const Setting& setting) {
   if (run_.rank == 0) {
     const Trial& last = report_.trials.back();
     double ratio = 1.0;
-    if (setting.element == last.setting.element && setting.edge_m) ratio = *setting.edge_m / last.setting.edge_m.value_or(last.edge_m);
+    if (setting.element == last.setting.element && setting.nodes)
+      ratio = std::pow(static_cast<double>(*setting.nodes) / static_cast<double>(last.nodes), -1.0 / find_dimension());
     if (setting.refinements > last.setting.refinements) ratio = std::pow(0.5, setting.refinements - last.setting.refinements);
     bytes = ratio < 1.0 ? forecast(setting, ratio).bytes - static_cast<double>(last.peak_bytes) : 0.0;
   }

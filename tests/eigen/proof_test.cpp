@@ -118,6 +118,30 @@ TEST(Canonical, modes_are_the_same_for_any_ranks_and_partition) {
   }
 }
 
+TEST(Canonical, part_of_a_group_that_max_modes_cuts_is_the_same_as_in_the_whole_group) {
+  const Network three = test::join(test::join(make_block(4, 4, 6), make_block(4, 4, 6, {30, 0, 0})), make_block(4, 4, 6, {0, 40, 0}));
+  const test::System system = test::make_system(three);
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(test::calc_all_eigenvalues(make_block(4, 4, 6))[12] * 1.0001);
+  const Modes whole = solve_modes(system.problem, options);
+  options.max_modes = 4;  // one of the second group of three
+  const Modes part = solve_modes(system.problem, options);
+  ASSERT_EQ(part.lambda.size(), 4u);
+  ASSERT_EQ(part.proof.clusters.size(), 1u);
+  const LocalColumns expected(whole.shapes);
+  const LocalColumns shapes(part.shapes);
+  double difference = 0;
+  double largest = 0;
+  for (PetscInt i = 0; i < shapes.rows; ++i) {
+    difference = std::max(difference, std::abs(shapes.column(3)[i] - expected.column(3)[i]));
+    largest = std::max(largest, std::abs(expected.column(3)[i]));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &difference, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD);
+  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD);
+  EXPECT_LT(difference, 1e-6 * largest);
+}
+
 TEST(Memory, that_does_not_suffice_is_named_before_the_work) {
   const test::System system = test::make_system(make_block(5, 5, 10));
   Options options;
