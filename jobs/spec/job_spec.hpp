@@ -17,7 +17,7 @@ enum class Element { T4, T10 };
 enum class Mass { consistent, lumped };
 /// Which eigensolver. automatic: dense LAPACK for small problems, else the fastest that suits the band.
 enum class Method { automatic, block_lanczos, krylov_schur, dense };
-/// Which sparse factorisation serves shift-invert. automatic: what suits the number of ranks and the band.
+/// Which sparse factorisation serves shift-invert. automatic: our L D L^T, and MUMPS where that proves unstable.
 enum class Factorisation { automatic, ldlt, mumps, cholmod };
 
 /// Nodes whose displacement is zero: a named node set of the mesh, or all nodes inside a closed axis-parallel box.

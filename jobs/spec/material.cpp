@@ -181,15 +181,6 @@ std::string Material::describe_damping() const {
   return text;
 }
 
-std::string Material::describe_elasticity() const {
-  if (!orthotropic) return fmt::format("isotropic, E {:.12g} Pa, nu {:.12g}", young_modulus_pa, poisson_ratio);
-  const Orthotropic& o = *orthotropic;
-  return fmt::format(
-      "orthotropic, E {:.12g} {:.12g} {:.12g} Pa, G12 G23 G13 {:.12g} {:.12g} {:.12g} Pa, nu12 nu23 nu13 {:.12g} {:.12g} {:.12g}",
-      o.young_modulus_pa[0], o.young_modulus_pa[1], o.young_modulus_pa[2], o.shear_modulus_pa[0], o.shear_modulus_pa[1],
-      o.shear_modulus_pa[2], o.poisson_ratio[0], o.poisson_ratio[1], o.poisson_ratio[2]);
-}
-
 Equivalent calc_equivalent(std::span<const Material> materials, std::span<const double> volume_m3) {
   double volume = 0.0, mass = 0.0;
   Moduli voigt, reuss;  // of Reuss the sums of the reciprocals

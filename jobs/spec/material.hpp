@@ -71,8 +71,6 @@ struct Material {
   double calc_damping_per_s(double lambda_rad2_s2, double elastic, double kinetic) const;
   /// The law with its constants on one line: "Rayleigh, alpha1 1e-07 s, alpha2 0.5 1/s".
   std::string describe_damping() const;
-  /// The elasticity on one line: "isotropic, E 6.835e+10 Pa, nu 0.33".
-  std::string describe_elasticity() const;
 };
 
 /// One number for each of what a body of several materials has many of.

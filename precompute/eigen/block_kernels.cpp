@@ -266,17 +266,4 @@ void combine_columns(const Columns& a, const double* small, int kept) {
   }
 }
 
-void multiply_symmetric(const Columns& a, const Columns& b, double* small) {
-  constexpr int kStrip = 64;
-  const int n = a.count;
-  for (int first = 0; first < n; first += kStrip) {
-    const int width = std::min(kStrip, n - first);
-    double* strip = small + static_cast<std::ptrdiff_t>(first) * n;
-    multiply_transposed(a.part(0, first + width), b.part(first, width), strip, n);
-  }
-  for (int j = 0; j < n; ++j) {
-    for (int i = j + 1; i < n; ++i) small[static_cast<std::ptrdiff_t>(j) * n + i] = small[static_cast<std::ptrdiff_t>(i) * n + j];
-  }
-}
-
 }  // namespace carillon::eigen

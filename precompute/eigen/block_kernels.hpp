@@ -26,8 +26,4 @@ void subtract_product(const Columns& a, const double* small, int small_stride, c
 /// The first `kept` columns of A <- A S, S: (a.count, kept) column-major with stride a.count. Not collective.
 void combine_columns(const Columns& a, const double* small, int kept);
 
-/// Upper triangle of A^T A in the inner product that turned A into B = M A: the same as multiply_transposed for symmetric results, at half
-/// its work. small: (a.count, a.count), both triangles are set. Not collective.
-void multiply_symmetric(const Columns& a, const Columns& b, double* small);
-
 }  // namespace carillon::eigen

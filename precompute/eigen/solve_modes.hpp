@@ -78,14 +78,14 @@ struct Seconds {
   double rigid = 0;
   double analyse = 0;  // elimination order and symbolic factorisation
   double factor = 0;   // every numeric factorisation, those of the counts included
-  double iterate = 0;  // Krylov-Schur, solves and orthogonalisation included
+  double iterate = 0;  // block Lanczos (or Krylov-Schur), solves and orthogonalisation included
   double solve = 0;    // of iterate: triangular solves
   double check = 0;    // residuals, orthonormality, signs
   double total = 0;
 };
 
 struct FactorStatistics {
-  std::string solver;        // "MUMPS 5.5.1 LDL^T", "CHOLMOD LL^T", "LAPACK (dense)"
+  std::string solver;        // "carillon L D L^T", "MUMPS 5.5.1 L D L^T", "CHOLMOD L L^T", "LAPACK dsygv (dense)"
   std::string ordering;      // "METIS nested dissection (given)", "PORD", ...
   std::int64_t entries = 0;  // stored entries of the factor, all ranks; 0 if the solver does not tell
   double flops = 0;          // of one numeric factorisation; 0 if unknown
