@@ -62,6 +62,7 @@ class BandSolver {
   Modes solve();
 
  private:
+  void check_room_for_copies();
   void solve_dense_band();
   void make_counter();
   void solve_sparse_band();
@@ -117,12 +118,27 @@ void BandSolver::report(Phase phase, std::int64_t done) const {
     options_.progress({phase, done, std::min(modes_.band_count, options_.max_modes.value_or(modes_.band_count))});
 }
 
+// K and M by nodes, at their worst moment while their arrays grow, and the rigid modes.
+void BandSolver::check_room_for_copies() {
+  double entries = 0;
+  for (const Mat matrix : {problem_.stiffness, problem_.mass}) {
+    MatInfo info;
+    check(MatGetInfo(matrix, MAT_LOCAL, &info));
+    entries += 3 * info.nz_used;
+  }
+  PetscInt rows = 0;
+  check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
+  entries += 18.0 * rows;
+  check_memory(comm_, static_cast<std::int64_t>(8 * entries), options_.memory_limit_bytes, "The eigensolver's copy of K and M");
+}
+
 Modes BandSolver::solve() {
   {
     const Timer total(modes_.seconds.total);
     {
       const Timer timer(modes_.seconds.rigid);
       report(Phase::kRigid, 0);
+      check_room_for_copies();
       rigid_ = make_rigid_modes(problem_.stiffness, problem_.mass, problem_.nodes, modes_.proof.rigid_per_component);
       modes_.rigid_count = static_cast<std::int64_t>(rigid_.size());
       operators_ = std::make_unique<Operators>(problem_.stiffness, problem_.mass);
