@@ -22,9 +22,10 @@
 
 #include "precompute/eigen/block_kernels.hpp"
 #include "precompute/eigen/local_columns.hpp"
-#include "precompute/eigen/noise.hpp"
 #include "precompute/eigen/orthogonality.hpp"
+#include "precompute/petsc/guard.hpp"
 #include "precompute/petsc/handle.hpp"
+#include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
 
 // What petscblaslapack.h leaves out.
@@ -38,6 +39,7 @@ namespace carillon::eigen {
 namespace {
 
 using petsc::check;
+using petsc::guard;
 
 constexpr PetscInt kDefaultBlock = 16;
 constexpr double kWellConditioned = 1e-2;  // Smallest pivot of the scaled Gram matrix that needs no second Cholesky QR,
@@ -374,7 +376,7 @@ int Iteration::orthonormalise_by_columns(Small& r) {
     for (int attempt = 0; attempt < 3; ++attempt) {
       ++noise_;
       for (std::ptrdiff_t row = 0; row < w_.rows; ++row)
-        w_.column(kept)[row] = make_noise(noise_, static_cast<std::uint64_t>(first_row + row));
+        w_.column(kept)[row] = petsc::make_noise(noise_, static_cast<std::uint64_t>(first_row + row));
       Small ignored(static_cast<std::size_t>(count), 0.0);
       if (orthogonalise_column(kept, ignored.data()) > 0) {
         ++kept;
@@ -668,19 +670,7 @@ void Iteration::run() {
   check(BVRestoreArray(eps_->V, &array));
 }
 
-// ---- what SLEPc calls; exceptions become PETSc's errors with the same words.
-
-template <typename Work>
-PetscErrorCode guard(Work&& work) {
-  try {
-    work();
-  } catch (const std::bad_alloc&) {
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "out of memory");
-  } catch (const std::exception& error) {
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_LIB, "%s", error.what());
-  }
-  return 0;
-}
+// ---- what SLEPc calls.
 
 PetscErrorCode set_up(EPS eps) {
   EPSCheckHermitianDefinite(eps);

@@ -34,6 +34,9 @@ void check_input(const Problem& problem, const Options& options) {
     PetscInt n = 0;
     check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
     check(MatGetSize(problem.stiffness, &n, nullptr));
+    if (options.method == Method::kDense && n > kMostDenseUnknowns)
+      throw InputError(
+          fmt::format("LAPACK solves up to {} unknowns densely and there are {}: take another method.", kMostDenseUnknowns, n));
     const NodeLayout& nodes = problem.nodes;
     if (static_cast<std::size_t>(rows) != 3 * nodes.position.size() || nodes.position.size() != nodes.component.size()) {
       throw InputError(fmt::format("The node layout has {} positions and {} components for {} rows of the stiffness matrix.",

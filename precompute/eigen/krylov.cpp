@@ -12,12 +12,15 @@
 
 #include "precompute/eigen/block_lanczos.hpp"
 #include "precompute/eigen/local_columns.hpp"
+#include "precompute/petsc/guard.hpp"
+#include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::eigen {
 namespace {
 
 using petsc::check;
+using petsc::guard;
 
 constexpr PetscInt kBlock = 16;
 
@@ -25,17 +28,6 @@ struct ShellContext {
   const KrylovRequest* request = nullptr;
   KrylovStatistics statistics;
 };
-
-// C callbacks must not let exceptions through: they come back as PETSc errors with the same words.
-template <typename Work>
-PetscErrorCode guard(Work&& work) {
-  try {
-    work();
-  } catch (const std::exception& error) {
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_LIB, "%s", error.what());
-  }
-  return 0;
-}
 
 void solve_columns(ShellContext& context, const Columns& x) {
   const double start = MPI_Wtime();
@@ -120,12 +112,9 @@ PetscErrorCode calc_error(EPS, PetscScalar theta, PetscScalar, PetscReal residua
 double make_noise(const Vec3& x, std::uint64_t a, std::uint64_t b) {
   std::uint64_t state = a * 0x9E3779B97F4A7C15ull + b * 0xD1B54A32D192ED03ull;
   for (const double coordinate : x) {
-    state ^= std::bit_cast<std::uint64_t>(coordinate + 0.0);  // + 0.0: minus zero is zero
-    state = (state ^ (state >> 30)) * 0xBF58476D1CE4E5B9ull;
-    state = (state ^ (state >> 27)) * 0x94D049BB133111EBull;
-    state ^= state >> 31;
+    state = petsc::scramble(state ^ std::bit_cast<std::uint64_t>(coordinate + 0.0));  // + 0.0: minus zero is zero
   }
-  return static_cast<double>(state >> 11) * 0x1.0p-53 - 0.5;
+  return petsc::to_noise(state);
 }
 
 void set_starting_block(EPS eps, const KrylovRequest& request) {

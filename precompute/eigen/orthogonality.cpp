@@ -15,7 +15,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "precompute/eigen/noise.hpp"
+#include "precompute/petsc/noise.hpp"
 
 extern "C" void dtrtri_(const char* half, const char* diagonal, const int* n, double* a, const int* lda, int* info);
 
@@ -81,7 +81,7 @@ void Orthogonality::advance(const State& state, const std::vector<double>& r, in
   std::vector<double> product(all * next);
   for (std::size_t j = 0; j < next; ++j) {
     for (std::size_t i = 0; i < m; ++i) {
-      const double random = 2 * make_noise(i, j);
+      const double random = 2 * petsc::make_noise(i, j);
       product[j * all + i] = is_spared && i < known && next == b ? foreseen_[j * m + i] + noise_ * random : kRounding * random;
     }
     product[j * all + m + j] = 1;

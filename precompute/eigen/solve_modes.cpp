@@ -143,7 +143,7 @@ Modes BandSolver::solve() {
       modes_.rigid_count = static_cast<std::int64_t>(rigid_.size());
       operators_ = std::make_unique<Operators>(problem_.stiffness, problem_.mass);
     }
-    if (n_ <= kDenseRows) {
+    if (n_ <= kDenseRows || options_.method == Method::kDense) {
       solve_dense_band();
     } else {
       solve_sparse_band();
@@ -157,6 +157,8 @@ Modes BandSolver::solve() {
 }
 
 void BandSolver::solve_dense_band() {
+  constexpr std::int64_t kMatrices = 4;  // K, M, and the vectors as they were calculated and distributed
+  check_memory(comm_, kMatrices * 8 * n_ * n_, options_.memory_limit_bytes, "The dense solve");
   DensePairs pairs;
   {
     const Timer timer(modes_.seconds.iterate);

@@ -47,10 +47,14 @@ enum class Factorisation {
 
 /// The eigensolver of a slice; both are SLEPc EPS types and heed its options (prefix "carillon_").
 enum class Method {
-  kAutomatic,  // block Lanczos
+  kAutomatic,  // dense for some hundred unknowns, else block Lanczos
   kBlockLanczos,
   kKrylovSchur,
+  kDense,  // LAPACK, all eigenvalues; up to kMostDenseUnknowns
 };
+
+/// A dense solve of more would take hours and the matrices' square on every rank.
+inline constexpr std::int64_t kMostDenseUnknowns = 8000;
 
 enum class Phase { kRigid, kAnalyse, kCount, kFactor, kIterate, kCheck };
 

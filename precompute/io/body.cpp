@@ -51,26 +51,16 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   return mesh;
 }
 
+void say_size(const Run& run, std::int64_t nodes, std::int64_t tets, int components, std::int64_t held_nodes) {
+  run.stations.say(fmt::format("{} nodes, {} tetrahedra, {} component{}, {} nodes held", nodes, tets, components,
+                               components == 1 ? "" : "s", held_nodes));
+}
+
 /// CHOLMOD and MUMPS want the elimination order of the whole graph, which costs rank 0 time and memory; the factorisation of this project
 /// orders by itself, and MUMPS does so with more fill where it has to stand in for it.
 bool wants_elimination_order(const spec::JobSpec& job) {
   return job.factorisation == spec::Factorisation::mumps || job.factorisation == spec::Factorisation::cholmod;
 }
-
-}  // namespace
-
-Setting get_setting(const spec::JobSpec& job) {
-  Setting setting;
-  setting.element = job.element;
-  setting.tolerance = job.tolerance;
-  if (job.body) {
-    if (job.body->nodes) setting.nodes = *job.body->nodes;
-    setting.edge_m = job.body->edge_m;
-  }
-  return setting;
-}
-
-namespace {
 
 /// Every rank reads its part of the file.
 Body read_in_parallel(Run& run, const Setting& setting) {
@@ -87,8 +77,7 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   body.held_nodes = mesh.held_nodes;
   body.surface = {std::move(mesh.boundary.vertices_m), std::move(mesh.boundary.triangles), std::move(mesh.boundary.row)};
   for (const std::string& line : body.check.warnings) run.stations.warn(line);
-  run.stations.say(fmt::format("{} nodes, {} tetrahedra, {} component{}, {} nodes held", body.pieces.nodes, body.pieces.tets,
-                               body.pieces.components, body.pieces.components == 1 ? "" : "s", body.held_nodes));
+  say_size(run, body.pieces.nodes, body.pieces.tets, body.pieces.components, body.held_nodes);
   run.stations.say(fem::describe(body.pieces.report));
   run.stations.end();
   return body;
@@ -103,6 +92,17 @@ bool is_parallel_format(const Run& run) {
 
 }  // namespace
 
+Setting get_setting(const spec::JobSpec& job) {
+  Setting setting;
+  setting.element = job.element;
+  setting.tolerance = job.tolerance;
+  if (job.body) {
+    if (job.body->nodes) setting.nodes = *job.body->nodes;
+    setting.edge_m = job.body->edge_m;
+  }
+  return setting;
+}
+
 Body make_body(Run& run, const Setting& setting) {
   if (is_parallel_format(run)) return read_in_parallel(run, setting);
   Body body;
@@ -115,8 +115,7 @@ Body make_body(Run& run, const Setting& setting) {
     mesh = read_checked_mesh(run, setting, body);
     held = find_held_nodes(mesh, run.job);
     body.held_nodes = static_cast<std::int64_t>(held.size());
-    run.stations.say(fmt::format("{} nodes, {} tetrahedra, {} component{}, {} nodes held", mesh.nodes.size(), mesh.tet_count(),
-                                 body.check.components, body.check.components == 1 ? "" : "s", held.size()));
+    say_size(run, static_cast<std::int64_t>(mesh.nodes.size()), mesh.tet_count(), body.check.components, body.held_nodes);
   });
   run.stations.end();
 

@@ -81,17 +81,18 @@ eigen::Method find_method(spec::Method wanted) {
       return eigen::Method::kBlockLanczos;
     case spec::Method::krylov_schur:
       return eigen::Method::kKrylovSchur;
+    case spec::Method::dense:
+      return eigen::Method::kDense;
     default:
       return eigen::Method::kAutomatic;
   }
 }
 
-/// LAPACK takes all eigenvalues of what eigen solves densely by itself; more unknowns would go to another method than the one asked for.
+/// Said before anything is assembled.
 void check_method(const Run& run, std::int64_t unknowns) {
-  constexpr std::int64_t kDenseUnknowns = 300;
-  if (run.job.method != spec::Method::dense || unknowns <= kDenseUnknowns) return;
+  if (run.job.method != spec::Method::dense || unknowns <= eigen::kMostDenseUnknowns) return;
   throw InputError(fmt::format("{}: \"solver.method\": \"dense\" solves up to {} unknowns, and the body has {}; take \"automatic\"",
-                               run.job.file.string(), kDenseUnknowns, unknowns));
+                               run.job.file.string(), eigen::kMostDenseUnknowns, unknowns));
 }
 
 eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, eigen::NodeLayout layout) {

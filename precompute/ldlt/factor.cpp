@@ -12,6 +12,7 @@
 #include "precompute/ldlt/local_rows.hpp"
 #include "precompute/ldlt/numeric.hpp"
 #include "precompute/petsc/handle.hpp"
+#include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -22,15 +23,6 @@ using petsc::check;
 
 constexpr double kWorstBackwardError = 1e-10;
 constexpr double kVanishedPivot = 64 * std::numeric_limits<double>::epsilon();  // relative to ||A||_inf
-
-/// A number in [-1, 1) that depends on the row alone (splitmix64).
-double find_noise(std::uint64_t row) {
-  std::uint64_t z = (row + 1) * 0x9e3779b97f4a7c15ULL;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  z ^= z >> 31;
-  return static_cast<double>(z >> 11) * 0x1p-52 - 1.0;
-}
 
 }  // namespace
 
@@ -102,7 +94,7 @@ double Factor::State::measure_backward_error() {
   check(VecGetOwnershipRange(x, &first, &last));
   PetscScalar* values = nullptr;
   check(VecGetArray(x, &values));
-  for (PetscInt i = first; i < last; ++i) values[i - first] = find_noise(static_cast<std::uint64_t>(i));
+  for (PetscInt i = first; i < last; ++i) values[i - first] = petsc::make_noise(static_cast<std::uint64_t>(i), 0);
   check(VecRestoreArray(x, &values));
   apply(x, b, scratch);
   check(VecCopy(b, x));

@@ -5,19 +5,16 @@
 // Deviations: none.
 #include "precompute/slabs/slab.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <bit>
-#include <cerrno>
+#include <array>
 #include <cmath>
-#include <cstring>
-#include <limits>
+#include <optional>
 
 #include "precompute/mesh/read.hpp"
-#include "runtime/config/document.hpp"
+#include "precompute/slabs/held.hpp"
+#include "precompute/slabs/source.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::slabs {
@@ -25,67 +22,6 @@ namespace {
 
 constexpr double kFlat = 1e-9;                        // as mesh::check_mesh: six volumes over the cube of the longest edge
 constexpr int kLinearType = 10, kQuadraticType = 24;  // VTK's cell types
-
-/// A file that is read by places.
-class Source {
- public:
-  Source(const std::filesystem::path& file, std::string name)
-      : name_(std::move(name)), handle_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
-    if (handle_ < 0)
-      throw SystemError(fmt::format("{}: cannot be opened on every rank ({}); put it where all nodes of the machine see it", name_,
-                                    std::strerror(errno)));
-  }
-  ~Source() { ::close(handle_); }
-  Source(const Source&) = delete;
-  Source& operator=(const Source&) = delete;
-
-  /// The rows first ... first + rows - 1 as T (double or std::int64_t).
-  template <typename T>
-  std::vector<T> read(const Array& array, std::int64_t first, std::int64_t rows) const {
-    std::vector<T> values(static_cast<std::size_t>(rows * array.columns));
-    std::array<unsigned char, 1 << 16> block;
-    const std::size_t in_block = block.size() / static_cast<std::size_t>(array.bytes);
-    for (std::size_t done = 0; done < values.size();) {
-      const std::size_t now = std::min(in_block, values.size() - done);
-      fill(block.data(), now * static_cast<std::size_t>(array.bytes),
-           array.offset + (first * array.columns + static_cast<std::int64_t>(done)) * array.bytes, array.name);
-      for (std::size_t i = 0; i < now; ++i)
-        values[done + i] = static_cast<T>(convert<T>(block.data() + i * static_cast<std::size_t>(array.bytes), array));
-      done += now;
-    }
-    return values;
-  }
-
- private:
-  void fill(unsigned char* into, std::size_t bytes, std::int64_t at, const std::string& array) const {
-    while (bytes > 0) {
-      const ssize_t got = ::pread(handle_, into, bytes, at);
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) throw SystemError(fmt::format("{}: array '{}' cannot be read: {}", name_, array, std::strerror(errno)));
-      if (got == 0) throw InputError(fmt::format("{}: the file ends within array '{}'; write it again", name_, array));
-      into += got;
-      at += got;
-      bytes -= static_cast<std::size_t>(got);
-    }
-  }
-
-  template <typename T>
-  static T convert(const unsigned char* bytes, const Array& array) {
-    static_assert(std::endian::native == std::endian::little);
-    std::uint64_t word = 0;
-    for (int i = 0; i < array.bytes; ++i) word |= std::uint64_t{bytes[array.is_big_endian ? array.bytes - 1 - i : i]} << (8 * i);
-    if (array.is_floating) {
-      if (array.bytes == 4) return static_cast<T>(std::bit_cast<float>(static_cast<std::uint32_t>(word)));
-      return static_cast<T>(std::bit_cast<double>(word));
-    }
-    const int spare = 64 - 8 * array.bytes;
-    if (array.is_signed) return static_cast<T>(static_cast<std::int64_t>(word << spare) >> spare);
-    return static_cast<T>(std::min<std::uint64_t>(word, INT64_MAX));
-  }
-
-  std::string name_;
-  int handle_;
-};
 
 std::string list_elements(const std::vector<std::int64_t>& elements, std::int64_t total) {
   std::string text;
@@ -211,71 +147,6 @@ void read_nodes(const Source& source, const std::string& name, const Layout& lay
       if (!std::isfinite(x))
         throw InputError(fmt::format("{}: node {} has a coordinate that is not finite; mend the mesh where it was made", name,
                                      begin + static_cast<std::int64_t>(i) + 1));
-  }
-}
-
-std::string begin_message(const std::string& name, const Hold& hold) {
-  return hold.place.empty() ? name : fmt::format("{}: {}", hold.place, name);
-}
-
-/// The array and the value of a node set: `NAME` is every node whose value in point data NAME is not 0 (then no value), `NAME:N` those
-/// whose value is N. Null if there is none.
-const Array* find_set(const Layout& layout, const std::string& set, std::optional<std::int64_t>& value) {
-  for (const Array& array : layout.point_data) {
-    if (set == array.name) return &array;
-    if (!set.starts_with(array.name + ":")) continue;
-    const std::string number = set.substr(array.name.size() + 1), digits = number.substr(number.starts_with("-") ? 1 : 0);
-    if (digits.empty() || digits.size() > 18 || digits.find_first_not_of("0123456789") != std::string::npos) continue;
-    value = std::stoll(number);
-    return &array;
-  }
-  return nullptr;
-}
-
-/// Marks the nodes of a set; returns how many are on this rank.
-std::int64_t read_held_set(const Source& source, const std::string& name, const Layout& layout, const Hold& hold, std::int64_t begin,
-                           Slab& slab) {
-  std::optional<std::int64_t> value;
-  if (const Array* array = find_set(layout, *hold.node_set, value)) {
-    const auto values = source.read<std::int64_t>(*array, begin, static_cast<std::int64_t>(slab.nodes_m.size()));
-    std::int64_t count = 0;
-    for (std::size_t i = 0; i < values.size(); ++i)
-      if (value ? values[i] == *value : values[i] != 0) {
-        slab.held[i] = 1;
-        ++count;
-      }
-    return count;
-  }
-  const std::string start = begin_message(name, hold);
-  if (layout.point_data.empty())
-    throw InputError(
-        fmt::format("{}: the mesh has no node set '{}': it has none at all; add an integer array to its PointData, or give a box instead",
-                    start, *hold.node_set));
-  std::vector<std::string> names;
-  std::string list;
-  for (const Array& array : layout.point_data) {
-    names.push_back(array.name);
-    if (names.size() <= 20) list += fmt::format("{}'{}'", list.empty() ? "" : ", ", array.name);
-  }
-  const std::string nearest = config::find_nearest(*hold.node_set, names);
-  throw InputError(fmt::format("{}: the mesh has no node set '{}'{}; it has {} (or with a value: '{}:1')", start, *hold.node_set,
-                               nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), list, names.front()));
-}
-
-/// Marks the nodes of all wished sets. Collective.
-void read_held_sets(MPI_Comm comm, const Source& source, const std::string& name, const Layout& layout, const Wish& wish,
-                    std::int64_t begin, Slab& slab) {
-  petsc::run_agreed(comm, [&] { slab.held.assign(slab.nodes_m.size(), 0); });
-  for (const Hold& hold : wish.hold) {
-    if (!hold.node_set) continue;
-    std::int64_t count = 0;
-    petsc::run_agreed(comm, [&] { count = read_held_set(source, name, layout, hold, begin, slab); });
-    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, comm);
-    petsc::run_agreed(comm, [&] {
-      if (count == 0)
-        throw InputError(
-            fmt::format("{}: the node set '{}' of the mesh holds no node; name another set", begin_message(name, hold), *hold.node_set));
-    });
   }
 }
 
@@ -437,46 +308,6 @@ void add_mid_nodes(MPI_Comm comm, Slab& slab, const std::string& name) {
     slab.tets = std::move(fine);
     slab.order = 2;
   });
-}
-
-/// The box of the mesh, into the report, and the nodes of the wished boxes. Collective.
-void find_held_boxes(MPI_Comm comm, const std::string& name, const Wish& wish, Slab& slab, mesh::CheckReport& report) {
-  Vec3 low, high;
-  low.fill(std::numeric_limits<double>::max());
-  high.fill(std::numeric_limits<double>::lowest());
-  for (const Vec3& x : slab.nodes_m)
-    for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], x[k]);
-      high[k] = std::max(high[k], x[k]);
-    }
-  MPI_Allreduce(MPI_IN_PLACE, low.data(), 3, MPI_DOUBLE, MPI_MIN, comm);
-  MPI_Allreduce(MPI_IN_PLACE, high.data(), 3, MPI_DOUBLE, MPI_MAX, comm);
-  report.box_low = low;
-  report.box_high = high;
-  const double slack = 1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-  for (const Hold& hold : wish.hold) {
-    if (!hold.box_m) continue;
-    const auto& [from, to] = *hold.box_m;
-    std::int64_t count = 0;
-    for (std::size_t i = 0; i < slab.nodes_m.size(); ++i) {
-      bool is_in = true;
-      for (std::size_t k = 0; k < 3; ++k) is_in = is_in && slab.nodes_m[i][k] >= from[k] - slack && slab.nodes_m[i][k] <= to[k] + slack;
-      if (!is_in) continue;
-      slab.held[i] = 1;
-      ++count;
-    }
-    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, comm);
-    petsc::run_agreed(comm, [&] {
-      for (std::size_t k = 0; k < 3; ++k)
-        if (!(from[k] <= to[k]))
-          throw InputError(fmt::format("{}: the box runs from {} to {} along {}; give the smaller corner first", begin_message(name, hold),
-                                       from[k], to[k], "xyz"[k]));
-      if (count == 0)
-        throw InputError(fmt::format(
-            "{}: no node lies in the box ({}, {}, {}) to ({}, {}, {}) m; the mesh spans ({}, {}, {}) to ({}, {}, {}) m",
-            begin_message(name, hold), from[0], from[1], from[2], to[0], to[1], to[2], low[0], low[1], low[2], high[0], high[1], high[2]));
-    });
-  }
 }
 
 }  // namespace

@@ -285,6 +285,30 @@ TEST(SolveModes, agrees_between_block_lanczos_and_krylov_schur) {
   expect_eigenvalues(single, pick(get_block_eigenvalues(), options.low_hz, options.high_hz));
 }
 
+TEST(SolveModes, solves_densely_when_asked_to) {
+  const test::System system = test::make_system(get_block());
+  Options options = make_options();
+  options.method = Method::kDense;
+  const Modes modes = solve_modes(system.problem, options);
+  expect_eigenvalues(modes, pick(get_block_eigenvalues(), options.low_hz, options.high_hz));
+  EXPECT_NE(modes.factor.solver.find("dense"), std::string::npos);
+  EXPECT_EQ(modes.factor.solves, 0);
+}
+
+TEST(SolveModes, names_the_interval_and_the_counts_when_modes_stay_missing) {
+  const test::System system = test::make_system(get_block());
+  check(PetscOptionsSetValue(nullptr, "-eps_max_it", "1"));
+  std::string message;
+  try {
+    solve_modes(system.problem, make_options());
+  } catch (const SolveError& error) {
+    message = error.what();
+  }
+  check(PetscOptionsClearValue(nullptr, "-eps_max_it"));
+  EXPECT_NE(message.find("Between 1 and "), std::string::npos) << message;
+  EXPECT_NE(message.find("counts 65 modes, and 0 were found"), std::string::npos) << message;
+}
+
 TEST(SolveModes, reports_progress_on_the_first_rank) {
   const test::System system = test::make_system(get_block());
   Options options = make_options();

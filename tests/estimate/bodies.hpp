@@ -63,4 +63,12 @@ Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, doub
 Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held, const estimate::Solid& solid, bool lumped,
               double low_hz, double high_hz, int max_modes, double tolerance = 1e-8);
 
+/// One body of the list on one mesh.
+struct Case {
+  const char* body;
+  int fineness;
+  MeshKind kind;
+};
+inline void PrintTo(const Case& c, std::ostream* out) { *out << c.body << " " << c.fineness << " " << describe(c.kind); }
+
 }  // namespace carillon::tests

@@ -16,14 +16,6 @@
 namespace carillon::tests {
 namespace {
 
-struct Case {
-  const char* body;
-  int fineness;
-  MeshKind kind;
-};
-
-void PrintTo(const Case& c, std::ostream* out) { *out << c.body << " " << c.fineness << " " << describe(c.kind); }
-
 class KnownBody : public testing::TestWithParam<Case> {};
 
 TEST_P(KnownBody, lies_within_its_bars_which_are_less_than_ten_times_too_wide_at_the_median) {

@@ -7,12 +7,6 @@
 namespace carillon::tests {
 namespace {
 
-struct Case {
-  const char* body;
-  int fineness;
-  MeshKind kind;
-};
-
 class SameBars : public testing::TestWithParam<Case> {};
 
 TEST_P(SameBars, on_one_rank_and_on_all) {

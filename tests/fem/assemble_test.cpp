@@ -11,27 +11,18 @@
 
 #include "precompute/petsc/session.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/ranks.hpp"
 
 namespace carillon::fem {
 namespace {
 
 using testing::HasSubstr;
+using tests::get_rank;
+using tests::get_ranks;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
 const spec::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
 constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
-
-int get_rank() {
-  int rank = 0;
-  MPI_Comm_rank(kWorld, &rank);
-  return rank;
-}
-
-int get_ranks() {
-  int ranks = 1;
-  MPI_Comm_size(kWorld, &ranks);
-  return ranks;
-}
 
 mesh::TetMesh on_rank_0(const mesh::TetMesh& whole) { return get_rank() == 0 ? whole : mesh::TetMesh{}; }
 

@@ -2,14 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/ranks.hpp"
+
 namespace carillon::io {
 namespace {
 
-int get_rank() {
-  int rank = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  return rank;
-}
+using tests::get_rank;
 
 TEST(Stations, take_the_seconds_of_the_slowest_rank_and_the_memory_of_all) {
   Stations stations(MPI_COMM_WORLD, true);

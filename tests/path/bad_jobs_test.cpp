@@ -69,10 +69,10 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"dense_beyond_its_size",
                 2,
                 [](const Folder& f) {
-                  mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {12, 2, 2}), f / "mesh.msh");
+                  mesh::write_gmsh(shapes::make_box({0.1, 0.02, 0.01}, {40, 8, 7}), f / "mesh.msh");
                   f.write_job({}, R"("element": "T4", "solver": {"method": "dense"},)");
                 },
-                {"job.json", "solver.method", "300 unknowns", "351", "automatic"}},
+                {"job.json", "solver.method", "8000 unknowns", "8856", "automatic"}},
         BadCase{"unknown_node_set",
                 2,
                 [](const Folder& f) { f.write_job({}, R"("fixed": "x-mim",)"); },

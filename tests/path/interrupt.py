@@ -15,21 +15,10 @@ import sys
 import tempfile
 import time
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "failures"))
+from runs import STEEL, is_running, list_ranks
+
 bin_dir = pathlib.Path(sys.argv[1]).resolve()
-STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {}}}
-
-
-def list_ranks(mpirun):
-    """The processes of ours below mpirun."""
-    found = []
-    for entry in pathlib.Path("/proc").iterdir():
-        try:
-            status = (entry / "stat").read_text().rsplit(")", 1)[1].split()
-            if int(status[1]) == mpirun and b"carillon" in (entry / "cmdline").read_bytes():
-                found.append(int(entry.name))
-        except (OSError, ValueError, IndexError):
-            pass
-    return sorted(found)
 
 
 def find_mentions(folder):
@@ -42,13 +31,6 @@ def find_mentions(folder):
         except OSError:
             pass
     return found
-
-
-def is_running(pid):
-    try:
-        return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in ("Z", "X")
-    except OSError:
-        return False
 
 
 def interrupt(folder, job, ranks, station, delay_s, number, at_rank):

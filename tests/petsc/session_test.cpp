@@ -9,21 +9,13 @@
 
 #include "precompute/petsc/handle.hpp"
 #include "runtime/config/error.hpp"
+#include "tests/support/ranks.hpp"
 
 namespace carillon::petsc {
 namespace {
 
-int find_rank() {
-  int rank = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  return rank;
-}
-
-int find_size() {
-  int size = 1;
-  MPI_Comm_size(MPI_COMM_WORLD, &size);
-  return size;
-}
+using tests::get_rank;
+using tests::get_ranks;
 
 template <typename Error, typename Call>
 std::string catch_message(Call&& call) {
@@ -65,22 +57,22 @@ TEST(Check, forgets_an_error_once_it_was_thrown) {
 
 TEST(AllOk, is_false_everywhere_when_one_rank_fails) {
   EXPECT_TRUE(all_ok(MPI_COMM_WORLD, true));
-  EXPECT_FALSE(all_ok(MPI_COMM_WORLD, find_rank() != find_size() - 1));
+  EXPECT_FALSE(all_ok(MPI_COMM_WORLD, get_rank() != get_ranks() - 1));
 }
 
 TEST(Agree, throws_the_same_text_on_every_rank) {
-  const bool is_last = find_rank() == find_size() - 1;
+  const bool is_last = get_rank() == get_ranks() - 1;
   EXPECT_EQ(catch_message<InputError>([&] { agree(MPI_COMM_WORLD, is_last ? std::string("line 3 is bad") : std::string()); }),
             "line 3 is bad");
   EXPECT_NO_THROW(agree(MPI_COMM_WORLD, std::string()));
 }
 
 TEST(Agree, lets_the_lowest_failing_rank_speak) {
-  EXPECT_EQ(catch_message<InputError>([&] { agree(MPI_COMM_WORLD, "rank " + std::to_string(find_rank())); }), "rank 0");
+  EXPECT_EQ(catch_message<InputError>([&] { agree(MPI_COMM_WORLD, "rank " + std::to_string(get_rank())); }), "rank 0");
 }
 
 TEST(RunAgreed, keeps_the_kind_of_the_error) {
-  const bool is_last = find_rank() == find_size() - 1;
+  const bool is_last = get_rank() == get_ranks() - 1;
   EXPECT_EQ(catch_message<SolveError>([&] {
               run_agreed(MPI_COMM_WORLD, [&] {
                 if (is_last) throw SolveError("lost modes");

@@ -17,26 +17,17 @@
 #include "runtime/config/error.hpp"
 #include "tests/slabs/write_vtkhdf.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/support/ranks.hpp"
 
 namespace carillon::slabs {
 namespace {
 
 using testing::HasSubstr;
+using tests::get_rank;
+using tests::get_ranks;
 using Box = std::array<Vec3, 2>;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
-
-int get_rank() {
-  int rank = 0;
-  MPI_Comm_rank(kWorld, &rank);
-  return rank;
-}
-
-int get_ranks() {
-  int ranks = 1;
-  MPI_Comm_size(kWorld, &ranks);
-  return ranks;
-}
 
 /// A file that rank 0 writes and all read.
 class SharedFile {

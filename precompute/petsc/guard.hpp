@@ -1,0 +1,24 @@
+// Callbacks of PETSc and SLEPc are C: no exception may pass through them.
+#pragma once
+
+#include <petscsys.h>
+
+#include <exception>
+#include <new>
+
+namespace carillon::petsc {
+
+/// Runs the work of a callback; an exception becomes PETSc's error with the same words, which check() turns into one again.
+template <typename Work>
+PetscErrorCode guard(Work&& work) {
+  try {
+    work();
+  } catch (const std::bad_alloc&) {
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "out of memory");
+  } catch (const std::exception& error) {
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_LIB, "%s", error.what());
+  }
+  return 0;
+}
+
+}  // namespace carillon::petsc
