@@ -54,6 +54,7 @@ void print_start(const petsc::Session& session, bool quiet) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  petsc::restart_with_fitting_kernels(argv);
   try {
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);

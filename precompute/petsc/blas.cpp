@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "precompute/petsc/blas_kernels.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -45,7 +46,7 @@ std::string find_blas_maker(const std::string& file) {
 
 std::string blas_name() {
   const std::string file = find_blas_file();
-  return fmt::format("{} ({})", find_blas_maker(file), file.empty() ? "file unknown" : file);
+  return fmt::format("{} ({}){}", find_blas_maker(file), file.empty() ? "file unknown" : file, describe_kernels());
 }
 
 bool blas_is_reference() { return find_blas_maker(find_blas_file()) == "reference BLAS"; }

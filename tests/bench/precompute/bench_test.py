@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """The bench's own functions: medians, tables, phases, pictures, the system that the rivals get. Oracles: closed forms and hand-made records."""
 import pathlib
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -33,6 +34,22 @@ class Measuring(unittest.TestCase):
     def test_the_children_of_a_child_count_too(self):
         cost = measuring.run_measured(["sh", "-c", f"{sys.executable} -c 'import time\nwhile time.process_time() < 0.4: pass'; true"], ".")
         self.assertGreaterEqual(cost.cpu_s, 0.39)
+
+    def test_kernels_fit_the_processor(self):
+        """The flags of real processors, shortened: Sapphire Rapids, Zen 3, Zen 4, Haswell, Nehalem, and a processor that is no x86."""
+        wide = "flags\t\t: fpu sse2 fma avx avx2 avx512f avx512dq avx512cd avx512bw avx512vl\n"
+        for vendor, flags, kernels in (("GenuineIntel", wide, "SkylakeX"), ("AuthenticAMD", "flags : sse2 fma avx avx2\n", "Zen"),
+                                       ("AuthenticAMD", wide, "SkylakeX"), ("GenuineIntel", "flags : sse2 fma avx avx2\n", "Haswell"),
+                                       ("GenuineIntel", "flags : sse2 ssse3\n", ""), ("ARM", "Features : fp asimd\n", "")):
+            self.assertEqual(measuring.find_fitting_kernels(f"vendor_id\t: {vendor}\n{flags}")[0], kernels)
+
+    def test_every_program_gets_the_kernels_that_the_bench_names(self):
+        kernels, why = measuring.find_kernels()
+        environment = measuring.make_environment()
+        self.assertEqual(environment.get("OPENBLAS_CORETYPE", ""), kernels, why)
+        if kernels:
+            taken = subprocess.run([sys.executable, "-c", measuring.ASK_KERNELS], env=environment, capture_output=True, text=True, check=True)
+            self.assertEqual(taken.stdout.strip().lower(), kernels.lower())
 
     def test_a_failing_program_tells_its_last_words(self):
         with self.assertRaisesRegex(RuntimeError, "exit code 3\nno such mesh"):

@@ -1,9 +1,12 @@
 """Running programs and judging what comes out: CPU seconds, medians, tables, ratios, the picture of the time by phase."""
 import dataclasses
+import functools
 import json
 import os
+import pathlib
 import statistics
 import subprocess
+import sys
 import tempfile
 import time
 
@@ -18,9 +21,49 @@ class Cost:
     wall_s: float
 
 
+@functools.cache
+def find_kernels():
+    """(kernels, text): OpenBLAS's kernels for every program that is measured, and why these. A release of OpenBLAS that is older than the
+    processor takes kernels without AVX: carillon-precompute mends that by itself, its rivals would be slow for no fault of theirs."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
+    child = subprocess.run([sys.executable, "-c", ASK_KERNELS], env=environment, capture_output=True, text=True)
+    if child.returncode != 0:
+        return "", "OpenBLAS was not found"
+    own = child.stdout.strip()
+    fitting, rank = find_fitting_kernels(pathlib.Path("/proc/cpuinfo").read_text())
+    if rank > KERNEL_RANKS.get(own.lower(), 9):
+        return fitting, f"for all programs, as they fit the processor; OpenBLAS alone takes {own}"
+    return own, "OpenBLAS's own choice"
+
+
+ASK_KERNELS = """import ctypes
+library = ctypes.CDLL("libopenblas.so.0")
+library.openblas_get_corename.restype = ctypes.c_char_p
+print(library.openblas_get_corename().decode())"""
+# By the vector instructions they use: 2 is AVX2 with FMA; names that are not here are newer.
+KERNEL_RANKS = dict.fromkeys(("generic", "katmai", "coppermine", "northwood", "prescott", "banias", "atom", "core2", "penryn", "dunnington",
+                              "nehalem", "athlon", "opteron", "opteron_sse3", "barcelona", "bobcat", "nano"), 0)
+KERNEL_RANKS |= dict.fromkeys(("sandybridge", "bulldozer", "piledriver", "steamroller"), 1) | dict.fromkeys(("haswell", "zen", "excavator"), 2)
+
+
+def find_fitting_kernels(cpuinfo):
+    """(kernels, rank) for the processor that the text of /proc/cpuinfo is of; ("", 0) when there is no telling."""
+    fields = dict(line.split(":", 1) for line in cpuinfo.splitlines() if ":" in line)
+    fields = {name.strip(): value.split() for name, value in fields.items()}
+    flags = set(fields.get("flags", []))
+    if {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"} <= flags:
+        return "SkylakeX", 3
+    if {"avx2", "fma"} <= flags:
+        return ("Zen" if fields.get("vendor_id") == ["AuthenticAMD"] else "Haswell"), 2
+    return "", 0
+
+
 def make_environment():
-    """That of every program that is measured: one thread, MPI on any machine, and OpenBLAS free to take the kernels of the processor."""
+    """That of every program that is measured: one thread, MPI on any machine, and the same kernels of OpenBLAS."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
+    kernels, _ = find_kernels()
+    if kernels:
+        kept["OPENBLAS_CORETYPE"] = kernels
     return kept | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive", "OMPI_ALLOW_RUN_AS_ROOT": "1",
                    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none",
                    "OMPI_MCA_mpi_yield_when_idle": "1"}
