@@ -11,7 +11,8 @@
 
 namespace carillon::estimate {
 
-NodeExchange::NodeExchange(MPI_Comm comm, const fem::LocalMesh& local, const std::vector<std::int32_t>& place) : comm_(comm) {
+NodeExchange::NodeExchange(MPI_Comm comm, const fem::LocalMesh& local, const std::vector<std::int32_t>& place, std::size_t piece_bytes)
+    : comm_(comm), piece_bytes_(piece_bytes) {
   int ranks = 1;
   MPI_Comm_size(comm, &ranks);
   if (ranks == 1) return;
@@ -48,7 +49,6 @@ NodeExchange::NodeExchange(MPI_Comm comm, const fem::LocalMesh& local, const std
     for (const std::int32_t id : wanted[r]) neighbour.owned.push_back(local_of.at(id));
     neighbours_.push_back(std::move(neighbour));
   }
-  requests_.resize(2 * neighbours_.size());
 }
 
 void NodeExchange::reserve(std::size_t width) {
@@ -68,26 +68,30 @@ template <typename T, typename Take>
 void NodeExchange::pass(T* values, std::size_t width, std::vector<std::int32_t> Neighbour::*from, std::vector<std::int32_t> Neighbour::*to,
                         const Take& take) {
   constexpr int kTag = 71;
-  T* send = reinterpret_cast<T*>(send_.data());
   T* receive = reinterpret_cast<T*>(receive_.data());
-  std::size_t at = 0, request = 0;
+  char* arriving = receive_.data();
+  requests_.clear();
   for (const Neighbour& neighbour : neighbours_) {
-    const std::size_t size = (neighbour.*to).size() * width;
-    MPI_Irecv(receive + at, static_cast<int>(size * sizeof(T)), MPI_BYTE, neighbour.rank, kTag, comm_, &requests_[request++]);
-    at += size;
+    const std::size_t bytes = (neighbour.*to).size() * width * sizeof(T);
+    for_pieces(bytes, piece_bytes_, [&](std::size_t at, int count) {
+      MPI_Irecv(arriving + at, count, MPI_BYTE, neighbour.rank, kTag, comm_, &requests_.emplace_back());
+    });
+    arriving += bytes;
   }
-  at = 0;
+  char* leaving = send_.data();
   for (const Neighbour& neighbour : neighbours_) {
-    T* begin = send + at;
+    char* end = leaving;
     for (const std::int32_t node : neighbour.*from) {
-      std::memcpy(send + at, values + static_cast<std::size_t>(node) * width, width * sizeof(T));
-      at += width;
+      std::memcpy(end, values + static_cast<std::size_t>(node) * width, width * sizeof(T));
+      end += width * sizeof(T);
     }
-    MPI_Isend(begin, static_cast<int>((send + at - begin) * static_cast<std::ptrdiff_t>(sizeof(T))), MPI_BYTE, neighbour.rank, kTag, comm_,
-              &requests_[request++]);
+    for_pieces(static_cast<std::size_t>(end - leaving), piece_bytes_, [&](std::size_t at, int count) {
+      MPI_Isend(leaving + at, count, MPI_BYTE, neighbour.rank, kTag, comm_, &requests_.emplace_back());
+    });
+    leaving = end;
   }
-  MPI_Waitall(static_cast<int>(request), requests_.data(), MPI_STATUSES_IGNORE);
-  at = 0;
+  std::size_t at = 0;
+  MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
   for (const Neighbour& neighbour : neighbours_)
     for (const std::int32_t node : neighbour.*to) {
       take(values + static_cast<std::size_t>(node) * width, receive + at);

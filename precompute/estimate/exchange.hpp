@@ -4,38 +4,50 @@
 
 #include <mpi.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "precompute/fem/distribute.hpp"
 
 namespace carillon::estimate {
 
+/// MPI counts in int: longer messages go in pieces of so many bytes.
+inline constexpr std::size_t kPieceBytes = std::size_t{1} << 30;
+
+/// Calls post(first byte, bytes) for every piece of `bytes`.
+template <typename Post>
+void for_pieces(std::size_t bytes, std::size_t piece_bytes, const Post& post) {
+  for (std::size_t at = 0; at < bytes; at += piece_bytes) post(at, static_cast<int>(std::min(piece_bytes, bytes - at)));
+}
+
 /// Sends out[r] to rank r and returns what came, by rank. T: trivially copyable. Collective.
 template <typename T>
-std::vector<std::vector<T>> exchange_lists(MPI_Comm comm, const std::vector<std::vector<T>>& out) {
+std::vector<std::vector<T>> exchange_lists(MPI_Comm comm, const std::vector<std::vector<T>>& out, std::size_t piece_bytes = kPieceBytes) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  constexpr int kTag = 72;
   const std::size_t ranks = out.size();
-  std::vector<int> sent(ranks), sent_at(ranks), got(ranks), got_at(ranks);
-  std::vector<T> flat;
-  for (std::size_t r = 0; r < ranks; ++r) {
-    sent[r] = static_cast<int>(out[r].size() * sizeof(T));
-    sent_at[r] = static_cast<int>(flat.size() * sizeof(T));
-    flat.insert(flat.end(), out[r].begin(), out[r].end());
-  }
-  MPI_Alltoall(sent.data(), 1, MPI_INT, got.data(), 1, MPI_INT, comm);
-  std::size_t total = 0;
-  for (std::size_t r = 0; r < ranks; ++r) {
-    got_at[r] = static_cast<int>(total);
-    total += static_cast<std::size_t>(got[r]);
-  }
-  std::vector<T> arrived(total / sizeof(T));
-  MPI_Alltoallv(flat.data(), sent.data(), sent_at.data(), MPI_BYTE, arrived.data(), got.data(), got_at.data(), MPI_BYTE, comm);
+  std::vector<std::int64_t> sent(ranks), got(ranks);
+  for (std::size_t r = 0; r < ranks; ++r) sent[r] = static_cast<std::int64_t>(out[r].size());
+  MPI_Alltoall(sent.data(), 1, MPI_INT64_T, got.data(), 1, MPI_INT64_T, comm);
   std::vector<std::vector<T>> in(ranks);
+  std::vector<MPI_Request> requests;
   for (std::size_t r = 0; r < ranks; ++r) {
-    const auto begin = arrived.begin() + static_cast<std::ptrdiff_t>(got_at[r] / sizeof(T));
-    in[r].assign(begin, begin + static_cast<std::ptrdiff_t>(got[r] / sizeof(T)));
+    in[r].resize(static_cast<std::size_t>(got[r]));
+    auto* bytes = reinterpret_cast<char*>(in[r].data());
+    for_pieces(in[r].size() * sizeof(T), piece_bytes, [&](std::size_t at, int count) {
+      MPI_Irecv(bytes + at, count, MPI_BYTE, static_cast<int>(r), kTag, comm, &requests.emplace_back());
+    });
   }
+  for (std::size_t r = 0; r < ranks; ++r) {
+    const auto* bytes = reinterpret_cast<const char*>(out[r].data());
+    for_pieces(out[r].size() * sizeof(T), piece_bytes, [&](std::size_t at, int count) {
+      MPI_Isend(bytes + at, count, MPI_BYTE, static_cast<int>(r), kTag, comm, &requests.emplace_back());
+    });
+  }
+  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
   return in;
 }
 
@@ -43,7 +55,7 @@ std::vector<std::vector<T>> exchange_lists(MPI_Comm comm, const std::vector<std:
 class NodeExchange {
  public:
   /// place: (nodes) where in the arrays of values a node has its own; -1: it has none, on any rank. Collective.
-  NodeExchange(MPI_Comm comm, const fem::LocalMesh& local, const std::vector<std::int32_t>& place);
+  NodeExchange(MPI_Comm comm, const fem::LocalMesh& local, const std::vector<std::int32_t>& place, std::size_t piece_bytes = kPieceBytes);
 
   /// Makes room for values of `width` numbers a node, so that what follows does not allocate. Local.
   void reserve(std::size_t width);
@@ -68,6 +80,7 @@ class NodeExchange {
             const Take& take);
 
   MPI_Comm comm_;
+  std::size_t piece_bytes_;
   std::vector<Neighbour> neighbours_;
   std::vector<char> send_, receive_;
   std::vector<MPI_Request> requests_;
