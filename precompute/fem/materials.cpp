@@ -3,26 +3,34 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <set>
 
 #include "precompute/fem/element.hpp"
 #include "precompute/petsc/session.hpp"
+#include "runtime/config/error.hpp"
 
 namespace carillon::fem {
 namespace {
 
 /// The regions of all ranks, ascending. Collective.
 std::vector<std::int32_t> find_regions(MPI_Comm comm, const LocalMesh& local) {
-  const std::set<std::int32_t> own(local.region.begin(), local.region.end());
-  const std::vector<std::int32_t> sent(own.begin(), own.end());
+  std::vector<std::int32_t> sent;
+  petsc::run_agreed(comm, [&] {
+    if (local.region.size() != static_cast<std::size_t>(local.tet_count()))
+      throw SystemError(fmt::format("{} tetrahedra came with {} region tags", local.tet_count(), local.region.size()));
+    const std::set<std::int32_t> own(local.region.begin(), local.region.end());
+    sent.assign(own.begin(), own.end());
+  });
   int ranks = 1;
   MPI_Comm_size(comm, &ranks);
   std::vector<int> counts(ranks), at(ranks + 1, 0);
   const int count = static_cast<int>(sent.size());
   MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
   std::partial_sum(counts.begin(), counts.end(), at.begin() + 1);
-  std::vector<std::int32_t> all(at.back());
+  std::vector<std::int32_t> all;
+  petsc::run_agreed(comm, [&] { all.resize(at.back()); });
   MPI_Allgatherv(sent.data(), count, MPI_INT32_T, all.data(), counts.data(), at.data(), MPI_INT32_T, comm);
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
@@ -31,18 +39,26 @@ std::vector<std::int32_t> find_regions(MPI_Comm comm, const LocalMesh& local) {
 
 /// Rank 0's names on every rank. Collective.
 std::map<std::int32_t, std::string> share_names(MPI_Comm comm, const std::map<std::int32_t, std::string>& names) {
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
   std::string text;
-  for (const auto& [tag, name] : names) text += fmt::format("{} {}", tag, name) + '\0';
-  auto size = static_cast<std::int64_t>(text.size());
-  MPI_Bcast(&size, 1, MPI_INT64_T, 0, comm);
-  text.resize(size);
-  MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, 0, comm);
+  petsc::run_agreed(comm, [&] {
+    if (rank != 0) return;
+    for (const auto& [tag, name] : names) text += fmt::format("{} {}", tag, name) + '\0';
+    if (text.size() > std::numeric_limits<int>::max()) throw InputError("the names of the mesh's regions are longer than 2 GB in all");
+  });
+  auto size = static_cast<int>(text.size());
+  MPI_Bcast(&size, 1, MPI_INT, 0, comm);
+  petsc::run_agreed(comm, [&] { text.resize(size); });
+  MPI_Bcast(text.data(), size, MPI_CHAR, 0, comm);
   std::map<std::int32_t, std::string> shared;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = text.find('\0', begin), blank = text.find(' ', begin);
-    shared[std::stoi(text.substr(begin, blank - begin))] = text.substr(blank + 1, end - blank - 1);
-    begin = end + 1;
-  }
+  petsc::run_agreed(comm, [&] {
+    for (std::size_t begin = 0; begin < text.size();) {
+      const std::size_t end = text.find('\0', begin), blank = text.find(' ', begin);
+      shared[std::stoi(text.substr(begin, blank - begin))] = text.substr(blank + 1, end - blank - 1);
+      begin = end + 1;
+    }
+  });
   return shared;
 }
 
@@ -105,9 +121,11 @@ Materials find_materials(MPI_Comm comm, const LocalMesh& local, const spec::JobS
   const std::vector<std::int32_t> regions = find_regions(comm, local);
   const auto names = share_names(comm, region_names);
   Materials materials;
-  const auto place = match(regions, names, job, materials);  // of what every rank knows alike, so all throw or none
-  materials.of_tet.reserve(local.tet_count());
-  for (const std::int32_t tag : local.region) materials.of_tet.push_back(place.at(tag));
+  petsc::run_agreed(comm, [&] {
+    const auto place = match(regions, names, job, materials);
+    materials.of_tet.reserve(local.tet_count());
+    for (const std::int32_t tag : local.region) materials.of_tet.push_back(place.at(tag));
+  });
   return materials;
 }
 

@@ -28,7 +28,8 @@ struct Materials {
 /// Finds the material of every tetrahedron from its region in the mesh. `region_names` (read on rank 0 only) are names of the mesh's
 /// region tags; a job may use the tag or the name. Materials that no tetrahedron has are errors, so all of the list are used.
 /// Collective. Throws InputError on every rank, naming the job's line and the regions there are: a region that the job names and the mesh
-/// does not have; one that the job names twice, by tag and by name; one without material.
+/// does not have; one that the job names twice, by tag and by name; one without material. SystemError on every rank when memory runs out on
+/// one, or its tetrahedra lack region tags.
 Materials find_materials(MPI_Comm comm, const LocalMesh& local, const spec::JobSpec& job,
                          const std::map<std::int32_t, std::string>& region_names = {});
 

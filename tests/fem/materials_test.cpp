@@ -94,6 +94,22 @@ TEST(MaterialsByRegion, that_name_a_region_twice_are_refused) {
                  "has a material already");
 }
 
+TEST(MaterialsByRegion, fail_on_every_rank_with_the_words_of_the_one_that_lacks_tags) {
+  Distribution pieces = distribute_halves(1);
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(kWorld, &rank);
+  MPI_Comm_size(kWorld, &ranks);
+  const auto job = parse("\"materials\": {\"7\": " + isotropic(1) + ", \"9\": " + isotropic(1) + "}");
+  if (rank == ranks - 1) pieces.local.region.resize(1);
+  try {
+    find_materials(kWorld, pieces.local, job);
+    FAIL() << "accepted";
+  } catch (const SystemError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("with 1 region tags"));
+  }
+  MPI_Barrier(kWorld);  // nobody is left waiting in another collective
+}
+
 /// Fills a (3n, fields) dense matrix with fields of the positions.
 petsc::MatHandle sample(const LocalMesh& local, const std::vector<std::function<Vec3(const Vec3&)>>& fields) {
   petsc::MatHandle shapes;
