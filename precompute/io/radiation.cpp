@@ -12,22 +12,16 @@
 #include <compare>
 #include <map>
 #include <numbers>
-#include <numeric>
+
+#include "precompute/mesh/faces.hpp"
 
 namespace carillon::io {
 namespace {
 
 /// Per triangle the smallest triangle that it is connected with through edges.
 std::vector<std::size_t> find_shells(const std::vector<Triangle>& triangles) {
-  std::vector<std::size_t> parent(triangles.size());
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
-  const auto root = [&](std::size_t t) {
-    while (parent[t] != t) t = parent[t] = parent[parent[t]];
-    return t;
-  };
   struct Edge {
-    std::int32_t low, high;
-    std::size_t triangle;
+    std::int32_t low, high, triangle;
     auto operator<=>(const Edge&) const = default;
   };
   std::vector<Edge> edges;
@@ -35,16 +29,15 @@ std::vector<std::size_t> find_shells(const std::vector<Triangle>& triangles) {
   for (std::size_t t = 0; t < triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
       const auto [low, high] = std::minmax(triangles[t][i], triangles[t][(i + 1) % 3]);
-      edges.push_back({low, high, t});
+      edges.push_back({low, high, static_cast<std::int32_t>(t)});
     }
   std::sort(edges.begin(), edges.end());
-  for (std::size_t i = 1; i < edges.size(); ++i) {
-    if (edges[i].low != edges[i - 1].low || edges[i].high != edges[i - 1].high) continue;
-    const std::size_t a = root(edges[i].triangle), b = root(edges[i - 1].triangle);
-    parent[std::max(a, b)] = std::min(a, b);
-  }
-  for (std::size_t t = 0; t < triangles.size(); ++t) parent[t] = root(t);
-  return parent;
+  mesh::Parts parts(triangles.size());
+  for (std::size_t i = 1; i < edges.size(); ++i)
+    if (edges[i].low == edges[i - 1].low && edges[i].high == edges[i - 1].high) parts.join(edges[i].triangle, edges[i - 1].triangle);
+  std::vector<std::size_t> shell(triangles.size());
+  for (std::size_t t = 0; t < triangles.size(); ++t) shell[t] = static_cast<std::size_t>(parts.find(static_cast<std::int32_t>(t)));
+  return shell;
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t
 /// The edge between the local corners i and j, as an index into kEdges.
 int find_edge(int i, int j);
 
-/// Nodes joined to parts; find() is cheap through path halving.
+/// Things joined to parts (nodes, triangles); find() is cheap through path halving.
 class Parts {
  public:
   explicit Parts(std::size_t count) : parent_(count) {
