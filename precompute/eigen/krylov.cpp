@@ -12,6 +12,7 @@
 
 #include "precompute/eigen/block_lanczos.hpp"
 #include "precompute/eigen/local_columns.hpp"
+#include "precompute/eigen/solver_options.hpp"
 #include "precompute/petsc/guard.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
@@ -108,6 +109,12 @@ PetscErrorCode calc_error(EPS, PetscScalar theta, PetscScalar, PetscReal residua
   return 0;
 }
 
+// Of K x - lambda M x: relative to what is not small against the shift, or the rounding of K x would let the lowest modes never converge.
+PetscErrorCode calc_error_of_pair(EPS, PetscScalar lambda, PetscScalar, PetscReal residual, PetscReal* error, void* context) {
+  *error = residual / std::max(std::abs(lambda), std::abs(static_cast<const KrylovRequest*>(context)->sigma));
+  return 0;
+}
+
 // A number in (-1/2, 1/2) from a position and two more numbers.
 double make_noise(const Vec3& x, std::uint64_t a, std::uint64_t b) {
   std::uint64_t state = a * 0x9E3779B97F4A7C15ull + b * 0xD1B54A32D192ED03ull;
@@ -134,20 +141,29 @@ void set_starting_block(EPS eps, const KrylovRequest& request) {
   check(EPSSetInitialSpace(eps, static_cast<PetscInt>(plain.size()), plain.data()));
 }
 
-// The shift-invert operator around the factor at hand.
-void set_operator(EPS eps, const KrylovRequest& request, ShellContext& shell, Mat mass) {
+// The factor at hand as the operator's inverse, or as a preconditioner.
+void set_operator(EPS eps, const KrylovRequest& request, Family family, ShellContext& shell, Mat mass) {
   ST st = nullptr;
   KSP ksp = nullptr;
   PC pc = nullptr;
-  check(EPSSetOperators(eps, request.stiffness, mass));
+  check(EPSSetOperators(eps, request.stiffness, family == Family::dense ? request.mass : mass));
   check(EPSSetProblemType(eps, EPS_GHEP));
   check(EPSSetTarget(eps, request.sigma));
   check(EPSGetST(eps, &st));
-  check(STSetType(st, STSINVERT));
+  if (family == Family::dense) return check(STSetType(st, STSHIFT));
+  check(STSetType(st, family == Family::davidson ? STPRECOND : STSINVERT));
   check(STSetShift(st, request.sigma));
   check(STSetMatMode(st, ST_MATMODE_SHELL));  // K - sigma M itself is formed where it is factorised.
   check(STGetKSP(st, &ksp));
-  check(KSPSetType(ksp, KSPPREONLY));
+  PetscBool is_jd = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), EPSJD, &is_jd));
+  if (is_jd == PETSC_TRUE) {
+    check(STPrecondSetKSPHasMat(st, PETSC_TRUE));
+    check(KSPSetType(ksp, KSPBCGSL));
+    check(KSPSetTolerances(ksp, 1e-4, PETSC_DEFAULT, PETSC_DEFAULT, 90));
+  } else {
+    check(KSPSetType(ksp, KSPPREONLY));
+  }
   check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, PCSHELL));
   check(PCShellSetContext(pc, &shell));
@@ -156,15 +172,13 @@ void set_operator(EPS eps, const KrylovRequest& request, ShellContext& shell, Ma
 }
 
 // Sizes for the type that the options left: the block method seeks the interval, the others what is nearest.
-void set_goal(EPS eps, const KrylovRequest& request) {
+void set_goal(EPS eps, const KrylovRequest& request, Family family) {
   PetscInt n = 0;
   PetscInt locked = 0;
   check(MatGetSize(request.stiffness, &n, nullptr));
   if (request.locked != nullptr) check(MatGetSize(request.locked, nullptr, &locked));
   const PetscInt room = n - locked;
-  PetscBool is_block = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_block));
-  if (is_block == PETSC_TRUE) {
+  if (family == Family::block) {
     const PetscInt wanted = std::min(request.count, room);
     check(EPSSetWhichEigenpairs(eps, EPS_ALL));
     check(EPSSetInterval(eps, request.low, request.high));
@@ -173,10 +187,18 @@ void set_goal(EPS eps, const KrylovRequest& request) {
   }
   // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the
   // modes on both sides of it and needs less.
-  const PetscInt wanted = std::min(request.nearest, room);
-  const PetscInt ncv = std::min(room, wanted + (request.sigma > 0 ? wanted / 2 : wanted) + 30);
+  const bool meets_locked = family == Family::plain;
+  const PetscInt wanted = meets_locked ? std::min(request.nearest + locked, n) : std::min(request.nearest, room);
+  const PetscInt ncv = std::min(meets_locked ? n : room, wanted + (request.sigma > 0 ? wanted / 2 : wanted) + 30);
+  PetscBool has_ncv = PETSC_FALSE;  // Where the user sizes the basis, or its part in use, the other follows as SLEPc does it.
+  PetscBool has_mpd = PETSC_FALSE;
+  check(PetscOptionsHasName(nullptr, nullptr, "-eps_ncv", &has_ncv));
+  check(PetscOptionsHasName(nullptr, nullptr, "-eps_mpd", &has_mpd));
+  const bool is_sized = has_ncv == PETSC_TRUE || has_mpd == PETSC_TRUE;
   check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  check(EPSSetDimensions(eps, wanted, ncv, ncv));
+  check(EPSSetDimensions(eps, wanted, is_sized ? PETSC_DEFAULT : ncv, family == Family::krylov && !is_sized ? ncv : PETSC_DEFAULT));
+  // Without an end to its steps a search for what it cannot find takes hours.
+  if (family == Family::davidson) check(EPSSetTolerances(eps, PETSC_DEFAULT, 50 * wanted + 200));
 }
 
 // For the types that know no locked columns.
@@ -196,6 +218,22 @@ void set_deflation_space(EPS eps, const KrylovRequest& request) {
     plain.push_back(vector);
   }
   check(EPSSetDeflationSpace(eps, count, plain.data()));
+}
+
+// For the types that know neither: takes the locked columns out of a vector. False if most of it goes with them: it is one of them.
+bool clear_of_locked(const KrylovRequest& request, Vec shape) {
+  if (request.locked == nullptr) return true;
+  petsc::VecHandle image, parts;
+  check(MatCreateVecs(request.locked, parts.out(), image.out()));
+  check(MatMult(request.mass, shape, image));
+  check(MatMultTranspose(request.locked, image, parts));
+  PetscReal known = 0;
+  check(VecNorm(parts, NORM_2, &known));
+  if (known * known > 0.5) return false;
+  check(VecScale(parts, -1));
+  check(MatMultAdd(request.locked, parts, shape, shape));
+  check(VecScale(shape, 1 / std::sqrt(1 - known * known)));
+  return true;
 }
 
 }  // namespace
@@ -221,7 +259,7 @@ void FoundModes::reset(Mat stiffness, PetscInt capacity) {
   columns_ = make_columns(capacity);
 }
 
-void FoundModes::add(EPS eps, PetscInt i, double eigenvalue) {
+void FoundModes::add(Vec shape, double eigenvalue) {
   const auto count = static_cast<PetscInt>(lambda.size());
   if (count == capacity_) {
     capacity_ = capacity_ + capacity_ / 8 + 8;
@@ -235,7 +273,7 @@ void FoundModes::add(EPS eps, PetscInt i, double eigenvalue) {
   }
   Vec column = nullptr;
   check(MatDenseGetColumnVecWrite(columns_, count, &column));
-  check(EPSGetEigenvector(eps, i, column, nullptr));
+  check(VecCopy(shape, column));
   check(MatDenseRestoreColumnVecWrite(columns_, count, &column));
   lambda.push_back(eigenvalue);
 }
@@ -289,36 +327,43 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   const petsc::MatHandle mass = make_mass_shell(request);
   petsc::EpsHandle eps;
   check(EPSCreate(comm, eps.out()));
-  set_operator(eps, request, shell, mass);
   check(EPSSetType(eps, request.method == Method::kKrylovSchur ? EPSKRYLOVSCHUR : kBlockLanczosType));
-  check(set_block_size(eps, kBlock));
-  check(EPSSetTolerances(eps, request.tolerance, PETSC_DEFAULT));
-  check(EPSSetPurify(eps, PETSC_FALSE));
-  check(EPSSetConvergenceTestFunction(eps, calc_error, const_cast<KrylovRequest*>(&request), nullptr));
   std::string type(128, '\0');
-  PetscBool is_chosen = PETSC_FALSE;  // The goal depends on the type, and options may change either.
+  PetscBool is_chosen = PETSC_FALSE;  // What follows depends on the type, and options may change either.
   check(PetscOptionsGetString(nullptr, nullptr, "-eps_type", type.data(), type.size(), &is_chosen));
   if (is_chosen == PETSC_TRUE) check(EPSSetType(eps, type.c_str()));
-  set_goal(eps, request);
+  const Family family = find_family(eps);
+  set_operator(eps, request, family, shell, mass);
+  check(set_block_size(eps, kBlock));
+  check(EPSLanczosSetReorthog(eps, EPS_LANCZOS_REORTHOG_FULL));
+  check(EPSSetTolerances(eps, request.tolerance, PETSC_DEFAULT));
+  check(EPSSetPurify(eps, PETSC_FALSE));
+  if (family == Family::block || family == Family::krylov)
+    check(EPSSetConvergenceTestFunction(eps, calc_error, const_cast<KrylovRequest*>(&request), nullptr));
+  if (family == Family::davidson)
+    check(EPSSetConvergenceTestFunction(eps, calc_error_of_pair, const_cast<KrylovRequest*>(&request), nullptr));
+  set_goal(eps, request, family);
   check(EPSSetFromOptions(eps));
-  PetscBool is_block = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps.get()), kBlockLanczosType, &is_block));
-  if (is_block == PETSC_TRUE) {
+  if (family == Family::block) {
     check(set_locked(eps, request.locked));
     set_starting_block(eps, request);
-  } else {
+  } else if (family == Family::krylov || family == Family::davidson) {
     set_deflation_space(eps, request);
   }
   if (request.progress) check(EPSMonitorSet(eps, report_progress, const_cast<KrylovRequest*>(&request), nullptr));
 
   check(EPSSolve(eps));
 
+  petsc::VecHandle shape;
+  check(MatCreateVecs(request.stiffness, shape.out(), nullptr));
   PetscInt converged = 0;
   check(EPSGetConverged(eps, &converged));
   for (PetscInt i = 0; i < converged; ++i) {
     PetscScalar lambda = 0;
-    check(EPSGetEigenvalue(eps, i, &lambda, nullptr));
-    if (lambda >= request.low && lambda <= request.high) found.add(eps, i, lambda);
+    check(EPSGetEigenpair(eps, i, &lambda, nullptr, shape, nullptr));
+    if (lambda < request.low || lambda > request.high) continue;
+    if ((family == Family::plain || family == Family::dense) && !clear_of_locked(request, shape)) continue;
+    found.add(shape, lambda);
   }
   return shell.statistics;
 }

@@ -18,8 +18,8 @@ class FoundModes {
  public:
   /// Forgets all modes and makes room for `capacity` with K's rows. Collective.
   void reset(Mat stiffness, PetscInt capacity);
-  /// Copies pair i of a solved eigensolver. Collective.
-  void add(EPS eps, PetscInt i, double eigenvalue);
+  /// Copies a pair. Collective.
+  void add(Vec shape, double eigenvalue);
   /// The modes with low < lambda < high and the other vectors in a matrix of their own; null if there are none. Collective.
   petsc::MatHandle copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const;
   /// The columns by the order given, and nothing else; this object is empty afterwards. Collective.

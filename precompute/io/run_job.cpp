@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/eigen/solver_options.hpp"
 #include "precompute/io/accuracy.hpp"
 #include "precompute/io/bank_content.hpp"
 #include "precompute/io/body.hpp"
@@ -41,6 +42,7 @@ spec::JobSpec read_shared_job(const Run& run, const fs::path& file) {
 
 void check_job(const Run& run) {
   petsc::run_agreed(run.comm, [&] {
+    eigen::check_solver_options();
     if (run.ranks > 1 && run.job.factorisation == spec::Factorisation::cholmod) {
       throw InputError(
           fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",

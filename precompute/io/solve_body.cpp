@@ -3,11 +3,13 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <optional>
 #include <utility>
 
+#include "precompute/eigen/solver_options.hpp"
 #include "precompute/fem/energy.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
@@ -90,6 +92,7 @@ eigen::Method find_method(spec::Method wanted) {
 
 /// Said before anything is assembled.
 void check_method(const Run& run, std::int64_t unknowns) {
+  eigen::check_solver_options(petsc::to_petsc_int(unknowns));
   if (run.job.method != spec::Method::dense || unknowns <= eigen::kMostDenseUnknowns) return;
   throw InputError(fmt::format("{}: \"solver.method\": \"dense\" solves up to {} unknowns, and the body has {}; take \"automatic\"",
                                run.job.file.string(), eigen::kMostDenseUnknowns, unknowns));
@@ -112,6 +115,31 @@ eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, 
                                modes.factor.solver));
   run.stations.end();
   return modes;
+}
+
+/// The words of PETSc and SLEPc that the user gave and that may change what is found.
+std::string list_changes(const Run& run) {
+  std::string text;
+  bool counts = false;
+  for (const std::string& word : run.solver_options) {
+    const bool is_name = word.size() > 1 && word[0] == '-' && std::isdigit(static_cast<unsigned char>(word[1])) == 0;
+    if (is_name) counts = word.find("_view") == std::string::npos && word.find("_monitor") == std::string::npos;
+    if (counts) text += (text.empty() ? "" : " ") + word;
+  }
+  return text;
+}
+
+/// A solve that fails under the user's options fails by them, for all that is known; the body has no part in the message.
+eigen::Modes solve_named(Run& run, const Setting& setting, const Body& body, const fem::System& system, eigen::NodeLayout layout) {
+  const std::string changes = list_changes(run);
+  const auto step = [&] { return solve(run, setting, system, std::move(layout)); };
+  if (changes.empty()) return name_errors(body.source, run, step);
+  try {
+    return step();
+  } catch (const SolveError& error) {
+    throw InputError(
+        fmt::format("the solve failed under the solver options \"{}\": {} Without the options it may not.", changes, error.what()));
+  }
 }
 
 estimate::ErrorBars calc_bars(Run& run, const Body& body, const fem::System& system, const SolvedBody& solved) {
@@ -154,7 +182,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   }
   run.stations.end();
 
-  solved.modes = name_errors(body.source, run, [&] { return solve(run, setting, system, make_layout(body.pieces)); });
+  solved.modes = solve_named(run, setting, body, system, make_layout(body.pieces));
   warn_of_oddities(run, solved.modes);
 
   run.stations.begin("errors", "error bars and decays");

@@ -109,7 +109,8 @@ std::vector<std::string> find_unused_options() {
   check(PetscOptionsLeftGet(nullptr, &count, &names, &values));
   for (PetscInt i = 0; i < count; ++i) {
     const std::string name = names[i];
-    if (name != "skip_petscrc" && name != "no_signal_handler") unused.push_back("-" + name);
+    const bool is_read_later = name == "options_left" || name == "memory_view" || name == "malloc_dump";
+    if (name != "skip_petscrc" && name != "no_signal_handler" && !is_read_later) unused.push_back("-" + name);
   }
   check(PetscOptionsLeftRestore(nullptr, &count, &names, &values));
   return unused;
