@@ -1,5 +1,6 @@
-// Method:     The rows are taken in panels that stay in the cache. A panel of the narrow block is packed once; the wide block streams past
-//             it and is read from memory once per call. Sums and coefficients live in registers (6 x 4 and 4 x 4 tiles).
+// Method:     The narrow block is packed, a panel of rows at a time that stays in the second-level cache; the wide block streams past it, a
+//             few columns at a time, in strips that stay in the first level and are called from memory one strip ahead. Sums and
+//             coefficients live in registers (6 x 4 tiles).
 // Source:     Goto, van de Geijn, Anatomy of high-performance matrix multiplication, ACM TOMS 34(3), 2008 (panels, register tiles).
 // Deviations: the wide block is not packed: it is used once, and packing it costs BLAS half its speed for 16 columns (figures:
 //             docs/decisions/block-lanczos.md). Processors without AVX-512 use BLAS on the same panels.
@@ -20,10 +21,13 @@ extern "C" void dgemm_(const char* transpose_a, const char* transpose_b, const i
 namespace carillon::eigen {
 namespace {
 
-constexpr std::ptrdiff_t kRowsTransposed = 1024;  // of a panel for A^T B: 16 columns of B take an eighth of the second-level cache
-constexpr std::ptrdiff_t kRowsProduct = 512;      // of a panel for B - A S
+constexpr std::ptrdiff_t kRowsTransposed = 4096;  // of a panel for A^T B: 16 columns of B are half a megabyte
+constexpr std::ptrdiff_t kStripTransposed = 256;  // of a strip of it
+constexpr std::ptrdiff_t kRowsProduct = 2048;     // of a panel for B - A S, which is written too
+constexpr std::ptrdiff_t kStripProduct = 128;     // of a strip of it
 constexpr std::ptrdiff_t kRowsCombined = 256;     // of a panel for A S
 constexpr int kTile = 4;                          // columns of the narrow block in registers
+constexpr int kWide = 6;                          // columns of the wide block with them
 
 int round_up(int n, int to) { return (n + to - 1) / to * to; }
 
@@ -43,18 +47,35 @@ bool has_avx512() {
   return has;
 }
 
-// c (kCount x 4) += a^T b over `rows`, any number; b is packed: aligned, zero beyond the rows.
+// Loops over what shall stay in registers are unrolled, all of them: one that is not sends the others' values through memory.
+
+// What a tile calls from memory while it works: the same rows of some columns of the wide block, one strip ahead.
+struct Ahead {
+  const double* first = nullptr;
+  int columns = 0;
+};
+
+// The share that tile `j` of `tiles` has in calling the next strip of columns [i, i + wide).
+Ahead find_ahead(const Columns& a, int i, int wide, std::ptrdiff_t row, int j, int tiles) {
+  const int from = j * wide / tiles;
+  return {a.column(i + from) + row, (j + 1) * wide / tiles - from};
+}
+
+// sum (kCount x 4 vectors of lanes) += a^T b over `rows`, any number; b is packed: aligned, zero beyond the rows.
 template <int kCount>
 CARILLON_AVX512 void add_transposed_tile(const double* a, std::ptrdiff_t lda, const double* b, std::ptrdiff_t ldb, std::ptrdiff_t rows,
-                                         double* c, std::ptrdiff_t ldc) {
+                                         double* lanes, Ahead ahead) {
   __m512d sum[kCount][kTile];
-  for (auto& row : sum) {
-    for (__m512d& s : row) s = _mm512_setzero_pd();
+#pragma GCC unroll 6
+  for (int i = 0; i < kCount; ++i) {
+#pragma GCC unroll 4
+    for (int j = 0; j < kTile; ++j) sum[i][j] = _mm512_load_pd(lanes + 8 * (i * kTile + j));
   }
   for (std::ptrdiff_t r = 0; r < rows; r += 8) {
     const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
     const __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
     const __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
+    for (int i = 0; i < ahead.columns; ++i) _mm_prefetch(reinterpret_cast<const char*>(ahead.first + i * lda + r), _MM_HINT_T0);
 #pragma GCC unroll 6
     for (int i = 0; i < kCount; ++i) {
       const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
@@ -64,28 +85,29 @@ CARILLON_AVX512 void add_transposed_tile(const double* a, std::ptrdiff_t lda, co
       sum[i][3] = _mm512_fmadd_pd(x, b3, sum[i][3]);
     }
   }
-  for (int j = 0; j < kTile; ++j) {
-    for (int i = 0; i < kCount; ++i) {
-      alignas(64) double lanes[8];
-      _mm512_store_pd(lanes, sum[i][j]);
-      c[j * ldc + i] += ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]));
-    }
+#pragma GCC unroll 6
+  for (int i = 0; i < kCount; ++i) {
+#pragma GCC unroll 4
+    for (int j = 0; j < kTile; ++j) _mm512_store_pd(lanes + 8 * (i * kTile + j), sum[i][j]);
   }
 }
 
 // b (rows x 4, packed) -= a (rows x kCount) s (kCount x 4).
 template <int kCount>
 CARILLON_AVX512 void subtract_tile(const double* a, std::ptrdiff_t lda, const double* s, std::ptrdiff_t lds, double* b, std::ptrdiff_t ldb,
-                                   std::ptrdiff_t rows) {
+                                   std::ptrdiff_t rows, Ahead ahead) {
   __m512d c[kCount][kTile];
-  for (int j = 0; j < kTile; ++j) {
-    for (int i = 0; i < kCount; ++i) c[i][j] = _mm512_set1_pd(s[j * lds + i]);
+#pragma GCC unroll 6
+  for (int i = 0; i < kCount; ++i) {
+#pragma GCC unroll 4
+    for (int j = 0; j < kTile; ++j) c[i][j] = _mm512_set1_pd(s[j * lds + i]);
   }
   for (std::ptrdiff_t r = 0; r < rows; r += 8) {
     const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
     __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
     __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
-#pragma GCC unroll 4
+    for (int i = 0; i < ahead.columns; ++i) _mm_prefetch(reinterpret_cast<const char*>(ahead.first + i * lda + r), _MM_HINT_T0);
+#pragma GCC unroll 6
     for (int i = 0; i < kCount; ++i) {
       const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
       b0 = _mm512_fnmadd_pd(x, c[i][0], b0);
@@ -100,8 +122,8 @@ CARILLON_AVX512 void subtract_tile(const double* a, std::ptrdiff_t lda, const do
   }
 }
 
-using TransposedTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, std::ptrdiff_t, double*, std::ptrdiff_t);
-using SubtractTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, double*, std::ptrdiff_t, std::ptrdiff_t);
+using TransposedTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, std::ptrdiff_t, double*, Ahead);
+using SubtractTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, double*, std::ptrdiff_t, std::ptrdiff_t, Ahead);
 constexpr TransposedTile kTransposedTile[] = {nullptr,
                                               add_transposed_tile<1>,
                                               add_transposed_tile<2>,
@@ -109,7 +131,8 @@ constexpr TransposedTile kTransposedTile[] = {nullptr,
                                               add_transposed_tile<4>,
                                               add_transposed_tile<5>,
                                               add_transposed_tile<6>};
-constexpr SubtractTile kSubtractTile[] = {nullptr, subtract_tile<1>, subtract_tile<2>, subtract_tile<3>, subtract_tile<4>};
+constexpr SubtractTile kSubtractTile[] = {nullptr,          subtract_tile<1>, subtract_tile<2>, subtract_tile<3>,
+                                          subtract_tile<4>, subtract_tile<5>, subtract_tile<6>};
 
 // Panels of columns, on cache lines, zero beyond the rows and columns that are filled.
 class PackedPanel {
@@ -141,27 +164,38 @@ class PackedPanel {
 };
 
 void multiply_transposed_avx512(const Columns& a, const Columns& b, double* small, int small_stride) {
-  const int padded_columns = round_up(b.count, kTile);
-  std::vector<double> sums(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(padded_columns), 0.0);
+  constexpr int kLanes = 8 * kWide * kTile;  // of one tile's sums
+  const int tiles = round_up(b.count, kTile) / kTile;
+  for (int j = 0; j < b.count; ++j) std::fill_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count, 0.0);
   PackedPanel panel(kRowsTransposed, b.count);
+  PackedPanel sums(kLanes, tiles);
   for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsTransposed) {
     const std::ptrdiff_t rows = std::min(kRowsTransposed, a.rows - first);
     panel.load(b, first, rows);
-    for (int i = 0; i < a.count; i += 6) {
-      const TransposedTile tile = kTransposedTile[std::min(6, a.count - i)];
-      for (int j = 0; j < padded_columns; j += kTile) {
-        tile(a.column(i) + first, a.stride, panel.get() + j * panel.stride(), panel.stride(), rows,
-             sums.data() + static_cast<std::ptrdiff_t>(j) * a.count + i, a.count);
+    for (int i = 0; i < a.count; i += kWide) {
+      const int wide = std::min(kWide, a.count - i);
+      std::fill_n(sums.get(), static_cast<std::ptrdiff_t>(tiles) * kLanes, 0.0);
+      for (std::ptrdiff_t r = 0; r < rows; r += kStripTransposed) {
+        const std::ptrdiff_t strip = std::min(kStripTransposed, rows - r);
+        for (int j = 0; j < tiles; ++j) {
+          kTransposedTile[wide](a.column(i) + first + r, a.stride, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip,
+                                sums.get() + j * kLanes, find_ahead(a, i, wide, first + r + kStripTransposed, j, tiles));
+        }
+      }
+      for (int j = 0; j < b.count; ++j) {
+        for (int k = 0; k < wide; ++k) {
+          const double* lane = sums.get() + (j / kTile) * kLanes + 8 * (k * kTile + j % kTile);
+          small[static_cast<std::ptrdiff_t>(j) * small_stride + i + k] +=
+              ((lane[0] + lane[4]) + (lane[1] + lane[5])) + ((lane[2] + lane[6]) + (lane[3] + lane[7]));
+        }
       }
     }
   }
-  for (int j = 0; j < b.count; ++j)
-    std::copy_n(sums.data() + static_cast<std::ptrdiff_t>(j) * a.count, a.count, small + static_cast<std::ptrdiff_t>(j) * small_stride);
 }
 
 void subtract_product_avx512(const Columns& a, const double* small, int small_stride, const Columns& b) {
-  const int padded_columns = round_up(b.count, kTile);
-  std::vector<double> coefficients(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(padded_columns), 0.0);
+  const int tiles = round_up(b.count, kTile) / kTile;
+  std::vector<double> coefficients(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(tiles * kTile), 0.0);
   for (int j = 0; j < b.count; ++j)
     std::copy_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count,
                 coefficients.data() + static_cast<std::ptrdiff_t>(j) * a.count);
@@ -169,16 +203,21 @@ void subtract_product_avx512(const Columns& a, const double* small, int small_st
   for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsProduct) {
     const std::ptrdiff_t rows = std::min(kRowsProduct, a.rows - first);
     panel.load(b, first, rows);
-    for (int i = 0; i < a.count; i += 4) {
-      const SubtractTile tile = kSubtractTile[std::min(4, a.count - i)];
-      for (int j = 0; j < padded_columns; j += kTile) {
-        tile(a.column(i) + first, a.stride, coefficients.data() + static_cast<std::ptrdiff_t>(j) * a.count + i, a.count,
-             panel.get() + j * panel.stride(), panel.stride(), rows);
+    for (int i = 0; i < a.count; i += kWide) {
+      const int wide = std::min(kWide, a.count - i);
+      for (std::ptrdiff_t r = 0; r < rows; r += kStripProduct) {
+        const std::ptrdiff_t strip = std::min(kStripProduct, rows - r);
+        for (int j = 0; j < tiles; ++j) {
+          kSubtractTile[wide](a.column(i) + first + r, a.stride, coefficients.data() + static_cast<std::ptrdiff_t>(j * kTile) * a.count + i,
+                              a.count, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip,
+                              find_ahead(a, i, wide, first + r + kStripProduct, j, tiles));
+        }
       }
     }
     panel.store(b, first, rows);
   }
 }
+
 constexpr int kRowTile = 24;    // rows and
 constexpr int kColumnTile = 8;  // columns of A S in registers
 constexpr int kStripTiles = 4;  // row tiles that share a packed tile of S in the first-level cache
@@ -186,8 +225,10 @@ constexpr int kStripTiles = 4;  // row tiles that share a packed tile of S in th
 // c (24 x 8) = a s; a: packed (count x 24), s: packed (count x 8). Stores `columns` columns of `rows` rows.
 CARILLON_AVX512 void combine_tile(const double* a, const double* s, int count, double* c, std::ptrdiff_t ldc, int rows, int columns) {
   __m512d sum[3][kColumnTile];
-  for (auto& row : sum) {
-    for (__m512d& x : row) x = _mm512_setzero_pd();
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 8
+    for (int j = 0; j < kColumnTile; ++j) sum[i][j] = _mm512_setzero_pd();
   }
   for (int k = 0; k < count; ++k) {
     const __m512d a0 = _mm512_loadu_pd(a + k * kRowTile), a1 = _mm512_loadu_pd(a + k * kRowTile + 8),
@@ -200,10 +241,14 @@ CARILLON_AVX512 void combine_tile(const double* a, const double* s, int count, d
       sum[2][j] = _mm512_fmadd_pd(a2, x, sum[2][j]);
     }
   }
+#pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
     const int left = std::clamp(rows - 8 * i, 0, 8);
     const auto mask = static_cast<__mmask8>((1 << left) - 1);
-    for (int j = 0; j < columns; ++j) _mm512_mask_storeu_pd(c + j * ldc + 8 * i, mask, sum[i][j]);
+#pragma GCC unroll 8
+    for (int j = 0; j < kColumnTile; ++j) {
+      if (j < columns) _mm512_mask_storeu_pd(c + j * ldc + 8 * i, mask, sum[i][j]);
+    }
   }
 }
 
