@@ -59,7 +59,13 @@ System make_system(const Network& network, MPI_Comm comm) {
   const int first = count * rank / size;
   const int last = count * (rank + 1) / size;
   System system;
-  check(MatCreateAIJ(comm, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, 90, nullptr, 90, nullptr,
+  std::vector<int> neighbours(network.nodes.size(), 1);
+  for (const Spring& spring : network.springs) {
+    ++neighbours[static_cast<std::size_t>(spring.a)];
+    ++neighbours[static_cast<std::size_t>(spring.b)];
+  }
+  const int width = 3 * *std::max_element(neighbours.begin(), neighbours.end());
+  check(MatCreateAIJ(comm, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, width, nullptr, width, nullptr,
                      system.stiffness.out()));
   check(MatCreateAIJ(comm, 3 * (last - first), 3 * (last - first), PETSC_DETERMINE, PETSC_DETERMINE, 1, nullptr, 0, nullptr,
                      system.mass.out()));
