@@ -9,16 +9,29 @@ namespace carillon::ldlt {
 /// Rows of L that lie together in memory. A block of m rows and n columns is stored as tiles of kTileRows rows (the last one may be lower),
 /// each by columns: both directions of a solve then read it once from front to end.
 inline constexpr int kTileRows = 12;
+/// Rows of W = L D that lie together, by columns.
+inline constexpr int kWideRows = 16;
+/// An update matrix of r rows is stored as strips of kStripColumns columns, each in full columns from its own first row on.
+inline constexpr int kStripColumns = 96;
+static_assert(kStripColumns % kTileRows == 0);
 /// Largest order of a diagonal block.
 inline constexpr int kMaxBlock = 72;
 
-/// D and the permutation of a diagonal block B (n, n): P B P^T = L D L^T.
+/// Numbers stored of a lower triangle of order n: tiles as above, each only as far as its last row reaches.
+constexpr std::int64_t count_triangle(std::int64_t n) {
+  const std::int64_t whole = n / kTileRows;
+  const std::int64_t rest = n - whole * kTileRows;
+  return kTileRows * kTileRows * (whole * (whole + 1) / 2) + rest * n;
+}
+
+/// D and the order of the pivots of a diagonal block B (n, n): P B P^T = L D L^T.
 struct BlockPivots {
   // The inverse of D: 1x1 pivots have off[k] = 0; a 2x2 pivot at k, k + 1 has off[k] != 0 and off[k + 1] = 0.
   double diagonal[kMaxBlock];
   double off[kMaxBlock];
-  int negative = 0;     // eigenvalues of D below zero
-  double smallest = 0;  // least magnitude of an eigenvalue of D (of 2x2 pivots: a lower bound)
+  int order[kMaxBlock];  // row k of P B is row order[k] of B
+  int negative = 0;      // eigenvalues of D below zero
+  double smallest = 0;   // least magnitude of an eigenvalue of D (of 2x2 pivots: a lower bound)
 };
 
 /// Consecutive rows of a child that stay consecutive in its parent.
@@ -28,24 +41,39 @@ struct Run {
   int length = 0;
 };
 
+/// An eliminated panel of n columns, for the update behind it. Rows are those of the front.
+struct Panel {
+  const double* tiles = nullptr;  // L21 in tiles, from row `begin` on
+  const double* wide = nullptr;   // W in strips of kWideRows rows, from there too
+  int n = 0;
+  int begin = 0;
+};
+
 /// Right-hand sides are rows of 8 * vectors numbers, aligned to 64 bytes; vectors is 1 or 2.
 struct Kernels {
-  /// out (m rows) -= A in (n rows); A (m, n) in tiles.
-  void (*subtract_product)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
-  /// out (m rows) = A in.
-  void (*set_product)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
-  /// out (n rows) -= A^T in (m rows).
-  void (*subtract_transposed)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
-  /// out (n rows) += A^T in.
-  void (*add_transposed)(const double* tiles, int m, int n, int vectors, const double* in, double* out);
-  /// Factorises a symmetric block, both triangles given, columns kMaxBlock apart, by rook pivoting; replaces it by T = L^-1 P with rows
-  /// kMaxBlock apart. False if a pivot vanishes exactly or is not finite.
-  bool (*factorise_block)(double* block, int n, BlockPivots& pivots);
-  /// L = W D^-1 (m, n): W by columns m apart, L by columns `ld` apart and again in tiles. Raises growth to the largest magnitude in L.
-  void (*divide_and_pack)(const double* product, int m, int n, const BlockPivots& pivots, double* below, int ld, double* tiles,
-                          double& growth);
-  /// target[run.to + i] += source[run.from + i] for every run.
-  void (*add_runs)(const double* source, const Run* runs, int count, double* target);
+  /// X -= A in, A (m, n) in tiles; in: n rows. Of X, rows 3 nodes[i], 3 nodes[i] + 1 and 3 nodes[i] + 2 are meant for i < m / 3.
+  void (*subtract_product)(const double* tiles, int m, int n, int vectors, const double* in, const int* nodes, double* x);
+  /// out (n rows) -= A^T X.
+  void (*subtract_transposed)(const double* tiles, int m, int n, int vectors, const int* nodes, double* x, double* out);
+  /// out (n rows) = T in, T a lower triangle in tiles.
+  void (*set_triangle)(const double* tiles, int n, int vectors, const double* in, double* out);
+  /// out (n rows) += T^T in.
+  void (*add_triangle_transposed)(const double* tiles, int n, int vectors, double* in, double* out);
+  /// Factorises a symmetric block, both triangles given, columns kMaxBlock apart, by rook pivoting; overwrites it and puts L^-1 in tiles
+  /// (count_triangle). False if a pivot vanishes exactly or is not finite.
+  bool (*factorise_block)(double* block, int n, BlockPivots& pivots, double* tiles);
+  /// W = A P^T L^-T for the rows begin to end of a front, to strips of kWideRows rows. columns: (n) where row 0 of each column of A would
+  /// be, in the order of the pivots; triangle: L^-1.
+  void (*calc_wide)(const double* const* columns, int begin, int end, int n, const double* triangle, double* wide);
+  /// L = W D^-1 (m, n), strips to tiles. Raises growth to the largest magnitude in L.
+  void (*divide_wide)(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth);
+  /// C -= L W^T (or = -L W^T where the update matrix is to be made), the columns panel.begin to end of a front with `end` rows, of which
+  /// the first `pivots`, a multiple of kTileRows behind panel.begin, stand whole and the others in strips. columns: (end) where row 0 of
+  /// each column would be. What is stored above the diagonal is left undefined.
+  void (*update)(const Panel& panel, int pivots, int end, bool is_made, double* const* columns);
+  /// target[c][run.to + i] += source[c][run.from + i] for every run and three columns; in column c rows before the c-th of the first run
+  /// are left out.
+  void (*add_runs)(const double* const* source, const Run* runs, int count, double* const* target);
   const char* name;
 };
 

@@ -20,100 +20,158 @@ typedef double Vector __attribute__((vector_size(64)));
 constexpr int kAhead = 1024;
 constexpr int kLine = 8;
 
+/// The 12 rows of right-hand sides that belong to a tile: three for each of four nodes.
+template <int kStride>
+struct TileRows {
+  Vector* node[kTileRows / 3];
+  Vector& at(int row, int v) const { return node[row / 3][row % 3 * kStride + v]; }
+};
+
+/// Rows that lie together.
+template <int kStride>
+inline TileRows<kStride> find_rows(Vector* first) {
+  TileRows<kStride> rows;
+  for (int a = 0; a < kTileRows / 3; ++a) rows.node[a] = first + 3 * a * kStride;
+  return rows;
+}
+
+/// Rows of the first `count` of some nodes. Those of the next four, which come next, are called from memory.
+template <int kStride>
+inline TileRows<kStride> find_rows(double* all, const int* nodes, int count) {
+  TileRows<kStride> rows;
+  for (int a = 0; a < kTileRows / 3; ++a)
+    rows.node[a] = reinterpret_cast<Vector*>(all) + 3 * kStride * static_cast<long>(nodes[a < count ? a : 0]);
+  for (int a = kTileRows / 3; a < 2 * (kTileRows / 3) && a < count; ++a) {
+    const double* next = all + 24 * kStride * static_cast<long>(nodes[a]);
+    for (int line = 0; line < 3 * kStride; ++line) __builtin_prefetch(next + kLine * line, 1);
+  }
+  return rows;
+}
+
 template <int kHeight, int kBegin, int kCount, int kUsed, int kStride, bool kSet>
-inline void multiply_rows(const double* tile, int n, const Vector* in, Vector* out) {
+inline void multiply_rows(const double* tile, int n, const Vector* in, const TileRows<kStride>& out, int first) {
   Vector sum[kCount][kUsed];
   for (int i = 0; i < kCount; ++i)
-    for (int v = 0; v < kUsed; ++v) sum[i][v] = kSet ? Vector{} : out[(kBegin + i) * kStride + v];
+    for (int v = 0; v < kUsed; ++v) sum[i][v] = kSet ? Vector{} : out.at(kBegin + i, first + v);
   for (int k = 0; k < n; ++k) {
     Vector row[kUsed];
-    for (int v = 0; v < kUsed; ++v) row[v] = in[k * kStride + v];
+    for (int v = 0; v < kUsed; ++v) row[v] = in[k * kStride + first + v];
     const double* a = tile + k * kHeight + kBegin;
     for (int i = 0; i < kCount; i += kLine) __builtin_prefetch(a + kAhead + i);
     for (int i = 0; i < kCount; ++i)
       for (int v = 0; v < kUsed; ++v) sum[i][v] = kSet ? sum[i][v] + row[v] * a[i] : sum[i][v] - row[v] * a[i];
   }
   for (int i = 0; i < kCount; ++i)
-    for (int v = 0; v < kUsed; ++v) out[(kBegin + i) * kStride + v] = sum[i][v];
+    for (int v = 0; v < kUsed; ++v) out.at(kBegin + i, first + v) = sum[i][v];
 }
 
+/// out (-= or, with kSet, =) tile in.
 template <int kHeight, int kStride, bool kSet, int kBegin = 0>
-inline void multiply_tile(const double* tile, int n, const Vector* in, Vector* out) {
+inline void multiply_tile(const double* tile, int n, const Vector* in, const TileRows<kStride>& out) {
   if constexpr (kBegin < kHeight) {
     constexpr int kCount = kHeight - kBegin < kRows ? kHeight - kBegin : kRows;
     constexpr int kUsed = kStride < kVectors ? kStride : kVectors;
-    for (int v = 0; v < kStride; v += kUsed) multiply_rows<kHeight, kBegin, kCount, kUsed, kStride, kSet>(tile, n, in + v, out + v);
+    for (int v = 0; v < kStride; v += kUsed) multiply_rows<kHeight, kBegin, kCount, kUsed, kStride, kSet>(tile, n, in, out, v);
     multiply_tile<kHeight, kStride, kSet, kBegin + kCount>(tile, n, in, out);
   }
 }
 
-template <int kStride, bool kSet>
-void multiply(const double* tiles, int m, int n, const double* in_rows, double* out_rows) {
+template <int kStride>
+void subtract_product(const double* tiles, int m, int n, const double* in_rows, const int* nodes, double* all) {
+  const auto* in = reinterpret_cast<const Vector*>(in_rows);
+  int i = 0;
+  for (; i + kTileRows <= m; i += kTileRows, nodes += kTileRows / 3)
+    multiply_tile<kTileRows, kStride, false>(tiles + static_cast<long>(i) * n, n, in, find_rows<kStride>(all, nodes, (m - i) / 3));
+  if (i == m) return;
+  tiles += static_cast<long>(i) * n;
+  const auto out = find_rows<kStride>(all, nodes, (m - i) / 3);
+  if (m - i == 9) multiply_tile<9, kStride, false>(tiles, n, in, out);
+  if (m - i == 6) multiply_tile<6, kStride, false>(tiles, n, in, out);
+  if (m - i == 3) multiply_tile<3, kStride, false>(tiles, n, in, out);
+}
+
+template <int kStride>
+void set_triangle(const double* tiles, int n, const double* in_rows, double* out_rows) {
   const auto* in = reinterpret_cast<const Vector*>(in_rows);
   auto* out = reinterpret_cast<Vector*>(out_rows);
   int i = 0;
-  for (; i + kTileRows <= m; i += kTileRows)
-    multiply_tile<kTileRows, kStride, kSet>(tiles + static_cast<long>(i) * n, n, in, out + i * kStride);
-  tiles += static_cast<long>(i) * n;
-  out += i * kStride;
-  if (m - i == 9) multiply_tile<9, kStride, kSet>(tiles, n, in, out);
-  if (m - i == 6) multiply_tile<6, kStride, kSet>(tiles, n, in, out);
-  if (m - i == 3) multiply_tile<3, kStride, kSet>(tiles, n, in, out);
+  for (; i + kTileRows <= n; i += kTileRows, out += kTileRows * kStride) {
+    multiply_tile<kTileRows, kStride, true>(tiles, i + kTileRows, in, find_rows<kStride>(out));
+    tiles += kTileRows * (i + kTileRows);
+  }
+  if (n - i == 9) multiply_tile<9, kStride, true>(tiles, n, in, find_rows<kStride>(out));
+  if (n - i == 6) multiply_tile<6, kStride, true>(tiles, n, in, find_rows<kStride>(out));
+  if (n - i == 3) multiply_tile<3, kStride, true>(tiles, n, in, find_rows<kStride>(out));
 }
 
 template <int kHeight, int kCount, int kUsed, int kStride, bool kAdd>
-inline void multiply_columns(const double* tile, const Vector* in, Vector* out) {
+inline void multiply_columns(const double* tile, const TileRows<kStride>& in, int first, Vector* out) {
   Vector sum[kCount][kUsed];
   for (int k = 0; k < kCount; ++k)
-    for (int v = 0; v < kUsed; ++v) sum[k][v] = out[k * kStride + v];
+    for (int v = 0; v < kUsed; ++v) sum[k][v] = out[k * kStride + first + v];
   for (int i = 0; i < kHeight * kCount; i += kLine) __builtin_prefetch(tile + kAhead + i);
   for (int i = 0; i < kHeight; ++i) {
     Vector row[kUsed];
-    for (int v = 0; v < kUsed; ++v) row[v] = in[i * kStride + v];
+    for (int v = 0; v < kUsed; ++v) row[v] = in.at(i, first + v);
     const double* a = tile + i;
     for (int k = 0; k < kCount; ++k)
       for (int v = 0; v < kUsed; ++v) sum[k][v] = kAdd ? sum[k][v] + row[v] * a[k * kHeight] : sum[k][v] - row[v] * a[k * kHeight];
   }
   for (int k = 0; k < kCount; ++k)
-    for (int v = 0; v < kUsed; ++v) out[k * kStride + v] = sum[k][v];
+    for (int v = 0; v < kUsed; ++v) out[k * kStride + first + v] = sum[k][v];
 }
 
+/// out (n rows) (-= or, with kAdd, +=) tile^T in.
 template <int kHeight, int kStride, bool kAdd>
-inline void multiply_tile_transposed(const double* tile, int n, const Vector* in, Vector* out) {
+inline void multiply_tile_transposed(const double* tile, int n, const TileRows<kStride>& in, Vector* out) {
   constexpr int kUsed = kStride < kVectors ? kStride : kVectors;
   for (int v = 0; v < kStride; v += kUsed) {
     int k = 0;
-    for (; k + kRows <= n; k += kRows)
-      multiply_columns<kHeight, kRows, kUsed, kStride, kAdd>(tile + k * kHeight, in + v, out + k * kStride + v);
-    for (; k < n; k += 3) multiply_columns<kHeight, 3, kUsed, kStride, kAdd>(tile + k * kHeight, in + v, out + k * kStride + v);
+    for (; k + kRows <= n; k += kRows) multiply_columns<kHeight, kRows, kUsed, kStride, kAdd>(tile + k * kHeight, in, v, out + k * kStride);
+    for (; k < n; k += 3) multiply_columns<kHeight, 3, kUsed, kStride, kAdd>(tile + k * kHeight, in, v, out + k * kStride);
   }
 }
 
-template <int kStride, bool kAdd>
-void multiply_transposed(const double* tiles, int m, int n, const double* in_rows, double* out_rows) {
-  const auto* in = reinterpret_cast<const Vector*>(in_rows);
+template <int kStride>
+void subtract_transposed(const double* tiles, int m, int n, const int* nodes, double* all, double* out_rows) {
   auto* out = reinterpret_cast<Vector*>(out_rows);
   int i = 0;
-  for (; i + kTileRows <= m; i += kTileRows)
-    multiply_tile_transposed<kTileRows, kStride, kAdd>(tiles + static_cast<long>(i) * n, n, in + i * kStride, out);
+  for (; i + kTileRows <= m; i += kTileRows, nodes += kTileRows / 3)
+    multiply_tile_transposed<kTileRows, kStride, false>(tiles + static_cast<long>(i) * n, n, find_rows<kStride>(all, nodes, (m - i) / 3),
+                                                        out);
+  if (i == m) return;
   tiles += static_cast<long>(i) * n;
-  in += i * kStride;
-  if (m - i == 9) multiply_tile_transposed<9, kStride, kAdd>(tiles, n, in, out);
-  if (m - i == 6) multiply_tile_transposed<6, kStride, kAdd>(tiles, n, in, out);
-  if (m - i == 3) multiply_tile_transposed<3, kStride, kAdd>(tiles, n, in, out);
+  const auto in = find_rows<kStride>(all, nodes, (m - i) / 3);
+  if (m - i == 9) multiply_tile_transposed<9, kStride, false>(tiles, n, in, out);
+  if (m - i == 6) multiply_tile_transposed<6, kStride, false>(tiles, n, in, out);
+  if (m - i == 3) multiply_tile_transposed<3, kStride, false>(tiles, n, in, out);
 }
 
-void subtract_product(const double* tiles, int m, int n, int vectors, const double* in, double* out) {
-  vectors == 1 ? multiply<1, false>(tiles, m, n, in, out) : multiply<2, false>(tiles, m, n, in, out);
+template <int kStride>
+void add_triangle_transposed(const double* tiles, int n, double* in_rows, double* out_rows) {
+  auto* in = reinterpret_cast<Vector*>(in_rows);
+  auto* out = reinterpret_cast<Vector*>(out_rows);
+  int i = 0;
+  for (; i + kTileRows <= n; i += kTileRows, in += kTileRows * kStride) {
+    multiply_tile_transposed<kTileRows, kStride, true>(tiles, i + kTileRows, find_rows<kStride>(in), out);
+    tiles += kTileRows * (i + kTileRows);
+  }
+  if (n - i == 9) multiply_tile_transposed<9, kStride, true>(tiles, n, find_rows<kStride>(in), out);
+  if (n - i == 6) multiply_tile_transposed<6, kStride, true>(tiles, n, find_rows<kStride>(in), out);
+  if (n - i == 3) multiply_tile_transposed<3, kStride, true>(tiles, n, find_rows<kStride>(in), out);
 }
-void set_product(const double* tiles, int m, int n, int vectors, const double* in, double* out) {
-  vectors == 1 ? multiply<1, true>(tiles, m, n, in, out) : multiply<2, true>(tiles, m, n, in, out);
+
+void subtract_product(const double* tiles, int m, int n, int vectors, const double* in, const int* nodes, double* rows) {
+  vectors == 1 ? subtract_product<1>(tiles, m, n, in, nodes, rows) : subtract_product<2>(tiles, m, n, in, nodes, rows);
 }
-void subtract_transposed(const double* tiles, int m, int n, int vectors, const double* in, double* out) {
-  vectors == 1 ? multiply_transposed<1, false>(tiles, m, n, in, out) : multiply_transposed<2, false>(tiles, m, n, in, out);
+void subtract_transposed(const double* tiles, int m, int n, int vectors, const int* nodes, double* rows, double* out) {
+  vectors == 1 ? subtract_transposed<1>(tiles, m, n, nodes, rows, out) : subtract_transposed<2>(tiles, m, n, nodes, rows, out);
 }
-void add_transposed(const double* tiles, int m, int n, int vectors, const double* in, double* out) {
-  vectors == 1 ? multiply_transposed<1, true>(tiles, m, n, in, out) : multiply_transposed<2, true>(tiles, m, n, in, out);
+void set_triangle(const double* tiles, int n, int vectors, const double* in, double* out) {
+  vectors == 1 ? set_triangle<1>(tiles, n, in, out) : set_triangle<2>(tiles, n, in, out);
+}
+void add_triangle_transposed(const double* tiles, int n, int vectors, double* in, double* out) {
+  vectors == 1 ? add_triangle_transposed<1>(tiles, n, in, out) : add_triangle_transposed<2>(tiles, n, in, out);
 }
 
 inline double magnitude(double x) { return __builtin_fabs(x); }
@@ -211,12 +269,12 @@ inline void eliminate_two(double* block, int n, int k, double d00, double d10, d
   c0[k + 1] = 0;
 }
 
-/// T = L^-1 P by rows: row i is e_i less multiples of the rows before.
-inline void invert_block(double* block, int n, const int* order) {
+/// L^-1 to tiles: row i is e_i less multiples of the rows before.
+inline void invert_block(const double* block, int n, double* tiles) {
   alignas(64) static thread_local double inverse[kMaxBlock * kMaxBlock];
   for (int i = 0; i < n; ++i) {
     double* row = inverse + i * kMaxBlock;
-    for (int j = 0; j < n; ++j) row[j] = 0;
+    for (int j = 0; j < kMaxBlock; ++j) row[j] = 0;
     row[i] = 1;
     for (int k = 0; k < i; ++k) {
       const double factor = block[k * kMaxBlock + i];
@@ -224,12 +282,15 @@ inline void invert_block(double* block, int n, const int* order) {
       for (int j = 0; j <= k; ++j) row[j] -= factor * above[j];
     }
   }
-  for (int i = 0; i < n; ++i)
-    for (int k = 0; k < n; ++k) block[i * kMaxBlock + order[k]] = inverse[i * kMaxBlock + k];
+  for (int i = 0; i < n; i += kTileRows) {
+    const int height = n - i < kTileRows ? n - i : kTileRows;
+    for (int k = 0; k < i + height; ++k)
+      for (int r = 0; r < height; ++r) *tiles++ = inverse[(i + r) * kMaxBlock + k];
+  }
 }
 
-bool factorise_block(double* block, int n, BlockPivots& pivots) {
-  int order[kMaxBlock];
+bool factorise_block(double* block, int n, BlockPivots& pivots, double* tiles) {
+  int* order = pivots.order;
   for (int k = 0; k < n; ++k) order[k] = k;
   pivots.negative = 0;
   pivots.smallest = __builtin_inf();
@@ -263,7 +324,7 @@ bool factorise_block(double* block, int n, BlockPivots& pivots) {
     if (size < pivots.smallest) pivots.smallest = size;
     k += kind;
   }
-  invert_block(block, n, order);
+  invert_block(block, n, tiles);
   return true;
 }
 
@@ -277,58 +338,188 @@ inline Quad find_larger(Quad a, Quad b) {
   return size > a ? size : a;
 }
 
-/// One tile of full height, column after column.
-inline void divide_tile(const double* product, int m, int n, const BlockPivots& pivots, double* below, int ld, double* tile,
-                        Quad& largest) {
-  constexpr int kParts = kTileRows / 4;
+typedef double UnalignedVector __attribute__((vector_size(64), aligned(8)));
+constexpr int kLanes = kWideRows / 8;
+
+inline Vector load_vector(const double* from) { return *reinterpret_cast<const UnalignedVector*>(from); }
+inline void store_vector(double* to, Vector value) { *reinterpret_cast<UnalignedVector*>(to) = value; }
+
+/// sum += (or -=) kCount rows of a tile, times some of the 16 numbers in each row of a strip.
+template <int kHeight, bool kMinus, int kCount, int kUsed>
+inline void add_outer(const double* tile, const Vector* strip, int n, Vector (&sum)[kCount][kUsed]) {
   for (int k = 0; k < n; ++k) {
-    const double* w = product + static_cast<long>(k) * m;
-    const double diagonal = pivots.diagonal[k];
-    Quad value[kParts];
-    for (int q = 0; q < kParts; ++q) value[q] = load(w + 4 * q) * diagonal;
-    if (pivots.off[k] != 0)
-      for (int q = 0; q < kParts; ++q) value[q] += load(w + m + 4 * q) * pivots.off[k];
-    if (k > 0 && pivots.off[k - 1] != 0)
-      for (int q = 0; q < kParts; ++q) value[q] += load(w - m + 4 * q) * pivots.off[k - 1];
-    for (int q = 0; q < kParts; ++q) {
-      largest = find_larger(largest, value[q]);
-      store(below + static_cast<long>(k) * ld + 4 * q, value[q]);
-      store(tile + k * kTileRows + 4 * q, value[q]);
+    Vector row[kUsed];
+    for (int v = 0; v < kUsed; ++v) row[v] = strip[k * kLanes + v];
+    for (int i = 0; i < kCount; ++i)
+      for (int v = 0; v < kUsed; ++v)
+        sum[i][v] = kMinus ? sum[i][v] - row[v] * tile[k * kHeight + i] : sum[i][v] + row[v] * tile[k * kHeight + i];
+  }
+}
+
+/// out (kHeight rows of 16 numbers) = tile times strip.
+template <int kHeight, int kBegin = 0>
+inline void multiply_strip(const double* tile, const Vector* strip, int n, Vector* out) {
+  if constexpr (kBegin < kHeight) {
+    constexpr int kCount = kHeight - kBegin < kRows ? kHeight - kBegin : kRows;
+    for (int v = 0; v < kLanes; v += kVectors) {
+      Vector sum[kCount][kVectors] = {};
+      add_outer<kHeight, false>(tile + kBegin, strip + v, n, sum);
+      for (int i = 0; i < kCount; ++i)
+        for (int u = 0; u < kVectors; ++u) out[(kBegin + i) * kLanes + v + u] = sum[i][u];
+    }
+    multiply_strip<kHeight, kBegin + kCount>(tile, strip, n, out);
+  }
+}
+
+/// The same, subtracted from (or put with a minus to) columns of C, from their row `row` on.
+template <int kHeight, int kBegin = 0>
+inline void update_block(const double* tile, const Vector* strip, int n, bool is_set, double* const* columns, long row) {
+  if constexpr (kBegin < kHeight) {
+    constexpr int kCount = kHeight - kBegin < kRows ? kHeight - kBegin : kRows;
+    for (int v = 0; v < kLanes; v += kVectors) {
+      if (!is_set)
+        for (int i = 0; i < kCount; ++i)
+          for (int u = 0; u < kVectors; ++u) __builtin_prefetch(columns[kBegin + i] + row + 8 * (v + u), 1);
+      Vector sum[kCount][kVectors] = {};
+      add_outer<kHeight, true>(tile + kBegin, strip + v, n, sum);
+      for (int i = 0; i < kCount; ++i) {
+        double* target = columns[kBegin + i] + row + 8 * v;
+        for (int u = 0; u < kVectors; ++u) store_vector(target + 8 * u, is_set ? sum[i][u] : load_vector(target + 8 * u) + sum[i][u]);
+      }
+    }
+    update_block<kHeight, kBegin + kCount>(tile, strip, n, is_set, columns, row);
+  }
+}
+
+void calc_wide(const double* const* columns, int begin, int end, int n, const double* triangle, double* wide) {
+  Vector sums[kTileRows * kLanes];
+  for (int row = begin; row < end; row += kWideRows, wide += kWideRows * n) {
+    auto* strip = reinterpret_cast<Vector*>(wide);
+    if (row + kWideRows <= end) {
+      for (int k = 0; k < n; ++k)
+        for (int v = 0; v < kLanes; ++v) strip[k * kLanes + v] = load_vector(columns[k] + row + 8 * v);
+    } else {
+      for (int k = 0; k < n; ++k)
+        for (int r = 0; r < kWideRows; ++r) wide[k * kWideRows + r] = row + r < end ? columns[k][row + r] : 0;
+    }
+    // From the last tile back: none needs rows behind its own, so W takes the place of A.
+    int i = n / kTileRows * kTileRows;
+    const double* tile = triangle + i * (i + kTileRows) / 2;
+    const int rest = n - i;
+    if (rest == 9) multiply_strip<9>(tile, strip, n, sums);
+    if (rest == 6) multiply_strip<6>(tile, strip, n, sums);
+    if (rest == 3) multiply_strip<3>(tile, strip, n, sums);
+    for (int k = 0; k < rest * kLanes; ++k) strip[i * kLanes + k] = sums[k];
+    while (i > 0) {
+      tile -= kTileRows * i;
+      multiply_strip<kTileRows>(tile, strip, i, sums);
+      i -= kTileRows;
+      for (int k = 0; k < kTileRows * kLanes; ++k) strip[i * kLanes + k] = sums[k];
     }
   }
 }
 
-void divide_and_pack(const double* product, int m, int n, const BlockPivots& pivots, double* below, int ld, double* tiles, double& growth) {
+void divide_wide(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth) {
+  constexpr int kParts = kTileRows / 4;
   Quad largest{};
-  int i = 0;
-  for (; i + kTileRows <= m; i += kTileRows, tiles += kTileRows * n) divide_tile(product + i, m, n, pivots, below + i, ld, tiles, largest);
-  for (int q = 0; q < 4; ++q) growth = largest[q] > growth ? largest[q] : growth;
-  const int height = m - i;
-  for (int k = 0; k < n; ++k)
-    for (int r = i; r < m; ++r) {
-      const double* w = product + static_cast<long>(k) * m + r;
-      double value = w[0] * pivots.diagonal[k];
-      if (pivots.off[k] != 0) value += w[m] * pivots.off[k];
-      if (k > 0 && pivots.off[k - 1] != 0) value += w[-m] * pivots.off[k - 1];
-      growth = magnitude(value) > growth ? magnitude(value) : growth;
-      below[static_cast<long>(k) * ld + r] = value;
-      tiles[k * height + r - i] = value;
+  for (int row = 0; row < m; row += kTileRows) {
+    const int height = m - row < kTileRows ? m - row : kTileRows;
+    const double* part[kParts];
+    for (int q = 0; q < kParts; ++q) {
+      const int at = 4 * q < height ? row + 4 * q : row;  // there is no strip behind the last row
+      part[q] = wide + static_cast<long>(at / kWideRows) * kWideRows * n + at % kWideRows;
     }
+    for (int k = 0; k < n; ++k) {
+      const double diagonal = pivots.diagonal[k];
+      Quad value[kParts];
+      for (int q = 0; q < kParts; ++q) value[q] = load(part[q] + k * kWideRows) * diagonal;
+      if (pivots.off[k] != 0)
+        for (int q = 0; q < kParts; ++q) value[q] += load(part[q] + (k + 1) * kWideRows) * pivots.off[k];
+      if (k > 0 && pivots.off[k - 1] != 0)
+        for (int q = 0; q < kParts; ++q) value[q] += load(part[q] + (k - 1) * kWideRows) * pivots.off[k - 1];
+      for (int q = 0; q < kParts; ++q) largest = find_larger(largest, value[q]);
+      if (height == kTileRows) {
+        for (int q = 0; q < kParts; ++q) store(tiles + 4 * q, value[q]);
+      } else {
+        double rows[kTileRows];
+        for (int q = 0; q < kParts; ++q) store(rows + 4 * q, value[q]);
+        for (int r = 0; r < height; ++r) tiles[r] = rows[r];
+      }
+      tiles += height;
+    }
+  }
+  for (int q = 0; q < 4; ++q) growth = largest[q] > growth ? largest[q] : growth;
 }
 
-void add_runs(const double* source, const Run* runs, int count, double* target) {
-  for (int k = 0; k < count; ++k) {
-    const double* __restrict__ from = source + runs[k].from;
-    double* __restrict__ to = target + runs[k].to;
-    const int length = runs[k].length;
-    for (int i = 0; i < length; ++i) to[i] += from[i];
+/// The same for blocks of which only the rows `from` to `behind` are stored.
+template <int kHeight>
+inline void update_edge(const double* tile, const Vector* strip, int n, bool is_set, double* const* columns, int row, int from,
+                        int behind) {
+  alignas(64) double sums[kHeight * kWideRows];
+  multiply_strip<kHeight>(tile, strip, n, reinterpret_cast<Vector*>(sums));
+  for (int j = 0; j < kHeight; ++j) {
+    double* target = columns[j];
+    const double* sum = sums + j * kWideRows - row;
+    int i = from;
+    for (; i + 4 <= behind; i += 4) store(target + i, (is_set ? Quad{} : load(target + i)) - load(sum + i));
+    for (; i < behind; ++i) target[i] = (is_set ? 0 : target[i]) - sum[i];
   }
+}
+
+/// The rows from `from` on, in blocks that lie between begin and behind.
+template <int kHeight>
+inline void update_tile(const Panel& panel, int column, int from, int begin, int behind, int end, bool is_set, double* const* columns) {
+  const double* tile = panel.tiles + static_cast<long>(column - panel.begin) * panel.n;
+  if (begin < column) begin += (column - begin) / kWideRows * kWideRows;
+  for (int row = begin; row < behind; row += kWideRows) {
+    const auto* strip = reinterpret_cast<const Vector*>(panel.wide + static_cast<long>(row - panel.begin) * panel.n);
+    if (row >= from && row + kWideRows <= end)
+      update_block<kHeight>(tile, strip, panel.n, is_set, columns + column, row);
+    else
+      update_edge<kHeight>(tile, strip, panel.n, is_set, columns + column, row, row > from ? row : from,
+                           row + kWideRows < end ? row + kWideRows : end);
+  }
+}
+
+void update(const Panel& panel, int pivots, int end, bool is_made, double* const* columns) {
+  constexpr int kStripNumbers = 1 << 16;  // 512 KB of strips stay in the second-level cache while the tiles pass
+  const int rows = kStripNumbers / (kWideRows * panel.n) * kWideRows;
+  for (int begin = panel.begin; begin < end; begin += rows) {
+    const int behind = begin + rows < end ? begin + rows : end;
+    for (int column = panel.begin; column < behind; column += kTileRows) {
+      const bool is_pivot = column < pivots;
+      const bool is_set = is_made && !is_pivot;
+      const int from = is_pivot ? panel.begin : pivots + (column - pivots) / kStripColumns * kStripColumns;
+      const int height = end - column;
+      if (height >= kTileRows)
+        update_tile<kTileRows>(panel, column, from, begin, behind, end, is_set, columns);
+      else if (height == 9)
+        update_tile<9>(panel, column, from, begin, behind, end, is_set, columns);
+      else if (height == 6)
+        update_tile<6>(panel, column, from, begin, behind, end, is_set, columns);
+      else
+        update_tile<3>(panel, column, from, begin, behind, end, is_set, columns);
+    }
+  }
+}
+
+inline void add_run(const double* __restrict__ from, double* __restrict__ to, int length) {
+  int i = 0;
+  for (; i + 4 <= length; i += 4) store(to + i, load(to + i) + load(from + i));
+  for (; i < length; ++i) to[i] += from[i];
+}
+
+void add_runs(const double* const* source, const Run* runs, int count, double* const* target) {
+  for (int c = 0; c < 3; ++c) add_run(source[c] + runs[0].from + c, target[c] + runs[0].to + c, runs[0].length - c);
+  for (int k = 1; k < count; ++k)
+    for (int c = 0; c < 3; ++c) add_run(source[c] + runs[k].from, target[c] + runs[k].to, runs[k].length);
 }
 
 }  // namespace
 
 extern const Kernels kTable;
-const Kernels kTable{subtract_product, set_product, subtract_transposed, add_transposed, factorise_block,
-                     divide_and_pack,  add_runs,    CARILLON_ISA_NAME};
+const Kernels kTable{subtract_product, subtract_transposed, set_triangle, add_triangle_transposed,
+                     factorise_block,  calc_wide,           divide_wide,  update,
+                     add_runs,         CARILLON_ISA_NAME};
 
 }  // namespace carillon::ldlt::CARILLON_ISA

@@ -1,5 +1,7 @@
 #include "precompute/ldlt/local_rows.hpp"
 
+#include <algorithm>
+
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -24,6 +26,21 @@ void LocalRows::Part::close() {
   (void)MatRestoreRowIJ(matrix, 0, PETSC_FALSE, PETSC_FALSE, &count, &offsets, &columns, &done);
 }
 
+bool LocalRows::Part::has_blocks(PetscInt rows, const PetscInt* global) const {
+  if (offsets == nullptr) return true;
+  const auto number = [global](PetscInt column) { return global == nullptr ? column : global[column]; };
+  for (PetscInt i = 0; i + 3 <= rows; i += 3) {
+    const PetscInt* row = columns + offsets[i];
+    const PetscInt length = offsets[i + 1] - offsets[i];
+    if (length % 3 != 0) return false;
+    for (PetscInt d = 1; d < 3; ++d)
+      if (offsets[i + d + 1] - offsets[i + d] != length || !std::equal(row, row + length, columns + offsets[i + d])) return false;
+    for (PetscInt k = 0; k < length; k += 3)
+      if (number(row[k]) % 3 != 0 || number(row[k + 2]) != number(row[k]) + 2) return false;
+  }
+  return true;
+}
+
 LocalRows::LocalRows(Mat matrix) {
   PetscInt last = 0;
   check(MatGetOwnershipRange(matrix, &first_, &last));
@@ -44,6 +61,7 @@ LocalRows::LocalRows(Mat matrix) {
   } else {
     throw InputError("K and M of a factorisation must be AIJ matrices. Convert them with MatConvert.");
   }
+  has_blocks_ = rows_ % 3 == 0 && own_.has_blocks(rows_, nullptr) && ghost_.has_blocks(rows_, ghosts_);
 }
 
 LocalRows::~LocalRows() {

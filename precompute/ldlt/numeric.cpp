@@ -1,11 +1,10 @@
 // Method:     Multifrontal L D L^T. A front holds its pivot columns (f, w) and an update matrix (r, r) for the rows behind them; entries of
-// A and
-//             the children's update matrices are added in, panels of at most 72 columns are eliminated one after the other, and the update
-//             matrix goes to the parent. In a panel the diagonal block is factorised with pivoting (P A11 P^T = L11 D L11^T), T = L11^-1 P
-//             is kept instead of L11, and W = A21 T^T = L21 D, L21 = W D^-1, A22 -= L21 W^T are matrix products.
+//             A and the children's update matrices are added in, panels of at most 72 columns are eliminated one after the other, and the
+//             update matrix goes to the parent. In a panel the diagonal block is factorised with pivoting (P A11 P^T = L11 D L11^T), L11^-1
+//             is kept instead of L11, and W = A21 P^T L11^-T = L21 D, L21 = W D^-1, A22 -= L21 W^T are products of tiles with strips.
 // Source:     Duff and Reid 1983; Liu 1992; Schenk and Gaertner 2006 (pivots are sought inside the diagonal block only). The explicit
-// inverse:
-//             Higham 2002, Accuracy and stability of numerical algorithms, chapter 14 (L11 has entries of order one by rook pivoting).
+//             inverse: Higham 2002, Accuracy and stability of numerical algorithms, chapter 14 (L11 has entries of order one by rook
+//             pivoting).
 // Deviations: no delayed pivots: a bad pivot shows in the backward error, which the caller is told.
 #include "precompute/ldlt/numeric.hpp"
 
@@ -14,35 +13,17 @@
 #include <cstring>
 #include <limits>
 #include <new>
+#include <numeric>
 
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/local_rows.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
-extern "C" void dgemm_(const char* trans_a, const char* trans_b, const int* m, const int* n, const int* k, const double* alpha,
-                       const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c, const int* ldc);
-
 namespace carillon::ldlt {
 namespace {
 
 static_assert(3 * kPanelNodes <= kMaxBlock);
-
-/// C (m, n) <- beta C + alpha A (m, k) op(B).
-void multiply(char trans_b, int m, int n, int k, double alpha, const double* a, int lda, const double* b, int ldb, double beta, double* c,
-              int ldc) {
-  if (m == 0 || n == 0) return;
-  dgemm_("N", &trans_b, &m, &n, &k, &alpha, a, &lda, b, &ldb, &beta, c, &ldc);
-}
-
-/// A (m, n) by columns, ld apart, to tiles. Returns the end.
-double* pack_tiles(const double* a, int ld, int m, int n, double* tiles) {
-  for (int i = 0; i < m; i += kTileRows) {
-    const int height = std::min(kTileRows, m - i);
-    for (int k = 0; k < n; ++k, tiles += height) std::memcpy(tiles, a + static_cast<std::ptrdiff_t>(k) * ld + i, sizeof(double) * height);
-  }
-  return tiles;
-}
 
 class Factoriser {
  public:
@@ -52,10 +33,10 @@ class Factoriser {
     std::int64_t scratch = 0;
     for (const Front& front : plan.fronts) {
       largest = std::max(largest, std::int64_t{9} * front.size() * front.width);
-      scratch = std::max(scratch, std::int64_t{9} * front.size() * kPanelNodes);
+      scratch = std::max(scratch, count_wide(front));
     }
     columns_ = Buffer(largest);
-    product_ = Buffer(scratch);
+    wide_ = Buffer(scratch);
     block_ = Buffer(kMaxBlock * kMaxBlock);
     for (int parity = 0; parity < 2; ++parity) stack_[parity] = Buffer(plan.stack_entries[parity]);
     where_.assign(plan.local_nodes, -1);
@@ -96,19 +77,34 @@ class Factoriser {
     f_ = w_ + r_;
     update_ = is_stacked(front) ? stack_[front.depth % 2].data() + used_[front.depth % 2] : loose_[s].data();
     if (is_stacked(front)) used_[front.depth % 2] += count_update(r_);
-    clear();
+    point_at_columns();
     for (std::int32_t i = 0; i < front.width; ++i) where_[front.first + i] = i;
     for (std::size_t i = 0; i < front.rows.size(); ++i) where_[front.rows[i]] = front.width + static_cast<std::int32_t>(i);
-    front.is_interface ? add_blocks(front) : add_entries(front);
-    for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c]);  // the last one lies on top
-    for (std::size_t c = 0; c < front.remote_children.size(); ++c) add_remote_child(front.remote_children[c], remote_[s][c]);
-    eliminate(front, numbers_.panels.data() + numbers_.front_offsets[s]);
+    std::memset(columns_.data(), 0, sizeof(double) * static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_));
+    double* panels = numbers_.panels.data() + numbers_.front_offsets[s];
+    if (front.is_interface) {
+      std::memset(update_, 0, sizeof(double) * static_cast<std::size_t>(count_update(r_)));
+      add_blocks(front);
+      for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kAll);  // the last one lies on top
+      for (std::size_t c = 0; c < front.remote_children.size(); ++c) add_remote_child(front.remote_children[c], remote_[s][c]);
+      eliminate(front, false, panels);
+    } else {
+      // The first panel makes the update matrix, so it need not be cleared, and the children's shares in it come behind.
+      add_entries(front);
+      const std::int64_t used[2] = {used_[0], used_[1]};
+      for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kPivots);
+      std::copy(used, used + 2, used_);
+      eliminate(front, true, panels);
+      for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kRest);
+    }
     if (front.to_parent.rank >= 0) send_update(front, s);
   }
 
-  void clear() {
-    std::memset(columns_.data(), 0, sizeof(double) * static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_));
-    std::memset(update_, 0, sizeof(double) * static_cast<std::size_t>(count_update(r_)));
+  /// starts_: where row 0 of each column of the front would be.
+  void point_at_columns() {
+    starts_.resize(static_cast<std::size_t>(f_));
+    for (int c = 0; c < w_; ++c) starts_[c] = columns_.data() + static_cast<std::ptrdiff_t>(c) * f_;
+    for (int c = w_; c < f_; ++c) starts_[c] = update_ + find_update_column(r_, c - w_) - w_;
   }
 
   /// Adds factor times this rank's row 3 v + d of a matrix to column `target` of the front; `first`: its first pivot.
@@ -122,13 +118,28 @@ class Factoriser {
   }
 
   void add_entries(const Front& front) {
-    for (std::int32_t i = 0; i < front.width; ++i)
-      for (int d = 0; d < 3; ++d) {
-        const PetscInt row = 3 * own_of_local_[front.first + i] + d;
-        double* target = columns_.data() + static_cast<std::ptrdiff_t>(3 * i + d) * f_;
-        add_row(k_, plan_.node_of_ghost_k, row, front.first, 1.0, target);
-        add_row(m_, plan_.node_of_ghost_m, row, front.first, -sigma_, target);
-      }
+    for (std::int32_t i = 0; i < front.width; ++i) {
+      double* target = columns_.data() + static_cast<std::ptrdiff_t>(3 * i) * f_;
+      const std::int32_t own = own_of_local_[front.first + i];
+      if (k_.has_blocks())
+        add_node_rows(own, front.first, target);
+      else
+        for (int d = 0; d < 3; ++d) add_row(k_, plan_.node_of_ghost_k, 3 * own + d, front.first, 1.0, target + d * f_);
+      for (int d = 0; d < 3; ++d) add_row(m_, plan_.node_of_ghost_m, 3 * own + d, front.first, -sigma_, target + d * f_);
+    }
+  }
+
+  /// Adds K's rows of a node, which are blocks of 3x3, to three columns of the front.
+  void add_node_rows(std::int32_t own, std::int32_t first, double* target) const {
+    const auto add = [&](std::int32_t node, const double* const(&values)[3]) {
+      if (node < first) return;
+      double* to = target + 3 * where_[node];
+      for (int d = 0; d < 3; ++d)
+        for (int e = 0; e < 3; ++e) to[d * f_ + e] += values[d][e];
+    };
+    k_.visit_blocks(
+        own, [&](PetscInt column, const double* const(&values)[3]) { add(plan_.node_of_own[column / 3], values); },
+        [&](PetscInt ghost, const double* const(&values)[3]) { add(plan_.node_of_ghost_k[ghost], values); });
   }
 
   /// Collects the 3x3 blocks between interface nodes that this rank's rows hold, and sends them to the owners of their fronts.
@@ -194,40 +205,47 @@ class Factoriser {
     }
   }
 
-  /// Where a child's rows are in the front, as runs. Those that are pivots come first.
-  void locate(const Ints& rows) {
+  /// Where a child's rows are in the front, as runs; the columns of pivots come first. Returns the number of nodes among the pivots.
+  std::size_t locate(const Ints& rows, std::int32_t pivots) {
     runs_.clear();
-    row_runs_.clear();
+    node_runs_.clear();
+    std::size_t before = 0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const int from = 3 * static_cast<int>(i);
       const int to = 3 * where_[rows[i]];
-      if (runs_.empty() || runs_.back().to + runs_.back().length != to) runs_.push_back({from, to, 0});
+      if (where_[rows[i]] < pivots) ++before;
+      if (runs_.empty() || runs_.back().to + runs_.back().length != to) runs_.push_back({3 * static_cast<int>(i), to, 0});
       runs_.back().length += 3;
-      for (int d = 0; d < 3; ++d) row_runs_.push_back(static_cast<int>(runs_.size()) - 1);
+      node_runs_.push_back(static_cast<int>(runs_.size()) - 1);
     }
+    return before;
   }
 
-  /// Adds column j of a child's update matrix, from its diagonal on. source: where its row 0 would be.
-  void add_column(const double* source, int j) {
-    const int r = row_runs_[j];
-    const Run whole = runs_[r];
-    const int column = whole.to + j - whole.from;
-    double* target =
-        column < w_ ? columns_.data() + static_cast<std::ptrdiff_t>(column) * f_ : update_ + find_update_column(r_, column - w_) - w_;
-    runs_[r] = {j, column, whole.length - (j - whole.from)};
-    kernels_.add_runs(source, runs_.data() + r, static_cast<int>(runs_.size()) - r, target);
-    runs_[r] = whole;
+  /// Adds the columns of node j of a child's update matrix of r rows, from their diagonals on.
+  void add_node(const double* update, std::int64_t r, std::size_t j) {
+    const int k = node_runs_[j];
+    const Run whole = runs_[k];
+    const int from = 3 * static_cast<int>(j);
+    const int column = whole.to + from - whole.from;
+    const double* source[3];
+    for (int c = 0; c < 3; ++c) source[c] = update + find_update_column(r, from + c);
+    runs_[k] = {from, column, whole.length - (from - whole.from)};
+    kernels_.add_runs(source, runs_.data() + k, static_cast<int>(runs_.size()) - k, starts_.data() + column);
+    runs_[k] = whole;
   }
 
-  void add_child(std::int32_t s) {
+  enum class Part { kPivots, kRest, kAll };
+
+  /// Adds a child's update matrix, or what of it falls into the columns of pivots, or the rest of it; gives it back with the rest.
+  void add_child(std::int32_t s, Part part) {
     const Front& child = plan_.fronts[s];
-    locate(child.rows);
+    const std::size_t pivots = locate(child.rows, w_ / 3);
     const std::int64_t r = count_rows(child.rows);
     const bool stacked = is_stacked(child);
     if (stacked) used_[child.depth % 2] -= count_update(r);
     const double* source = child_update(child, s);
-    for (std::int64_t j = 0; j < r; ++j) add_column(source + find_update_column(r, j), static_cast<int>(j));
-    if (!stacked) loose_[s] = Buffer();
+    for (std::size_t j = part == Part::kRest ? pivots : 0; j < (part == Part::kPivots ? pivots : child.rows.size()); ++j)
+      add_node(source, r, j);
+    if (!stacked && part != Part::kPivots) loose_[s] = Buffer();
   }
 
   /// Children lie on their stack in order, and are taken from behind: so where they begin follows from what is used below them.
@@ -237,9 +255,8 @@ class Factoriser {
 
   void add_remote_child(const Edge& edge, Buffer& update) {
     MPI_Recv(update.data(), static_cast<int>(update.size()), MPI_DOUBLE, edge.rank, kUpdateTag + edge.tag, plan_.comm, MPI_STATUS_IGNORE);
-    locate(edge.rows);
-    const std::int64_t r = count_rows(edge.rows);
-    for (std::int64_t j = 0; j < r; ++j) add_column(update.data() + find_update_column(r, j), static_cast<int>(j));
+    locate(edge.rows, 0);
+    for (std::size_t j = 0; j < edge.rows.size(); ++j) add_node(update.data(), count_rows(edge.rows), j);
     update = Buffer();
   }
 
@@ -260,63 +277,48 @@ class Factoriser {
     }
   }
 
-  void eliminate(const Front& front, double* packed) {
+  /// is_made: the update matrix holds nothing yet.
+  void eliminate(const Front& front, bool is_made, double* panels) {
     for (std::int32_t p = 0; p < count_panels(front.width); ++p) {
       const int begin = 3 * find_panel_start(front.width, p);
       const int end = 3 * find_panel_start(front.width, p + 1);
-      packed = eliminate_panel(front, p, begin, end, packed);
+      panels = eliminate_panel(3 * static_cast<std::size_t>(front.first), begin, end, is_made && p == 0, panels);
     }
   }
 
-  double* eliminate_panel(const Front& front, std::int32_t p, int begin, int end, double* packed) {
+  double* eliminate_panel(std::size_t first_row, int begin, int end, bool is_made, double* triangle) {
     const int n = end - begin;
-    const int m = f_ - end;
-    double* diagonal = columns_.data() + static_cast<std::ptrdiff_t>(begin) * f_ + begin;
-    double* below = diagonal + n;
-    double* product = product_.data();
+    double* tiles = triangle + count_triangle(n);
     BlockPivots pivots;
-    factorise_diagonal(diagonal, n, pivots);
-    const std::size_t first_row = 3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin);
+    factorise_diagonal(begin, n, pivots, triangle);
+    first_row += static_cast<std::size_t>(begin);
     std::copy(pivots.diagonal, pivots.diagonal + n, numbers_.d_diagonal.data() + first_row);
     std::copy(pivots.off, pivots.off + n, numbers_.d_off.data() + first_row);
-    multiply('N', m, n, n, 1.0, below, f_, block_.data(), kMaxBlock, 0.0, product, std::max(m, 1));
-    transpose_block(n);
-    packed = pack_tiles(block_.data(), kMaxBlock, n, n, packed);
-    kernels_.divide_and_pack(product, m, n, pivots, below, f_, packed, growth_);
-    for (std::int32_t q = p + 1; q < count_panels(front.width); ++q) {
-      const int from = 3 * find_panel_start(front.width, q);
-      const int width = 3 * find_panel_start(front.width, q + 1) - from;
-      multiply('T', f_ - from, width, n, -1.0, below + (from - end), f_, product + (from - end), m, 1.0,
-               columns_.data() + static_cast<std::ptrdiff_t>(from) * f_ + from, f_);
-    }
-    for (int j = 0; j < r_; j += kStripColumns) {
-      const int from = w_ - end + j;
-      multiply('T', r_ - j, std::min<int>(kStripColumns, r_ - j), n, -1.0, below + from, f_, product + from, m, 1.0,
-               update_ + find_strip(r_, j / kStripColumns), r_ - j);
-    }
-    return packed + static_cast<std::ptrdiff_t>(m) * n;
+    std::copy(pivots.order, pivots.order + n, numbers_.order.data() + first_row);
+    if (end == f_) return tiles;
+    const double* columns[kMaxBlock];
+    for (int k = 0; k < n; ++k) columns[k] = starts_[begin + pivots.order[k]];
+    kernels_.calc_wide(columns, end, f_, n, triangle, wide_.data());
+    kernels_.divide_wide(wide_.data(), f_ - end, n, pivots, tiles, growth_);
+    kernels_.update({tiles, wide_.data(), n, end}, w_, f_, is_made, starts_.data());
+    return tiles + static_cast<std::ptrdiff_t>(f_ - end) * n;
   }
 
-  /// T comes by rows.
-  void transpose_block(int n) {
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < i; ++k) std::swap(block_.data()[i * kMaxBlock + k], block_.data()[k * kMaxBlock + i]);
-  }
-
-  /// block_ <- T of the diagonal block; zero with zero pivots when one vanishes, so that what follows stays finite.
-  void factorise_diagonal(const double* diagonal, int n, BlockPivots& pivots) {
+  /// triangle <- L^-1 of the diagonal block; zero with zero pivots when one vanishes, so that what follows stays finite.
+  void factorise_diagonal(int begin, int n, BlockPivots& pivots, double* triangle) {
     double* block = block_.data();
     for (int j = 0; j < n; ++j)
-      for (int i = j; i < n; ++i) block[j * kMaxBlock + i] = block[i * kMaxBlock + j] = diagonal[static_cast<std::ptrdiff_t>(j) * f_ + i];
-    if (kernels_.factorise_block(block, n, pivots)) {
+      for (int i = j; i < n; ++i) block[j * kMaxBlock + i] = block[i * kMaxBlock + j] = starts_[begin + j][begin + i];
+    if (kernels_.factorise_block(block, n, pivots, triangle)) {
       negative_ += pivots.negative;
       smallest_ = std::min(smallest_, pivots.smallest);
       return;
     }
     is_complete_ = false;
-    std::fill(block, block + kMaxBlock * kMaxBlock, 0.0);
+    std::fill(triangle, triangle + count_triangle(n), 0.0);
     std::fill(pivots.diagonal, pivots.diagonal + n, 0.0);
     std::fill(pivots.off, pivots.off + n, 0.0);
+    std::iota(pivots.order, pivots.order + n, 0);
   }
 
   void reduce() {
@@ -343,12 +345,13 @@ class Factoriser {
   int r_ = 0;
   int f_ = 0;
   Buffer columns_;
-  Buffer product_;
+  Buffer wide_;
   Buffer block_;
   double* update_ = nullptr;
+  std::vector<double*> starts_;
   Ints where_;             // (local_nodes) node of the front in work
   std::vector<Run> runs_;  // of the child that is being added
-  Ints row_runs_;          // the run of each of its rows
+  Ints node_runs_;         // the run of each of its nodes
 
   Buffer stack_[2];
   std::int64_t used_[2] = {0, 0};
@@ -389,6 +392,7 @@ Numbers make_numbers(const Plan& plan) {
   numbers.panels = Buffer(stored);
   numbers.d_diagonal.assign(3 * static_cast<std::size_t>(plan.local_nodes), 0.0);
   numbers.d_off.assign(3 * static_cast<std::size_t>(plan.local_nodes), 0.0);
+  numbers.order.assign(3 * static_cast<std::size_t>(plan.local_nodes), 0);
   return numbers;
 }
 

@@ -26,12 +26,13 @@ class Buffer {
   std::int64_t size_ = 0;
 };
 
-/// L D L^T of this rank's fronts. Each front is a row of panels; each panel is T = L11^-1 P and then L21, both in tiles (kernels.hpp).
+/// L D L^T of this rank's fronts. Each front is a row of panels; each panel is L11^-1 and then L21, both in tiles (kernels.hpp).
 struct Numbers {
   Buffer panels;
   std::vector<std::int64_t> front_offsets;  // where each front's panels begin
   std::vector<double> d_diagonal;           // (3 local_nodes) the inverse of D at this rank's pivots: diagonal ...
   std::vector<double> d_off;                // ... and between a row and the next
+  std::vector<std::uint8_t> order;          // (3 local_nodes) of the pivots in their panels: BlockPivots::order
   std::int64_t negative = 0;                // the rest over all ranks: negative eigenvalues of D
   double smallest = 0;                      // least magnitude of a pivot
   double growth = 0;                        // largest magnitude in L21
@@ -47,7 +48,6 @@ void factorise_fronts(const Plan& plan, Mat stiffness, Mat mass, double sigma, N
 /// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
 struct Workspace {
   std::vector<Buffer> blocks;  // one per 16 columns
-  Buffer front;                // of the largest front
 };
 
 inline constexpr int kSolveColumns = 32;  // at a time

@@ -12,6 +12,7 @@
 
 #include "precompute/ldlt/interface.hpp"
 #include "precompute/ldlt/interior.hpp"
+#include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/local_rows.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
@@ -221,7 +222,7 @@ Analysis::Rank measure(Plan& plan) {
     own.entries += count_entries(front.width, front.size());
     own.flops += count_flops(front.width, front.size());
     factor += count_stored(front.width, front.size());
-    scratch = std::max(scratch, std::int64_t{9} * front.size() * kPanelNodes);
+    scratch = std::max(scratch, count_wide(front));
     columns = std::max(columns, std::int64_t{9} * front.size() * front.width);
     const bool is_stacked = front.parent >= 0 && front.parent < plan.interior_fronts;
     std::int64_t& room = is_stacked ? used[front.depth % 2] : loose;
@@ -267,10 +268,16 @@ void gather_analysis(Plan& plan, const Analysis::Rank& own, int ranks, const Int
 std::int64_t count_stored(std::int32_t width, std::int32_t size) {
   std::int64_t stored = 0;
   for (std::int32_t p = 0; p < count_panels(width); ++p) {
-    const std::int64_t first = find_panel_start(width, p);
-    stored += 9 * (find_panel_start(width, p + 1) - first) * (size - first);
+    const std::int64_t end = find_panel_start(width, p + 1);
+    const std::int64_t nodes = end - find_panel_start(width, p);
+    stored += count_triangle(3 * nodes) + 9 * nodes * (size - end);
   }
   return stored;
+}
+
+std::int64_t count_wide(const Front& front) {
+  const std::int64_t panel = std::min(front.width, kPanelNodes);
+  return 3 * panel * (3 * static_cast<std::int64_t>(front.size()) + kWideRows);
 }
 
 Plan make_plan(Mat stiffness, Mat mass) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "precompute/ldlt/factor.hpp"
+#include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/symbolic.hpp"
 
 namespace carillon::ldlt {
@@ -76,16 +77,19 @@ Plan make_plan(Mat stiffness, Mat mass);
 /// Pivot nodes eliminated at a time, and how `width` pivot nodes are cut into such panels.
 inline constexpr std::int32_t kPanelNodes = 24;
 inline std::int32_t count_panels(std::int32_t width) { return (width + kPanelNodes - 1) / kPanelNodes; }
-/// First pivot node of panel p: panels are equal to one node.
+/// First pivot node of panel p. Panels are nearly equal; all but the first have a multiple of 4 nodes, so that tiles of 12 rows behind a
+/// panel also begin where the update matrix does.
 inline std::int32_t find_panel_start(std::int32_t width, std::int32_t p) {
-  return static_cast<std::int32_t>(static_cast<std::int64_t>(width) * p / count_panels(width));
+  const std::int64_t quads = (static_cast<std::int64_t>(width) + 3) / 4;
+  const std::int32_t panels = count_panels(width);
+  return p == 0 ? 0 : width - 4 * static_cast<std::int32_t>(quads * (panels - p) / panels);
 }
-/// Numbers stored of a front: each panel in full columns from its own first row on.
+/// Numbers stored of a front: of each panel a triangle and the rows below.
 std::int64_t count_stored(std::int32_t width, std::int32_t size);
+/// Room for the W of one of its panels.
+std::int64_t count_wide(const Front& front);
 
-/// An update matrix of r rows is stored as strips of kStripColumns columns, each in full columns from its own first row on.
-inline constexpr std::int64_t kStripColumns = 96;
-/// Where strip b begins.
+/// Where strip b of an update matrix of r rows begins.
 inline std::int64_t find_strip(std::int64_t r, std::int64_t b) { return kStripColumns * (b * r - kStripColumns * (b * (b - 1) / 2)); }
 /// Numbers stored of it.
 inline std::int64_t count_update(std::int64_t r) {

@@ -1,13 +1,13 @@
-// Method:     L D L^T X = B by fronts: forward in order of elimination, backward against it. A front's rows of the right-hand sides are
-// gathered, its
-//             panels applied as products (T stands for L11^-1 P, so there is no triangular solve), and the rows put back. Panels are read
-//             once in each direction for up to 32 columns. At a front of the interface the owner adds up what other ranks have gathered at
-//             its pivots, and on the way back sends them the solution there.
+// Method:     L D L^T X = B by fronts: forward in order of elimination, backward against it, on the rows of the right-hand sides where they
+//             lie. Panels are applied as products (L11^-1 is at hand, so there is no triangular solve), and read once in each direction for
+//             up to 32 columns. At a front of the interface the owner adds up what other ranks have gathered at its pivots, and on the way
+//             back sends them the solution there.
 // Source:     Liu 1992, section 6; Ashcraft, Eisenstat, Liu 1990, A fan-in algorithm for distributed sparse numerical factorization (sums
 //             travel to the owner once).
 // Deviations: none.
 #include <algorithm>
 #include <cstring>
+#include <numeric>
 
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/numeric.hpp"
@@ -26,7 +26,7 @@ struct Block {
 class Solver {
  public:
   Solver(const Plan& plan, const Numbers& numbers, Workspace& workspace, int columns)
-      : plan_(plan), numbers_(numbers), kernels_(get_kernels()), front_rows_(workspace.front.data()) {
+      : plan_(plan), numbers_(numbers), kernels_(get_kernels()) {
     for (int first = 0; first < columns; first += 16) {
       const int count = std::min(16, columns - first);
       blocks_.push_back({workspace.blocks[static_cast<std::size_t>(first / 16)].data(), count > 8 ? 16 : 8, count, first});
@@ -91,70 +91,66 @@ class Solver {
     return block.rows + 3 * static_cast<std::ptrdiff_t>(node) * block.width;
   }
 
-  void gather(const Front& front, const Block& block) const {
-    const std::size_t node_bytes = 3 * sizeof(double) * static_cast<std::size_t>(block.width);
-    double* to = front_rows_;
-    std::memcpy(to, find_row(block, front.first), node_bytes * static_cast<std::size_t>(front.width));
-    to += 3 * static_cast<std::ptrdiff_t>(front.width) * block.width;
-    for (const std::int32_t node : front.rows) {
-      std::memcpy(to, find_row(block, node), node_bytes);
-      to += 3 * block.width;
-    }
+  const std::uint8_t* find_order(const Front& front, int begin) const {
+    return numbers_.order.data() + 3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin);
   }
 
-  void put_pivots(const Front& front, const Block& block) const {
-    std::memcpy(find_row(block, front.first), front_rows_,
-                3 * sizeof(double) * static_cast<std::size_t>(block.width) * static_cast<std::size_t>(front.width));
+  static void copy_row(const double* from, int width, double* to) {
+    if (width == 16)
+      std::memcpy(to, from, 16 * sizeof(double));
+    else
+      std::memcpy(to, from, 8 * sizeof(double));
   }
 
-  void put_rows(const Front& front, const Block& block) const {
-    const double* from = front_rows_ + 3 * static_cast<std::ptrdiff_t>(front.width) * block.width;
-    for (const std::int32_t node : front.rows) {
-      std::memcpy(find_row(block, node), from, 3 * sizeof(double) * static_cast<std::size_t>(block.width));
-      from += 3 * block.width;
-    }
+  /// nodes_: the nodes of a front.
+  void list_nodes(const Front& front) {
+    nodes_.resize(static_cast<std::size_t>(front.size()));
+    std::iota(nodes_.begin(), nodes_.begin() + front.width, front.first);
+    std::copy(front.rows.begin(), front.rows.end(), nodes_.begin() + front.width);
   }
 
-  void forward(std::int32_t s) const {
+  void forward(std::int32_t s) {
     const Front& front = plan_.fronts[s];
-    const int f = 3 * front.size();
+    list_nodes(front);
     alignas(64) double pivots[kMaxBlock * 16];
-    for (const Block& block : blocks_) {
-      gather(front, block);
-      const double* tiles = numbers_.panels.data() + numbers_.front_offsets[s];
-      for (std::int32_t p = 0; p < count_panels(front.width); ++p) {
-        const int begin = 3 * find_panel_start(front.width, p);
-        const int end = 3 * find_panel_start(front.width, p + 1);
-        const int n = end - begin;
-        kernels_.set_product(tiles, n, n, block.width / 8, front_rows_ + begin * block.width, pivots);
-        std::memcpy(front_rows_ + begin * block.width, pivots, sizeof(double) * static_cast<std::size_t>(n * block.width));
-        kernels_.subtract_product(tiles + n * n, f - end, n, block.width / 8, pivots, front_rows_ + end * block.width);
-        tiles += static_cast<std::ptrdiff_t>(n) * (f - begin);
+    const double* tiles = numbers_.panels.data() + numbers_.front_offsets[s];
+    for (std::int32_t p = 0; p < count_panels(front.width); ++p) {
+      const int begin = 3 * find_panel_start(front.width, p);
+      const int end = 3 * find_panel_start(front.width, p + 1);
+      const int n = end - begin;
+      const int m = 3 * front.size() - end;
+      const std::uint8_t* order = find_order(front, begin);
+      for (const Block& block : blocks_) {
+        double* own = find_row(block, front.first) + begin * block.width;
+        for (int k = 0; k < n; ++k) copy_row(own + order[k] * block.width, block.width, pivots + k * block.width);
+        kernels_.set_triangle(tiles, n, block.width / 8, pivots, own);
+        kernels_.subtract_product(tiles + count_triangle(n), m, n, block.width / 8, own, nodes_.data() + end / 3, block.rows);
       }
-      put_pivots(front, block);
-      put_rows(front, block);
+      tiles += count_triangle(n) + static_cast<std::ptrdiff_t>(n) * m;
     }
   }
 
-  void backward(std::int32_t s) const {
+  void backward(std::int32_t s) {
     const Front& front = plan_.fronts[s];
-    const int f = 3 * front.size();
+    list_nodes(front);
     alignas(64) double pivots[kMaxBlock * 16];
-    for (const Block& block : blocks_) {
-      gather(front, block);
-      const double* tiles = numbers_.panels.data() + numbers_.front_offsets[s] + count_stored(front.width, front.size());
-      for (std::int32_t p = count_panels(front.width); p-- > 0;) {
-        const int begin = 3 * find_panel_start(front.width, p);
-        const int end = 3 * find_panel_start(front.width, p + 1);
-        const int n = end - begin;
-        tiles -= static_cast<std::ptrdiff_t>(n) * (f - begin);
-        double* own = front_rows_ + begin * block.width;
+    alignas(64) double solution[kMaxBlock * 16];
+    const double* tiles = numbers_.panels.data() + numbers_.front_offsets[s] + count_stored(front.width, front.size());
+    for (std::int32_t p = count_panels(front.width); p-- > 0;) {
+      const int begin = 3 * find_panel_start(front.width, p);
+      const int end = 3 * find_panel_start(front.width, p + 1);
+      const int n = end - begin;
+      const int m = 3 * front.size() - end;
+      const std::uint8_t* order = find_order(front, begin);
+      tiles -= count_triangle(n) + static_cast<std::ptrdiff_t>(n) * m;
+      for (const Block& block : blocks_) {
+        double* own = find_row(block, front.first) + begin * block.width;
         divide_by_pivots(3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin), n, block.width, own, pivots);
-        kernels_.subtract_transposed(tiles + n * n, f - end, n, block.width / 8, front_rows_ + end * block.width, pivots);
-        std::memset(own, 0, sizeof(double) * static_cast<std::size_t>(n * block.width));
-        kernels_.add_transposed(tiles, n, n, block.width / 8, pivots, own);
+        kernels_.subtract_transposed(tiles + count_triangle(n), m, n, block.width / 8, nodes_.data() + end / 3, block.rows, pivots);
+        std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * block.width));
+        kernels_.add_triangle_transposed(tiles, n, block.width / 8, pivots, solution);
+        for (int k = 0; k < n; ++k) copy_row(solution + k * block.width, block.width, own + order[k] * block.width);
       }
-      put_pivots(front, block);
     }
   }
 
@@ -203,8 +199,8 @@ class Solver {
   const Plan& plan_;
   const Numbers& numbers_;
   const Kernels& kernels_;
-  double* front_rows_;
   std::vector<Block> blocks_;
+  Ints nodes_;  // of the front in work
   int row_width_ = 0;
   std::vector<std::vector<double>> messages_;
   std::vector<double> received_;
@@ -216,9 +212,6 @@ class Solver {
 Workspace make_workspace(const Plan& plan) {
   Workspace workspace;
   for (int first = 0; first < kSolveColumns; first += 16) workspace.blocks.emplace_back(std::int64_t{3 * 16} * plan.local_nodes);
-  std::int64_t largest = 0;
-  for (const Front& front : plan.fronts) largest = std::max<std::int64_t>(largest, front.size());
-  workspace.front = Buffer(3 * 16 * largest);
   return workspace;
 }
 

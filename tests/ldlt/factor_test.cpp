@@ -9,6 +9,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
+#include <memory>
 #include <random>
 #include <string>
 
@@ -27,6 +29,8 @@ using test::Pencil;
 
 // A random block of three rows may be nearly singular, and pivots are not sought outside the blocks.
 constexpr double kRandomTolerance = 1e-10;
+// Of 600 lattices and shifts the median is 1e-15, 99 % lie below 1.3e-13, and the worst had 1.1e-12.
+constexpr double kLatticeTolerance = 3e-12;
 
 int find_ranks() {
   int ranks = 1;
@@ -74,7 +78,7 @@ std::vector<double> pick_shifts(const Eigen::VectorXd& lambda, int count) {
   return shifts;
 }
 
-void expect_counts_and_solves(Pencil& pencil, int shift_count, double tolerance = 1e-12) {
+void expect_counts_and_solves(Pencil& pencil, int shift_count, double tolerance = kLatticeTolerance) {
   const Eigen::VectorXd lambda = calc_eigenvalues(pencil);
   Factor factor(pencil.k, pencil.m);
   const std::vector<double> shifts = pick_shifts(lambda, shift_count);
@@ -279,38 +283,121 @@ TEST(factor, counts_and_solves_alike_with_every_instruction_set_of_this_processo
   set_kernels(nullptr);
 }
 
+Eigen::MatrixXd make_numbers(int rows, int columns, std::mt19937& random) {
+  std::normal_distribution<double> value;
+  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return value(random); });
+}
+
+/// Tiles as kernels.hpp defines them; `is_triangle`: each only as far as its last row reaches.
+std::vector<double> make_tiles(const Eigen::MatrixXd& a, bool is_triangle) {
+  std::vector<double> tiles;
+  for (int i = 0; i < a.rows(); i += kTileRows) {
+    const int behind = std::min<int>(static_cast<int>(a.rows()), i + kTileRows);
+    for (int k = 0; k < (is_triangle ? behind : a.cols()); ++k)
+      for (int r = i; r < behind; ++r) tiles.push_back(a(r, k));
+  }
+  tiles.resize(tiles.size() + 2048);  // memory is called ahead
+  return tiles;
+}
+
 TEST(kernels, of_every_instruction_set_multiply_tiles_as_the_definition_says) {
   std::mt19937 random(5);
-  std::normal_distribution<double> value;
   for (const Kernels* kernels : list_kernels())
     for (const int m : {3, 6, 9, 12, 15, 39})
       for (const int n : {3, 21, 72})
         for (const int vectors : {1, 2}) {
           const int width = 8 * vectors;
-          Eigen::MatrixXd a(m, n), x(n, width), y(m, width);
-          for (Eigen::MatrixXd* matrix : {&a, &x, &y})
-            for (double& entry : matrix->reshaped()) entry = value(random);
-          std::vector<double> tiles;
-          for (int i = 0; i < m; i += kTileRows)
-            for (int k = 0; k < n; ++k)
-              for (int r = i; r < std::min(m, i + kTileRows); ++r) tiles.push_back(a(r, k));
-          tiles.resize(tiles.size() + 2048);  // memory is called ahead
-          alignas(64) double in[72 * 16], out[72 * 16];
-          const auto check = [&](const auto& product, const Eigen::MatrixXd& from, const Eigen::MatrixXd& to,
-                                 const Eigen::MatrixXd& expected) {
+          const Eigen::MatrixXd a = make_numbers(m, n, random);
+          const std::vector<double> tiles = make_tiles(a, false);
+          // Node i of the block has rows 3 nodes[i] and on of X; the others must stay as they are.
+          std::vector<int> nodes(m / 3), row_of(m);
+          for (int i = 0; i < m / 3; ++i) nodes[i] = (5 * i + 3) % 17;
+          for (int i = 0; i < m; ++i) row_of[i] = 3 * nodes[i / 3] + i % 3;
+          const Eigen::MatrixXd x = make_numbers(3 * 17, width, random);
+          const Eigen::MatrixXd y = make_numbers(n, width, random);
+          alignas(64) double rows[3 * 17 * 16], block[72 * 16];
+          const auto put = [width](const Eigen::MatrixXd& from, double* to) {
             for (int i = 0; i < from.rows(); ++i)
-              for (int c = 0; c < width; ++c) in[i * width + c] = from(i, c);
-            for (int i = 0; i < to.rows(); ++i)
-              for (int c = 0; c < width; ++c) out[i * width + c] = to(i, c);
-            product(tiles.data(), m, n, vectors, in, out);
-            for (int i = 0; i < to.rows(); ++i)
+              for (int c = 0; c < width; ++c) to[i * width + c] = from(i, c);
+          };
+          const auto expect = [&](const double* out, const Eigen::MatrixXd& expected) {
+            for (int i = 0; i < expected.rows(); ++i)
               for (int c = 0; c < width; ++c)
                 ASSERT_NEAR(out[i * width + c], expected(i, c), 1e-12) << kernels->name << " " << m << " " << n;
           };
-          check(kernels->set_product, x, y, a * x);
-          check(kernels->subtract_product, x, y, y - a * x);
-          check(kernels->add_transposed, y, x, x + a.transpose() * y);
-          check(kernels->subtract_transposed, y, x, x - a.transpose() * y);
+          put(x, rows);
+          put(y, block);
+          kernels->subtract_product(tiles.data(), m, n, vectors, block, nodes.data(), rows);
+          Eigen::MatrixXd wanted = x;
+          for (int i = 0; i < m; ++i) wanted.row(row_of[i]) -= a.row(i) * y;
+          expect(rows, wanted);
+          put(x, rows);
+          kernels->subtract_transposed(tiles.data(), m, n, vectors, nodes.data(), rows, block);
+          wanted = y;
+          for (int i = 0; i < m; ++i) wanted -= a.row(i).transpose() * x.row(row_of[i]);
+          expect(block, wanted);
+        }
+}
+
+TEST(kernels, of_every_instruction_set_multiply_triangles) {
+  std::mt19937 random(6);
+  for (const Kernels* kernels : list_kernels())
+    for (const int n : {3, 12, 18, 57, 72})
+      for (const int vectors : {1, 2}) {
+        const int width = 8 * vectors;
+        const Eigen::MatrixXd a = make_numbers(n, n, random).triangularView<Eigen::Lower>();
+        const std::vector<double> tiles = make_tiles(a, true);
+        ASSERT_EQ(static_cast<std::int64_t>(tiles.size()) - 2048, count_triangle(n));
+        const Eigen::MatrixXd x = make_numbers(n, width, random);
+        alignas(64) double in[72 * 16], out[72 * 16];
+        for (int i = 0; i < n * width; ++i) in[i] = out[i] = x(i / width, i % width);
+        kernels->add_triangle_transposed(tiles.data(), n, vectors, in, out);
+        const Eigen::MatrixXd sum = x + a.transpose() * x;
+        for (int i = 0; i < n * width; ++i) ASSERT_NEAR(out[i], sum(i / width, i % width), 1e-12) << kernels->name << " " << n;
+        kernels->set_triangle(tiles.data(), n, vectors, in, out);
+        const Eigen::MatrixXd product = a * x;
+        for (int i = 0; i < n * width; ++i) ASSERT_NEAR(out[i], product(i / width, i % width), 1e-12) << kernels->name << " " << n;
+      }
+}
+
+// A front of w pivots in one panel, and r rows behind it: L and the update matrix against dense algebra, with the update matrix made anew
+// or added to.
+TEST(kernels, of_every_instruction_set_eliminate_a_panel) {
+  std::mt19937 random(7);
+  for (const Kernels* kernels : list_kernels())
+    for (const int w : {3, 15, 36, 72})
+      for (const int r : {3, 12, 30, 96, 201})
+        for (const bool is_made : {false, true}) {
+          Eigen::MatrixXd a = make_numbers(w + r, w + r, random);
+          a = (a + a.transpose()).eval();
+          const Eigen::MatrixXd schur = a.bottomRightCorner(r, r) * (is_made ? 0 : 1) -
+                                        a.bottomLeftCorner(r, w) * a.topLeftCorner(w, w).fullPivLu().solve(a.topRightCorner(w, r));
+          Eigen::MatrixXd front = a;
+          if (is_made) front.bottomRightCorner(r, r).setConstant(std::numeric_limits<double>::quiet_NaN());
+          alignas(64) double block[kMaxBlock * kMaxBlock];
+          for (int j = 0; j < w; ++j)
+            for (int i = 0; i < w; ++i) block[j * kMaxBlock + i] = a(i, j);
+          BlockPivots pivots;
+          std::vector<double> triangle(count_triangle(w)), tiles(r * w);
+          ASSERT_TRUE(kernels->factorise_block(block, w, pivots, triangle.data()));
+          std::vector<double*> columns(w + r);
+          const double* ordered[kMaxBlock];
+          for (int j = 0; j < w + r; ++j) columns[j] = front.col(j).data();
+          for (int k = 0; k < w; ++k) ordered[k] = columns[pivots.order[k]];
+          const auto wide = std::unique_ptr<double, void (*)(void*)>(
+              static_cast<double*>(std::aligned_alloc(64, sizeof(double) * w * (r + kWideRows) / 64 * 64 + 64)), std::free);
+          double growth = 0;
+          kernels->calc_wide(ordered, w, w + r, w, triangle.data(), wide.get());
+          kernels->divide_wide(wide.get(), r, w, pivots, tiles.data(), growth);
+          kernels->update({tiles.data(), wide.get(), w, w}, w, w + r, is_made, columns.data());
+          const double scale = schur.cwiseAbs().maxCoeff() + a.cwiseAbs().maxCoeff();
+          double largest = 0;
+          for (const double l : tiles) largest = std::max(largest, std::abs(l));
+          EXPECT_EQ(growth, largest);
+          const double tolerance = 1e-12 * scale * std::max(1.0, growth);
+          for (int j = 0; j < r; ++j)
+            for (int i = j; i < r; ++i)
+              ASSERT_NEAR(front(w + i, w + j), schur(i, j), tolerance) << kernels->name << " " << w << " " << r << " " << i << " " << j;
         }
 }
 
