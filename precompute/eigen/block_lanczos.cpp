@@ -54,6 +54,7 @@ constexpr double kSeen = 1e-3;             // A Ritz value with this error is no
 // What the type keeps in eps->data.
 struct Settings {
   PetscInt block = PETSC_DEFAULT;
+  PetscBool knows_count = PETSC_TRUE;
   Mat locked = nullptr;
 };
 
@@ -521,7 +522,8 @@ void Iteration::choose_wanted(Ritz& ritz, const Small& lambda) const {
     const auto at = static_cast<std::size_t>(i);
     return !is_inside(i) && std::abs(lambda[at] - sigma) > reach && ritz.error[at] <= kSeen;
   });
-  ritz.done = ritz.converged >= wanted || (inside == ritz.converged && sees_past);
+  const bool has_all = get_settings(eps_).knows_count == PETSC_TRUE && ritz.converged >= wanted;
+  ritz.done = has_all || (inside == ritz.converged && sees_past);
 }
 
 void Iteration::share_vectors(Ritz& ritz) const {
@@ -780,6 +782,13 @@ PetscErrorCode set_block_size(EPS eps, PetscInt columns) {
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "blocks of %d columns", static_cast<int>(columns));
   get_settings(eps).block = columns;
   eps->state = EPS_STATE_INITIAL;
+  return 0;
+}
+
+PetscErrorCode set_count_known(EPS eps, PetscBool known) {
+  PetscBool is_ours = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_ours));
+  if (is_ours == PETSC_TRUE) get_settings(eps).knows_count = known;
   return 0;
 }
 

@@ -335,6 +335,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   const Family family = find_family(eps);
   set_operator(eps, request, family, shell, mass);
   check(set_block_size(eps, kBlock));
+  check(set_count_known(eps, request.is_count_known ? PETSC_TRUE : PETSC_FALSE));
   check(EPSLanczosSetReorthog(eps, EPS_LANCZOS_REORTHOG_FULL));
   check(EPSSetTolerances(eps, request.tolerance, PETSC_DEFAULT));
   check(EPSSetPurify(eps, PETSC_FALSE));
@@ -356,15 +357,21 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
 
   petsc::VecHandle shape;
   check(MatCreateVecs(request.stiffness, shape.out(), nullptr));
+  EPSConvergedReason reason = EPS_CONVERGED_ITERATING;
+  check(EPSGetConvergedReason(eps, &reason));
   PetscInt converged = 0;
   check(EPSGetConverged(eps, &converged));
+  double highest = request.sigma;
   for (PetscInt i = 0; i < converged; ++i) {
     PetscScalar lambda = 0;
     check(EPSGetEigenpair(eps, i, &lambda, nullptr, shape, nullptr));
     if (lambda < request.low || lambda > request.high) continue;
     if ((family == Family::plain || family == Family::dense) && !clear_of_locked(request, shape)) continue;
     found.add(shape, lambda);
+    highest = std::max(highest, lambda);
   }
+  // The block method ends when the interval is done, the others with the farthest of what is nearest.
+  shell.statistics.solved_to = std::min(family == Family::block && reason > 0 ? request.high : highest, request.high);
   return shell.statistics;
 }
 

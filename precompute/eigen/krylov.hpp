@@ -42,7 +42,8 @@ struct KrylovRequest {
   double sigma = 0;
   double low = 0;  // the interval whose eigenvalues are sought,
   double high = 0;
-  PetscInt count = 0;                                    // how many it is known to hold beside the locked ones,
+  PetscInt count = 0;                                    // how many it holds beside the locked ones,
+  bool is_count_known = true;                            // as is known, or guessed,
   PetscInt nearest = 0;                                  // and so many nearest sigma cover them (for what can only seek the nearest)
   Method method = Method::kAutomatic;                    // unless SLEPc's options say otherwise
   double tolerance = 1e-10;                              // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
@@ -55,6 +56,7 @@ struct KrylovRequest {
 struct KrylovStatistics {
   std::int64_t solves = 0;
   double solve_seconds = 0;
+  double solved_to = 0;  // From sigma up to here no eigenvalue is missing, as far as the run can tell; at most the interval's end.
 };
 
 /// Adds the eigenpairs of K x = lambda M x that it finds in the interval to `found`; fewer than there are when some did not converge, or

@@ -1,6 +1,6 @@
 // The band from count to proof: one object, one state; longer than most files.
 // Method:     1. The rigid modes are built in closed form and deflated. 2. The inertia of K - lambda M at both ends of the band says how
-//             many modes it holds; many are cut into slices by further counts. 3. Block Lanczos with a shift inside the slice finds them;
+//             many modes it holds; many are gone through in slices. 3. Block Lanczos with a shift inside the slice finds them;
 //             copies of repeated eigenvalues that a run leaves out are sought again with everything found deflated. 4. Every count, those
 //             at the shifts too, must agree with the modes found below it. 5. Clusters get a canonical basis; residuals and
 //             orthonormality are measured from K and M.
@@ -49,6 +49,7 @@ constexpr double kSafeMargin = 1e-7;       // Counts nearer to a mode (relative 
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
 constexpr int kRounds = 60;                // Krylov runs per interval at most until its count is met,
 constexpr int kIdleRounds = 2;             // and so many without a new mode.
+constexpr int kGuess = -1;                 // The round of a run whose count is a guess.
 constexpr double kKrylovTolerance = 0.1;   // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
 
 double calc_lambda(double freq_hz) {
@@ -67,10 +68,10 @@ class BandSolver {
   void make_counter();
   void solve_sparse_band();
   Slice count_band();
-  std::vector<Slice> cut(const Slice& band);
-  void solve_slice(const Slice& slice);
+  Slice cut(const Slice& band);
+  void solve_in_slices(const Slice& band);
   void find_missing(const Slice& slice, double sigma);
-  void run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round);
+  double run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round);
   std::int64_t count_found(double low, double high) const;
   double find_margin(double lambda) const;
   void move_doubtful_counts();
@@ -208,11 +209,10 @@ Slice BandSolver::count_band() {
   return band;
 }
 
-std::vector<Slice> BandSolver::cut(const Slice& band) {
-  const CountBelow count = [this](double lambda) { return counter_->take(lambda).below; };
-  const Slice wanted = options_.max_modes ? cut_to_lowest(band, *options_.max_modes, count) : band;
-  if (options_.factorisation == Factorisation::kCholmod) return {wanted};  // It cannot shift into the band.
-  return cut_into_slices(wanted, kSliceModes, count);
+// The part of the band that holds the modes wanted.
+Slice BandSolver::cut(const Slice& band) {
+  if (!options_.max_modes) return band;
+  return cut_to_lowest(band, *options_.max_modes, [this](double lambda) { return counter_->take(lambda).below; });
 }
 
 void BandSolver::make_counter() {
@@ -228,17 +228,14 @@ void BandSolver::solve_sparse_band() {
     counter_.reset();
     return solve_dense_band();
   }
-  const std::vector<Slice> slices = cut(band);
-  sought_to_ = slices.back().high;
-  const std::int64_t wanted = slices.back().below_high - slices.front().below_low;
-  std::int64_t widest = 0;
-  for (const Slice& slice : slices) widest = std::max(widest, slice.count());
+  const Slice wanted = cut(band);
+  sought_to_ = wanted.high;
   PetscInt rows = 0;
   check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
-  check_memory(comm_, static_cast<std::int64_t>(rows) * 8 * (wanted + 5 * widest / 2 + 100), options_.memory_limit_bytes,
-               fmt::format("The search for {} modes", wanted));
-  found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted));
-  for (const Slice& slice : slices) solve_slice(slice);
+  check_memory(comm_, static_cast<std::int64_t>(rows) * 8 * (wanted.count() + 5 * std::min(wanted.count(), kSliceModes) / 2 + 100),
+               options_.memory_limit_bytes, fmt::format("The search for {} modes", wanted.count()));
+  found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted.count()));
+  solve_in_slices(wanted);
   prove();
   describe_proof();
   take_found();
@@ -248,8 +245,9 @@ std::int64_t BandSolver::count_found(double low, double high) const {
   return std::count_if(found_.lambda.begin(), found_.lambda.end(), [&](double lambda) { return lambda >= low && lambda < high; });
 }
 
-// One Krylov run; adds to found_ what lies in the slice and was not there.
-void BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round) {
+// One Krylov run; adds to found_ what lies in the slice and was not there. Returns up to where from sigma on it left nothing out. `round`
+// below zero: `missing` is a guess.
+double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round) {
   const Timer timer(modes_.seconds.iterate);
   KrylovRequest request;
   request.stiffness = problem_.stiffness;
@@ -260,11 +258,12 @@ void BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sig
   request.low = slice.low * (1 - kEdgeTolerance);
   request.high = slice.high * (1 + kEdgeTolerance);
   request.count = petsc::to_petsc_int(missing);
+  request.is_count_known = round >= 0;
   // Those below the slice are nearer the shift than its upper end when it starts at the bottom. Copies that rounding alone brings in come
   // late: later runs ask for some more, beyond the slice.
   const bool is_below = sigma - slice.low * 0.5 > slice.high - sigma || sigma < slice.low;
   const std::int64_t below = slice.below_low - modes_.rigid_count;
-  request.nearest = petsc::to_petsc_int(missing + (is_below || 5 * below <= slice.count() ? below : 0) + std::min(round, 4) * 10);
+  request.nearest = petsc::to_petsc_int(missing + (is_below || 5 * below <= slice.count() ? below : 0) + std::clamp(round, 0, 4) * 10);
   request.method = options_.method;
   request.tolerance = kKrylovTolerance * options_.tolerance;
   request.position = &problem_.nodes.position;
@@ -278,6 +277,7 @@ void BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sig
   const KrylovStatistics statistics = run_krylov(request, found_);
   modes_.factor.solves += statistics.solves;
   modes_.seconds.solve += statistics.solve_seconds;
+  return statistics.solved_to;
 }
 
 // Runs around sigma, where the factor stands or will be put, until the slice holds what it was counted to hold.
@@ -308,9 +308,20 @@ void BandSolver::find_missing(const Slice& slice, double sigma) {
   }
 }
 
-void BandSolver::solve_slice(const Slice& slice) {
-  if (slice.count() == 0) return;
-  find_missing(slice, std::midpoint(slice.low, slice.high));
+void BandSolver::solve_in_slices(const Slice& band) {
+  // CHOLMOD cannot shift into the band.
+  const std::int64_t most = options_.factorisation == Factorisation::kCholmod ? band.count() : kSliceModes;
+  Sweep sweep(band, most, [this](double lambda) {
+    report(Phase::kFactor, static_cast<std::int64_t>(found_.lambda.size()));
+    return counter_->take(lambda).below;
+  });
+  while (!sweep.is_last()) {
+    const Sweep::Part part = sweep.take();
+    const double solved_to = run_round(part.slice, counter_->get_factor(), part.sigma, part.slice.count(), kGuess);
+    sweep.advance(solved_to, band.below_low + count_found(band.low * (1 - kEdgeTolerance), solved_to));
+  }
+  const Slice& rest = sweep.get_rest();
+  if (rest.count() > 0) find_missing(rest, std::midpoint(rest.low, rest.high));
 }
 
 // Distance of the nearest mode found, relative to lambda.
