@@ -74,31 +74,6 @@ Elasticity turn(const Elasticity& own, const Square3& a) {
   return turned;
 }
 
-/// Eigenvalues of a symmetric 6 x 6 matrix by Jacobi's rotations (Golub and Van Loan, section 8.5).
-std::array<double, 6> calc_eigenvalues(Elasticity a) {
-  for (int sweep = 0; sweep < 30; ++sweep)
-    for (int p = 0; p < 6; ++p)
-      for (int q = p + 1; q < 6; ++q) {
-        if (a[6 * p + q] == 0.0) continue;
-        const double theta = (a[6 * q + q] - a[6 * p + p]) / (2 * a[6 * p + q]);
-        const double t = std::copysign(1.0, theta) / (std::abs(theta) + std::hypot(theta, 1.0));
-        const double c = 1 / std::hypot(t, 1.0), s = t * c;
-        for (int k = 0; k < 6; ++k) {
-          const double kp = a[6 * k + p], kq = a[6 * k + q];
-          a[6 * k + p] = c * kp - s * kq;
-          a[6 * k + q] = s * kp + c * kq;
-        }
-        for (int k = 0; k < 6; ++k) {
-          const double pk = a[6 * p + k], qk = a[6 * q + k];
-          a[6 * p + k] = c * pk - s * qk;
-          a[6 * q + k] = s * pk + c * qk;
-        }
-      }
-  std::array<double, 6> values{};
-  for (int i = 0; i < 6; ++i) values[i] = a[7 * i];
-  return values;
-}
-
 /// Bulk and shear modulus of the isotropic solid nearest to a material.
 struct Moduli {
   double bulk_pa = 0.0, shear_pa = 0.0;
@@ -131,6 +106,32 @@ double find_loss_factor(const std::vector<LossRow>& table, double freq_hz) {
 }
 
 }  // namespace
+
+// Jacobi's rotations (Golub and Van Loan, section 8.5).
+std::array<double, 6> calc_eigenvalues(Elasticity a) {
+  for (int sweep = 0; sweep < 30; ++sweep)
+    for (int p = 0; p < 6; ++p)
+      for (int q = p + 1; q < 6; ++q) {
+        if (a[6 * p + q] == 0.0) continue;
+        const double theta = (a[6 * q + q] - a[6 * p + p]) / (2 * a[6 * p + q]);
+        const double t = std::copysign(1.0, theta) / (std::abs(theta) + std::hypot(theta, 1.0));
+        const double c = 1 / std::hypot(t, 1.0), s = t * c;
+        for (int k = 0; k < 6; ++k) {
+          const double kp = a[6 * k + p], kq = a[6 * k + q];
+          a[6 * k + p] = c * kp - s * kq;
+          a[6 * k + q] = s * kp + c * kq;
+        }
+        for (int k = 0; k < 6; ++k) {
+          const double pk = a[6 * p + k], qk = a[6 * q + k];
+          a[6 * p + k] = c * pk - s * qk;
+          a[6 * q + k] = s * pk + c * qk;
+        }
+      }
+  std::array<double, 6> values{};
+  for (int i = 0; i < 6; ++i) values[i] = a[7 * i];
+  std::sort(values.begin(), values.end());
+  return values;
+}
 
 Elasticity Material::calc_elasticity_pa() const {
   if (orthotropic) return turn(calc_own(*orthotropic), orthotropic->axes);

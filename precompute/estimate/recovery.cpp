@@ -16,6 +16,7 @@
 #include <numeric>
 
 #include "precompute/estimate/surface.hpp"
+#include "precompute/fem/element.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::estimate {
@@ -93,15 +94,14 @@ std::array<float, 36> calc_root(const Solid& solid) {
   return root;
 }
 
-/// sqrt(K_full / K) of the bulk moduli that the variation and the mean of the dilatation of a T10 meet; fem::Solid::full_lambda_pa.
+/// sqrt(K_full / K) of the bulk moduli that the variation and the mean of the dilatation of a T10 meet; fem::Solid::mean_lambda_pa.
 float find_dilatation(const Solid& solid) {
-  constexpr double kFullLambda = 10.0;  // that of precompute/fem/element.hpp
+  const double mean = fem::calc_mean_lambda(solid.elasticity_pa);
+  if (mean == 0.0) return 1.0F;
   const auto& c = solid.elasticity_pa;
-  const double lambda = c[1], mu = c[35], scale = 1e-9 * c[0];
-  const Solid isotropic = make_isotropic(mu * (3 * lambda + 2 * mu) / (lambda + mu), lambda / (2 * (lambda + mu)), 1.0);
-  for (int i = 0; i < 36; ++i)
-    if (!(std::abs(isotropic.elasticity_pa[i] - c[i]) <= 1e3 * scale)) return 1.0F;
-  return lambda > kFullLambda * mu ? static_cast<float>(std::sqrt((kFullLambda + 2.0 / 3) * mu / (lambda + 2 * mu / 3))) : 1.0F;
+  const double shear = (c[0] + c[7] + c[14] - c[1] - c[2] - c[8] + 3 * (c[21] + c[28] + c[35])) / 15;
+  const double full = (fem::kFullLambda + 2.0 / 3) * shear;
+  return static_cast<float>(std::sqrt(full / (full + mean)));
 }
 
 /// The normal matrices of all patches, summed over the ranks, then their regularised inverses.

@@ -63,9 +63,8 @@ std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
 System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, Form form) {
   LocalRows rows = make_rows(comm, local, mass == spec::Mass::lumped);
   petsc::run_agreed(comm, [&] {
-    std::vector<Solid> solids(materials.list.begin(), materials.list.end());
-    if (form == Form::displacement)
-      for (Solid& solid : solids) solid.full_lambda_pa = solid.lame_lambda_pa;
+    std::vector<Solid> solids;
+    for (const spec::Material& material : materials.list) solids.emplace_back(material, form == Form::displacement);
     ElementMatrices element;
     std::array<Vec3, kMaxNodes> x;
     for (const std::int32_t e : order_by_row(local)) {

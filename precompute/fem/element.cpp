@@ -275,10 +275,10 @@ double calc_curved_mass(std::span<const Vec3> x, std::array<double, kMaxNodes * 
 
 /// Adds what the bulk modulus is stiffer than the products have it, for the mean dilatation only: excess (integral div u)^2 / V.
 void add_mean_dilatation(const std::array<double, 3 * kMaxNodes>& divergence, double volume, double excess, ElementMatrices& out) {
-  constexpr int kWidth = 3 * kMaxNodes;
-  for (int row = 0; row < kWidth; ++row)
-    for (int column = 0; column < kWidth; ++column)
-      out.stiffness[row * kWidth + column] += excess / volume * divergence[row] * divergence[column];
+  const int width = 3 * out.nodes;
+  for (int row = 0; row < width; ++row)
+    for (int column = 0; column < width; ++column)
+      out.stiffness[row * width + column] += excess / volume * divergence[row] * divergence[column];
 }
 
 void lump_hrz(ElementMatrices& out, double mass_kg) {
@@ -291,19 +291,41 @@ void lump_hrz(ElementMatrices& out, double mass_kg) {
 
 }  // namespace
 
-Solid::Solid(const spec::Material& material)
-    : isotropic(!material.orthotropic),
-      lame_lambda_pa(material.lame_lambda_pa()),
-      full_lambda_pa(std::min(lame_lambda_pa, kFullLambda * material.lame_mu_pa())),
-      lame_mu_pa(material.lame_mu_pa()),
-      density_kg_m3(material.density_kg_m3) {
-  if (isotropic) return;
+double calc_mean_lambda(const spec::Elasticity& c) {
+  // C s = 1 for the normal strains s under a unit pressure, by elimination; C is positive definite.
+  std::array<std::array<double, 7>, 6> row{};
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) row[i][j] = c[6 * i + j];
+    row[i][6] = i < 3 ? 1.0 : 0.0;
+  }
+  for (int p = 0; p < 6; ++p)
+    for (int i = 0; i < 6; ++i) {
+      if (i == p) continue;
+      const double factor = row[i][p] / row[p][p];
+      for (int j = p; j < 7; ++j) row[i][j] -= factor * row[p][j];
+    }
+  double dilatation = 0.0;
+  for (int i = 0; i < 3; ++i) dilatation += row[i][6] / row[i][i];
+  const double bulk = 1 / dilatation;
+  const double shear = (c[0] + c[7] + c[14] - c[1] - c[2] - c[8] + 3 * (c[21] + c[28] + c[35])) / 15;
+  return std::max(bulk - (kFullLambda + 2.0 / 3) * shear, 0.0);
+}
+
+Solid::Solid(const spec::Material& material, bool full)
+    : isotropic(!material.orthotropic), lame_mu_pa(material.lame_mu_pa()), density_kg_m3(material.density_kg_m3) {
+  if (isotropic) {
+    mean_lambda_pa = full ? 0.0 : std::max(material.lame_lambda_pa() - kFullLambda * lame_mu_pa, 0.0);
+    full_lambda_pa = material.lame_lambda_pa() - mean_lambda_pa;
+    return;
+  }
   constexpr int kVoigt[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
   const spec::Elasticity c = material.calc_elasticity_pa();
+  mean_lambda_pa = full ? 0.0 : calc_mean_lambda(c);
   for (int r = 0; r < 3; ++r)
     for (int s = 0; s < 3; ++s)
       for (int b = 0; b < 3; ++b)
-        for (int d = 0; d < 3; ++d) tensor_pa[27 * r + 9 * s + 3 * b + d] = c[6 * kVoigt[r][b] + kVoigt[s][d]];
+        for (int d = 0; d < 3; ++d)
+          tensor_pa[27 * r + 9 * s + 3 * b + d] = c[6 * kVoigt[r][b] + kVoigt[s][d]] - (r == b && s == d ? mean_lambda_pa : 0.0);
 }
 
 bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, ElementMatrices& out) {
@@ -314,31 +336,37 @@ bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, 
   const bool curved = n == kMaxNodes && !is_straight(x);
   if (!curved && !(volume > 0.0)) return false;
   if (n == 4) {
-    put_stiffness(calc_linear_products(b, volume), solid, solid.lame_lambda_pa, out);
+    put_stiffness(calc_linear_products(b, volume), solid, solid.full_lambda_pa + solid.mean_lambda_pa, out);
+    if (!solid.isotropic && solid.mean_lambda_pa > 0) {
+      std::array<double, 3 * kMaxNodes> divergence{};
+      for (int i = 0; i < 4; ++i)
+        for (int r = 0; r < 3; ++r) divergence[3 * i + r] = volume * b[i][r];
+      add_mean_dilatation(divergence, volume, solid.mean_lambda_pa, out);
+    }
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j) out.mass[i * 4 + j] = mass_kg / 20.0 * (i == j ? 2 : 1);
   } else if (!curved) {
     put_straight_t10(b, volume, solid, out);
     put_straight_mass(mass_kg, out);
-    if (solid.lame_lambda_pa > solid.full_lambda_pa) {
+    if (solid.mean_lambda_pa > 0) {
       // integral d N / d L_a is 0 for corners (4 L_a - 1) and V for mid nodes (4 L_b)
       std::array<double, 3 * kMaxNodes> divergence{};
       for (int e = 0; e < 6; ++e)
         for (int r = 0; r < 3; ++r) divergence[12 + 3 * e + r] = volume * (b[mesh::kEdges[e][0]][r] + b[mesh::kEdges[e][1]][r]);
-      add_mean_dilatation(divergence, volume, solid.lame_lambda_pa - solid.full_lambda_pa, out);
+      add_mean_dilatation(divergence, volume, solid.mean_lambda_pa, out);
     }
   } else {
     Gradients gradients;
     if (!calc_gradients(x, gradients)) return false;
     put_stiffness(calc_curved_products(gradients), solid, solid.full_lambda_pa, out);
-    if (solid.lame_lambda_pa > solid.full_lambda_pa) {
+    if (solid.mean_lambda_pa > 0) {
       std::array<double, 3 * kMaxNodes> divergence{};
       double sum = 0.0;
       for (std::size_t q = 0; q < 14; ++q) {
         sum += gradients.dv[q];
         for (std::size_t i = 0; i < divergence.size(); ++i) divergence[i] += gradients.dv[q] * gradients.b[q][i];
       }
-      add_mean_dilatation(divergence, sum, solid.lame_lambda_pa - solid.full_lambda_pa, out);
+      add_mean_dilatation(divergence, sum, solid.mean_lambda_pa, out);
     }
     mass_kg = solid.density_kg_m3 * calc_curved_mass(x, out.mass);
     for (double& m : out.mass) m *= solid.density_kg_m3;

@@ -29,23 +29,29 @@ struct ElementMoments {
 /// Poisson's ratios up to kFullLambda / (2 (kFullLambda + 1)) = 0.4545 are not touched.
 inline constexpr double kFullLambda = 10.0;
 
+/// What the mean of the dilatation alone meets in a T10 [Pa]: the part of the bulk modulus (Reuss' average) above (kFullLambda + 2/3) times
+/// the shear modulus (Voigt's average), for an isotropic solid lambda - kFullLambda mu; 0 if there is none. C less this part of every
+/// normal pair is still positive definite.
+double calc_mean_lambda(const spec::Elasticity& elasticity_pa);
+
 /// A material as the elements use it, made once for many elements.
 struct Solid {
-  Solid(const spec::Material& material);  // NOLINT(google-explicit-constructor): a material is a solid
+  /// full: all of the dilatation within an element meets all of the elasticity, near incompressibility too.
+  Solid(const spec::Material& material, bool full = false);  // NOLINT(google-explicit-constructor): a material is a solid
 
   bool isotropic = true;
-  double lame_lambda_pa = 0.0;
-  double full_lambda_pa = 0.0;  // what all of the dilatation in a T10 meets; its mean over the element meets lame_lambda_pa
+  double full_lambda_pa = 0.0;  // of isotropic solids: what all of the dilatation in a T10 meets;
+  double mean_lambda_pa = 0.0;  // of all: what its mean over the element meets beside
   double lame_mu_pa = 0.0;
   double density_kg_m3 = 0.0;
-  std::array<double, 81> tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd; of anisotropic solids only
+  std::array<double, 81> tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd, less mean_lambda_pa; of anisotropic ones
 };
 
 /// Calculates K and M of the element with node positions x, (4) or (10) in the order of mesh::TetMesh. Mid-side nodes are used where they
 /// are (isoparametric) unless all lie within 1e-6 of an edge's length from its middle. Straight-sided T10 are integrated exactly; the mass
 /// of curved ones too, their stiffness by a rule of degree 5.
 /// T4: OSG02 eqs. 12 (corrected: + vol), 14, 15; T10: the same strain energy, HRZ lumping (Hinton, Rock and Zienkiewicz 1976).
-/// T10 of nearly incompressible solids (Solid::full_lambda_pa below lame_lambda_pa): mean dilatation for what lambda is above that.
+/// T10 of nearly incompressible solids: mean dilatation for Solid::mean_lambda_pa.
 /// Returns false, with `out` unusable, when the Jacobian is not positive at every node and integration point of the stiffness; each of them
 /// is one that mesh::is_folded tests. Not collective.
 [[nodiscard]] bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, ElementMatrices& out);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "precompute/eigen/solver_options.hpp"
+#include "precompute/fem/element.hpp"
 #include "precompute/fem/energy.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
@@ -160,6 +161,26 @@ void warn_of_oddities(Run& run, const eigen::Modes& modes) {
   if (modes.lambda.empty()) run.stations.warn("no mode lies in the band: the bank will be silent");
 }
 
+/// Elements that cannot bend without straining in the one way that the solid hardly allows are too stiff; docs/elements.md.
+void warn_of_locking(Run& run, const spec::Material& material, bool is_linear) {
+  constexpr double kStiff = 50;
+  if (is_linear && material.poisson_ratio > 0.4)
+    run.stations.warn(
+        fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
+                    material.poisson_ratio));
+  if (!material.orthotropic) return;
+  spec::Elasticity c = material.calc_elasticity_pa();
+  const double mean = fem::calc_mean_lambda(c);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) c[6 * i + j] -= mean;
+  const auto stiffness = spec::calc_eigenvalues(c);
+  if (stiffness[5] > kStiff * stiffness[4])
+    run.stations.warn(
+        fmt::format("{}: the solid is {:.0f} times as stiff in one strain as in any other: coarse meshes lock and are some per cent sharp; "
+                    "compare with a finer one",
+                    material.place, stiffness[5] / stiffness[4]));
+}
+
 }  // namespace
 
 SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
@@ -174,12 +195,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
       name_errors(body.source, run, [&] { return fem::assemble(run.comm, body.pieces.local, solved.materials, run.job.mass); });
   solved.volume_m3 = fem::calc_volumes(run.comm, body.pieces.local, solved.materials);
   solved.rigid = fem::calc_rigid_body(run.comm, body.pieces.local, solved.materials);
-  for (const spec::Material& material : solved.materials.list) {
-    if (is_linear && material.poisson_ratio > 0.4)
-      run.stations.warn(
-          fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
-                      material.poisson_ratio));
-  }
+  for (const spec::Material& material : solved.materials.list) warn_of_locking(run, material, is_linear);
   run.stations.end();
 
   solved.modes = solve_named(run, setting, body, system, make_layout(body.pieces));

@@ -196,5 +196,22 @@ TEST(Lumped, mass_of_T4_lowers_and_of_T10_keeps_the_frequencies_of_a_bar_within_
   EXPECT_LT(bank.freq_hz(1), 1135.46) << "HRZ lumping comes from below";
 }
 
+TEST(Fibres, that_make_coarse_meshes_lock_are_warned_of_and_wood_is_not) {
+  for (const auto& [young, is_warned] : {std::pair("[2e11, 1e8, 1e8]", true), std::pair("[11e9, 0.9e9, 0.5e9]", false)}) {
+    Folder folder;
+    folder.write("job.json",
+                 fmt::format(R"({{"body": {{"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.02, "nodes": 300}},
+      "band_hz": [20, 2000], "bank": "out.bank",
+      "material": {{"orthotropic": {{"young_modulus_pa": {}, "shear_modulus_pa": [4e7, 4e7, 4e7], "poisson_ratio": [0.3, 0.3, 0.3]}},
+                   "density_kg_m3": 1000, "damping": {{"rayleigh": {{}}}}}}}})",
+                             young));
+    const Outcome outcome = folder.run();
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_EQ(outcome.output.find("job.json:3: the solid is 1400 times as stiff in one strain") != std::string::npos, is_warned)
+        << outcome.output;
+    EXPECT_EQ(outcome.output.find("as stiff in one strain") != std::string::npos, is_warned) << outcome.output;
+  }
+}
+
 }  // namespace
 }  // namespace carillon::tests
