@@ -41,8 +41,8 @@ Graph make_dual_graph(std::span<const std::int32_t> corners);
 /// negative entries are skipped (nodes that take no part). Throws InputError when the graph exceeds 32-bit indices.
 Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::int32_t nodes);
 
-/// Cuts tetrahedra into `parts` parts of nearly equal size with few shared faces between them: METIS k-way on the dual graph, contiguous
-/// parts where METIS can make them. No part is empty. The same input gives the same answer. corners: (E, 4).
+/// Cuts tetrahedra into `parts` parts of nearly equal size with few tetrahedra on the seams between them: METIS k-way on the dual graph,
+/// contiguous parts where METIS can make them. No part is empty. The same input gives the same answer. corners: (E, 4).
 /// Throws InputError when there are fewer elements than parts, SystemError when METIS runs out of memory.
 Partition partition_elements(std::span<const std::int32_t> corners, int parts);
 

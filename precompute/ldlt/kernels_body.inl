@@ -51,17 +51,24 @@ inline TileRows<kStride> find_rows(double* all, const int* nodes, int count) {
 template <int kHeight, int kBegin, int kCount, int kUsed, int kStride, bool kSet>
 inline void multiply_rows(const double* tile, int n, const Vector* in, const TileRows<kStride>& out, int first) {
   Vector sum[kCount][kUsed];
+#pragma GCC unroll 12
   for (int i = 0; i < kCount; ++i)
+#pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) sum[i][v] = kSet ? Vector{} : out.at(kBegin + i, first + v);
   for (int k = 0; k < n; ++k) {
     Vector row[kUsed];
+#pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) row[v] = in[k * kStride + first + v];
     const double* a = tile + k * kHeight + kBegin;
     for (int i = 0; i < kCount; i += kLine) __builtin_prefetch(a + kAhead + i);
+#pragma GCC unroll 12
     for (int i = 0; i < kCount; ++i)
+#pragma GCC unroll 2
       for (int v = 0; v < kUsed; ++v) sum[i][v] = kSet ? sum[i][v] + row[v] * a[i] : sum[i][v] - row[v] * a[i];
   }
+#pragma GCC unroll 12
   for (int i = 0; i < kCount; ++i)
+#pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) out.at(kBegin + i, first + v) = sum[i][v];
 }
 
@@ -107,17 +114,24 @@ void set_triangle(const double* tiles, int n, const double* in_rows, double* out
 template <int kHeight, int kCount, int kUsed, int kStride, bool kAdd>
 inline void multiply_columns(const double* tile, const TileRows<kStride>& in, int first, Vector* out) {
   Vector sum[kCount][kUsed];
+#pragma GCC unroll 12
   for (int k = 0; k < kCount; ++k)
+#pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) sum[k][v] = out[k * kStride + first + v];
   for (int i = 0; i < kHeight * kCount; i += kLine) __builtin_prefetch(tile + kAhead + i);
   for (int i = 0; i < kHeight; ++i) {
     Vector row[kUsed];
+#pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) row[v] = in.at(i, first + v);
     const double* a = tile + i;
+#pragma GCC unroll 12
     for (int k = 0; k < kCount; ++k)
+#pragma GCC unroll 2
       for (int v = 0; v < kUsed; ++v) sum[k][v] = kAdd ? sum[k][v] + row[v] * a[k * kHeight] : sum[k][v] - row[v] * a[k * kHeight];
   }
+#pragma GCC unroll 12
   for (int k = 0; k < kCount; ++k)
+#pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) out[k * kStride + first + v] = sum[k][v];
 }
 
@@ -349,8 +363,11 @@ template <int kHeight, bool kMinus, int kCount, int kUsed>
 inline void add_outer(const double* tile, const Vector* strip, int n, Vector (&sum)[kCount][kUsed]) {
   for (int k = 0; k < n; ++k) {
     Vector row[kUsed];
+#pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) row[v] = strip[k * kLanes + v];
+#pragma GCC unroll 12
     for (int i = 0; i < kCount; ++i)
+#pragma GCC unroll 2
       for (int v = 0; v < kUsed; ++v)
         sum[i][v] = kMinus ? sum[i][v] - row[v] * tile[k * kHeight + i] : sum[i][v] + row[v] * tile[k * kHeight + i];
   }
@@ -364,7 +381,9 @@ inline void multiply_strip(const double* tile, const Vector* strip, int n, Vecto
     for (int v = 0; v < kLanes; v += kVectors) {
       Vector sum[kCount][kVectors] = {};
       add_outer<kHeight, false>(tile + kBegin, strip + v, n, sum);
+#pragma GCC unroll 12
       for (int i = 0; i < kCount; ++i)
+#pragma GCC unroll 2
         for (int u = 0; u < kVectors; ++u) out[(kBegin + i) * kLanes + v + u] = sum[i][u];
     }
     multiply_strip<kHeight, kBegin + kCount>(tile, strip, n, out);
@@ -378,12 +397,16 @@ inline void update_block(const double* tile, const Vector* strip, int n, bool is
     constexpr int kCount = kHeight - kBegin < kRows ? kHeight - kBegin : kRows;
     for (int v = 0; v < kLanes; v += kVectors) {
       if (!is_set)
+#pragma GCC unroll 12
         for (int i = 0; i < kCount; ++i)
+#pragma GCC unroll 2
           for (int u = 0; u < kVectors; ++u) __builtin_prefetch(columns[kBegin + i] + row + 8 * (v + u), 1);
       Vector sum[kCount][kVectors] = {};
       add_outer<kHeight, true>(tile + kBegin, strip + v, n, sum);
+#pragma GCC unroll 12
       for (int i = 0; i < kCount; ++i) {
         double* target = columns[kBegin + i] + row + 8 * v;
+#pragma GCC unroll 2
         for (int u = 0; u < kVectors; ++u) store_vector(target + 8 * u, is_set ? sum[i][u] : load_vector(target + 8 * u) + sum[i][u]);
       }
     }

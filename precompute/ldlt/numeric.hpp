@@ -10,7 +10,13 @@
 
 namespace carillon::ldlt {
 
-/// Uninitialised numbers, aligned for vectors. Throws std::bad_alloc.
+struct FreeNumbers {
+  std::size_t mapped_bytes = 0;  // 0: from the heap
+  void operator()(double* p) const;
+};
+
+/// Uninitialised numbers, aligned for vectors. Large ones are pages of their own, which go back to the system at once: update matrices come
+/// and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
 class Buffer {
  public:
   Buffer() = default;
@@ -19,10 +25,7 @@ class Buffer {
   std::int64_t size() const { return size_; }
 
  private:
-  struct Free {
-    void operator()(double* p) const { std::free(p); }
-  };
-  std::unique_ptr<double, Free> data_;
+  std::unique_ptr<double, FreeNumbers> data_;
   std::int64_t size_ = 0;
 };
 
