@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numeric>
 #include <tuple>
 
@@ -43,6 +44,27 @@ void sum_over_ranks(MPI_Comm comm, std::vector<double>& values) {
   MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, comm);
 }
 
+// Sums of `kSums` terms each over the rows. Eight of each at a time, so that they need not wait for one another.
+template <std::size_t kSums, typename Terms>
+std::array<double, kSums> sum_rows(std::ptrdiff_t rows, Terms&& terms) {
+  constexpr std::ptrdiff_t kLanes = 8;
+  double lanes[kSums][kLanes] = {};
+  std::ptrdiff_t i = 0;
+  for (; i + kLanes <= rows; i += kLanes) {
+    for (std::ptrdiff_t lane = 0; lane < kLanes; ++lane) {
+      const std::array<double, kSums> term = terms(i + lane);
+      for (std::size_t k = 0; k < kSums; ++k) lanes[k][lane] += term[k];
+    }
+  }
+  for (; i < rows; ++i) {
+    const std::array<double, kSums> term = terms(i);
+    for (std::size_t k = 0; k < kSums; ++k) lanes[k][0] += term[k];
+  }
+  std::array<double, kSums> sums{};
+  for (std::size_t k = 0; k < kSums; ++k) sums[k] = std::accumulate(lanes[k], lanes[k] + kLanes, 0.0);
+  return sums;
+}
+
 // Some columns of a block with K and M times them.
 struct Strip {
   Columns phi, m_phi, k_phi;
@@ -53,8 +75,10 @@ std::vector<double> calc_energies(MPI_Comm comm, const Strip& strip) {
   std::vector<double> energies;
   for (int j = 0; j < strip.phi.count; ++j) {
     const double* phi = strip.phi.column(j);
-    energies.push_back(std::inner_product(phi, phi + strip.phi.rows, strip.m_phi.column(j), 0.0));
-    energies.push_back(std::inner_product(phi, phi + strip.phi.rows, strip.k_phi.column(j), 0.0));
+    const double* m_phi = strip.m_phi.column(j);
+    const double* k_phi = strip.k_phi.column(j);
+    const auto sums = sum_rows<2>(strip.phi.rows, [=](std::ptrdiff_t i) { return std::array{phi[i] * m_phi[i], phi[i] * k_phi[i]}; });
+    energies.insert(energies.end(), sums.begin(), sums.end());
   }
   sum_over_ranks(comm, energies);
   return energies;
@@ -92,13 +116,13 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
       const double* m_phi = strip.m_phi.column(c);
       const double* k_phi = strip.k_phi.column(c);
       const double* own = strip.phi.column(c);
-      for (std::size_t i = 0; i < rows; ++i) {
-        const double rest = k_phi[i] - lambda[j] * m_phi[i];
-        const double term = operators.stiffness_diagonal[i] * own[i];
-        sums[3 * j] += rest * rest;
-        sums[3 * j + 1] += m_phi[i] * m_phi[i];
-        sums[3 * j + 2] += term * term;
-      }
+      const double* diagonal = operators.stiffness_diagonal.data();
+      const auto squares = sum_rows<3>(phi.rows, [=, value = lambda[j]](std::ptrdiff_t i) {
+        const double rest = k_phi[i] - value * m_phi[i];
+        const double term = diagonal[i] * own[i];
+        return std::array{rest * rest, m_phi[i] * m_phi[i], term * term};
+      });
+      std::copy(squares.begin(), squares.end(), sums.begin() + static_cast<std::ptrdiff_t>(3 * j));
     }
     multiply_transposed(phi.part(0, first + width), strip.m_phi, gram.data() + static_cast<std::size_t>(first) * modes, phi.count);
   }
@@ -166,7 +190,12 @@ void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {
   std::vector<double> largest(modes, 0.0);
   for (std::size_t j = 0; j < modes; ++j) {
     const double* column = phi.column(static_cast<PetscInt>(j));
-    for (PetscInt i = 0; i < phi.rows; ++i) largest[j] = std::max(largest[j], std::abs(column[i]));
+    double lanes[8] = {};
+    for (PetscInt i = 0; i < phi.rows; i += 8) {
+      for (PetscInt lane = 0; lane < std::min<PetscInt>(8, phi.rows - i); ++lane)
+        lanes[lane] = std::max(lanes[lane], std::abs(column[i + lane]));
+    }
+    largest[j] = *std::max_element(lanes, lanes + 8);
   }
   MPI_Allreduce(MPI_IN_PLACE, largest.data(), static_cast<int>(modes), MPI_DOUBLE, MPI_MAX, comm);
 

@@ -70,23 +70,33 @@ Sweep::Sweep(const Slice& band, std::int64_t most, CountBelow count_below)
 bool Sweep::is_last() const { return rest_.count() <= most_ || rest_.high - rest_.low < kNarrow * rest_.high; }
 
 Sweep::Part Sweep::take() {
-  constexpr int kTrials = 8;
+  constexpr int kTrials = 3;  // by what the counts foresee, then by halves
   const double parts = std::ceil(static_cast<double>(rest_.count()) / static_cast<double>(most_));
   const double share = static_cast<double>(rest_.count()) / parts;
   const auto below_low = static_cast<double>(rest_.below_low);
   Part part{rest_.low, rest_};
-  double under = 0;  // eigenvalues of the slice below the shift
-  for (int i = 0; i < kTrials; ++i) {
-    part.sigma = std::midpoint(rest_.low, std::clamp(counts_.find_lambda(below_low + share, kNearEnd), rest_.low, rest_.high));
+  double few = rest_.low;    // too few of the slice's eigenvalues lie below it,
+  double many = rest_.high;  // and too many below this
+  double under = 0;          // the shift
+  bool is_cluster = false;
+  for (int trial = 0;; ++trial) {
+    const double foreseen = std::midpoint(rest_.low, counts_.find_lambda(below_low + share, kNearEnd));
+    part.sigma = std::midpoint(few, many);
+    if (trial < kTrials) part.sigma = std::clamp(foreseen, std::lerp(few, many, kNearEnd), std::lerp(many, few, kNearEnd));
     const std::int64_t below = count_below_(part.sigma);
     counts_.add(part.sigma, below);
     under = static_cast<double>(below) - below_low;
-    if (under <= 0.75 * static_cast<double>(most_) || part.sigma - rest_.low < kNarrow * part.sigma) break;
+    if (under >= 0.2 * share && under <= static_cast<double>(most_)) break;
+    (under < share ? few : many) = part.sigma;
+    is_cluster = many - few < kNarrow * many;
+    if (is_cluster) break;
   }
   const double reach = part.sigma - rest_.low;
   const double wanted = std::max(share, 1.25 * under);
-  part.slice.high = std::min(
-      rest_.high, std::clamp(counts_.find_lambda(below_low + wanted, 0), part.sigma + reach / kLopsided, part.sigma + reach * kLopsided));
+  const double foreseen = counts_.find_lambda(below_low + wanted, 0);
+  part.slice.high = is_cluster ? std::max(foreseen, many * (1 + kNarrow))
+                               : std::clamp(foreseen, part.sigma + reach / kLopsided, part.sigma + reach * kLopsided);
+  part.slice.high = std::min(part.slice.high, rest_.high);
   part.slice.below_high = rest_.below_low + static_cast<std::int64_t>(wanted);
   return part;
 }

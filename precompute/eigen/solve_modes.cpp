@@ -49,6 +49,7 @@ constexpr double kSafeMargin = 1e-7;       // Counts nearer to a mode (relative 
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
 constexpr int kRounds = 60;                // Krylov runs per interval at most until its count is met,
 constexpr int kIdleRounds = 2;             // and so many without a new mode.
+constexpr double kLockedMargin = 0.5;      // Of a slice's width: modes found that near are held away (800 modes: 2144 solves, at 0.1 2272).
 constexpr int kGuess = -1;                 // The round of a run whose count is a guess.
 constexpr double kKrylovTolerance = 0.1;   // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
 
@@ -268,8 +269,9 @@ double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double s
   request.tolerance = kKrylovTolerance * options_.tolerance;
   request.position = &problem_.nodes.position;
   request.round = round;
-  // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be held away.
-  const double margin = 0.1 * (slice.high - slice.low);
+  // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be held away, and fewer
+  // neighbours make the iteration shorter.
+  const double margin = kLockedMargin * (slice.high - slice.low);
   const petsc::MatHandle locked = found_.copy_between(slice.low - margin, slice.high + margin, rigid_);
   request.locked = locked;
   const auto before = static_cast<std::int64_t>(found_.lambda.size());

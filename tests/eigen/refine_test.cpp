@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "precompute/eigen/slices.hpp"
@@ -69,28 +70,61 @@ TEST(RefineModes, brings_spoiled_modes_back_within_the_tolerance) {
   }
 }
 
-TEST(CutIntoSlices, covers_the_band_without_gaps_and_with_few_modes_each) {
-  std::vector<double> lambda;  // 1000 modes, evenly in frequency
-  for (int j = 1; j <= 1000; ++j) lambda.push_back(j * j);
+// Goes through a band of these eigenvalues as a solver would that finds all of every slice; returns the modes per slice.
+std::vector<std::int64_t> sweep_through(const std::vector<double>& lambda, const Slice& band, std::int64_t most, int& counts) {
   const CountBelow count = [&](double x) { return std::lower_bound(lambda.begin(), lambda.end(), x) - lambda.begin(); };
-  const std::vector<Slice> slices = cut_into_slices({0.5, 0, 2e6, 1000}, 320, count);
-  EXPECT_EQ(slices.front().low, 0.5);
-  EXPECT_EQ(slices.back().high, 2e6);
-  for (std::size_t i = 0; i < slices.size(); ++i) {
-    EXPECT_LE(slices[i].count(), 320);
-    EXPECT_EQ(slices[i].below_high, count(slices[i].high));
-    if (i == 0) continue;
-    EXPECT_EQ(slices[i].low, slices[i - 1].high);
-    EXPECT_EQ(slices[i].below_low, slices[i - 1].below_high);
+  Sweep sweep(band, most, [&](double x) {
+    ++counts;
+    EXPECT_GT(x, band.low);
+    EXPECT_LT(x, band.high);
+    return count(x);
+  });
+  std::vector<std::int64_t> modes;
+  while (!sweep.is_last() && modes.size() < 100) {
+    const double low = sweep.get_rest().low;
+    const Sweep::Part part = sweep.take();
+    EXPECT_EQ(part.slice.low, low);
+    EXPECT_EQ(part.slice.below_low, count(low));
+    EXPECT_GT(part.sigma, low);
+    EXPECT_LT(part.sigma, part.slice.high);
+    EXPECT_LE(part.slice.high, band.high);
+    modes.push_back(count(part.slice.high) - count(low));
+    sweep.advance(part.slice.high, count(part.slice.high));
   }
-  EXPECT_LE(slices.size(), 6u);
+  EXPECT_EQ(sweep.get_rest().high, band.high);
+  EXPECT_EQ(sweep.get_rest().below_high, band.below_high);
+  modes.push_back(sweep.get_rest().count());
+  return modes;
 }
 
-TEST(CutIntoSlices, leaves_a_cluster_too_narrow_to_cut_in_one_piece) {
-  const CountBelow count = [](double x) { return x > 1.0 ? 1000 : 0; };
-  std::int64_t modes = 0;
-  for (const Slice& slice : cut_into_slices({0.1, 0, 4.0, 1000}, 320, count)) modes += slice.count();
-  EXPECT_EQ(modes, 1000);
+TEST(Sweep, covers_the_band_in_slices_of_about_equal_size_at_one_count_each) {
+  for (const double power : {1.0, 2.0, 0.5}) {  // of frequency: plates, half-way to solids, strings in bending
+    std::vector<double> lambda;
+    for (int j = 1; j <= 1000; ++j) lambda.push_back(std::pow(j, 2 / power));
+    int counts = 0;
+    const std::vector<std::int64_t> modes = sweep_through(lambda, {0.5, 0, 1.001 * lambda.back(), 1000}, 320, counts);
+    EXPECT_EQ(std::accumulate(modes.begin(), modes.end(), std::int64_t{0}), 1000);
+    EXPECT_LE(modes.size(), 5u) << "frequency to the " << power;
+    EXPECT_LE(counts, static_cast<int>(modes.size())) << "frequency to the " << power;
+    for (const std::int64_t count : modes) EXPECT_LE(count, 400) << "frequency to the " << power;
+  }
+}
+
+TEST(Sweep, takes_few_modes_at_once) {
+  std::vector<double> lambda(300);
+  std::iota(lambda.begin(), lambda.end(), 1.0);
+  int counts = 0;
+  EXPECT_EQ(sweep_through(lambda, {0.5, 0, 301, 300}, 320, counts), std::vector<std::int64_t>{300});
+  EXPECT_EQ(counts, 0);
+}
+
+TEST(Sweep, goes_past_a_cluster_too_narrow_to_cut) {
+  std::vector<double> lambda(1000, 1.0);
+  for (int j = 1; j <= 500; ++j) lambda.push_back(1 + 0.01 * j);
+  int counts = 0;
+  const std::vector<std::int64_t> modes = sweep_through(lambda, {0.1, 0, 6.5, 1500}, 320, counts);
+  EXPECT_EQ(std::accumulate(modes.begin(), modes.end(), std::int64_t{0}), 1500);
+  EXPECT_LE(counts, 25);
 }
 
 TEST(CutToLowest, keeps_a_few_modes_more_than_wanted) {
