@@ -21,20 +21,20 @@ Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double densi
 }
 
 double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio) {
-  constexpr double kInterpolation = 2.0, kMostOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15;
+  constexpr double kMostOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15;
   const double second = edge_ratio * edge_ratio, fourth = second * second;
   const double interpolation = parts.interpolation * (kind == Kind::kT4 ? second : fourth), lumping = std::abs(parts.lumping) * second;
-  // A share of the computed lambda as a share of the true one, which is smaller.
-  const auto enlarge = [&](double share) {
+  // A share of the computed lambda as a share of the true one, which is smaller, times a safety factor.
+  const auto enlarge = [&](double factor, double share) {
     const double s = std::clamp(share, 0.0, kMostOfEnergy);
-    return kInterpolation * s / (1.0 - s);
+    return factor * s / (1.0 - s);
   };
   // Interpolation raises lambda and a lumped mass lowers it. Where both matter they are trusted to cancel within limits only.
-  double mesh = enlarge(interpolation);
+  double mesh = enlarge(kind == Kind::kT4 ? 2.0 : 3.5, interpolation);
   if (lumping > 0.0 && kind == Kind::kT4)
-    mesh = enlarge(std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
-  else if (lumping > 0.0)  // the estimate of interpolation is two to four times too large for most T10
-    mesh = std::max(enlarge(interpolation - 0.5 * lumping), 1.75 * lumping - 0.25 * interpolation);
+    mesh = enlarge(2.0, std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
+  else if (lumping > 0.0)  // how far up, and how far down
+    mesh = std::max(enlarge(4.5, interpolation) - lumping, 1.75 * lumping - 0.65 * interpolation);
   const double geometry =
       (kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise) * (kind == Kind::kT10Curved ? fourth : second);
   return 600.0 * std::log2(1.0 + mesh + geometry);

@@ -1,7 +1,9 @@
 // Method: at every vertex a polynomial (linear for T4, quadratic for T10) is fitted by least squares to the strains that the elements
 // around
 //   have at their best points (centroid; the four points of degree 2). The fit is linear in the strains, so it is kept as weights. Where
-//   the samples do not fix a term (a corner with one element), a small ridge lets the term be zero.
+//   the samples do not fix a term of the highest degree (a corner with one element), a small ridge lets it be zero. Terms of lower degree
+//   have none: what one element can follow is recovered exactly in every patch, or bending, whose strains are linear through the
+//   thickness, would be taken for an error wherever patches are one-sided, as on all of a slender bar.
 // Source: Zienkiewicz and Zhu 1992, IJNME 33, 1331 ("superconvergent patch recovery").
 // Deviations: ridge instead of wider patches, which would reach beyond the neighbours' ranks; strains scaled by the root of the elasticity.
 #include "precompute/estimate/recovery.hpp"
@@ -24,7 +26,8 @@ namespace {
 
 using fem::Vec3;
 
-constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-4;
+constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-2;  // of 1e-4 ... 1: the least scatter on the training bodies of docs/error-bars.md
+constexpr double kFlatness = 1e-10;                  // what flat elements may be short of in the terms without ridge
 
 /// 1, x, y, z, xx, yy, zz, xy, yz, xz of the place seen from the patch's vertex, in units of `scale`.
 std::array<double, 10> calc_monomials(const Vec3& at, const Vec3& vertex, double scale) {
@@ -119,16 +122,17 @@ class Patches {
 
   void sum(NodeExchange& vertices, int materials) { vertices.sum(normal_.data(), static_cast<std::size_t>(terms_) * terms_ * materials); }
 
-  /// N becomes D (D N D + ridge)^-1 D with D = diag(N)^-1/2; the constant term has no ridge, so constant strains are met exactly.
+  /// N becomes D (D N D + ridge)^-1 D with D = diag(N)^-1/2; the ridge is on the terms of the highest degree alone.
   void invert() {
     const double ridge = terms_ == 4 ? kRidgeT4 : kRidgeT10;
+    const int first = terms_ == 4 ? 1 : 4;  // of the highest degree
     for (std::size_t at = 0; at < normal_.size(); at += static_cast<std::size_t>(terms_) * terms_) {
       Eigen::Map<Eigen::MatrixXd> normal(&normal_[at], terms_, terms_);
       if (normal(0, 0) == 0.0) continue;
       const Eigen::VectorXd scale =
           normal.diagonal().unaryExpr([&](double d) { return d > 1e-12 * normal(0, 0) ? 1 / std::sqrt(d) : 0.0; });
       Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
-      for (int i = 0; i < terms_; ++i) scaled(i, i) += scale[i] == 0.0 ? 1.0 : i == 0 ? 0.0 : ridge;
+      for (int i = 0; i < terms_; ++i) scaled(i, i) += scale[i] == 0.0 ? 1.0 : i == 0 ? 0.0 : i < first ? kFlatness : ridge;
       normal = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
     }
   }

@@ -25,8 +25,9 @@ using mesh::Vec3;
 
 double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-/// Moves the inner nodes of a lattice about, those of faces within the faces, so that nothing is regular any more.
-void shake(TetMesh& mesh, double spacing_m) {
+/// Moves the inner nodes of a lattice about, those of faces within the faces, so that nothing is regular any more. keeps_middle: those of
+/// the plane in the middle of x stay in it.
+void shake(TetMesh& mesh, double spacing_m, bool keeps_middle) {
   Vec3 low = mesh.nodes[0], high = mesh.nodes[0];
   for (const Vec3& x : mesh.nodes)
     for (int k = 0; k < 3; ++k) {
@@ -37,16 +38,27 @@ void shake(TetMesh& mesh, double spacing_m) {
   std::uniform_real_distribution<double> move(-0.18, 0.18);
   for (Vec3& x : mesh.nodes)
     for (int k = 0; k < 3; ++k)
-      if (x[k] > low[k] + 1e-9 * spacing_m && x[k] < high[k] - 1e-9 * spacing_m) x[k] += move(random) * spacing_m;
+      if (x[k] > low[k] + 1e-9 * spacing_m && x[k] < high[k] - 1e-9 * spacing_m &&
+          !(keeps_middle && k == 0 && std::abs(x[0] - (low[0] + high[0]) / 2) < 1e-9 * spacing_m))
+        x[k] += move(random) * spacing_m;
 }
 
-/// A box [m] cut into cells; shaken unless a dimension has one cell only.
-TetMesh make_lattice(const std::array<double, 3>& edges_m, const std::array<int, 3>& cells, bool shaken) {
+/// A box [m] cut into cells; shaken unless a dimension has one cell only. in_two: regions 0 and 1, halves along x.
+TetMesh make_lattice(const std::array<double, 3>& edges_m, const std::array<int, 3>& cells, bool shaken, bool in_two) {
   TetMesh mesh = shapes::make_box(edges_m, cells, 1);
   if (shaken) {
     double spacing = 1e300;
     for (int k = 0; k < 3; ++k) spacing = std::min(spacing, edges_m[k] / cells[k]);
-    shake(mesh, spacing);
+    shake(mesh, spacing, in_two);
+  }
+  if (in_two) {
+    const auto [low, high] = std::minmax_element(mesh.nodes.begin(), mesh.nodes.end());  // by x
+    const double middle = ((*low)[0] + (*high)[0]) / 2;
+    for (std::size_t e = 0; e < mesh.regions.size(); ++e) {
+      double x = 0;
+      for (int i = 0; i < 4; ++i) x += mesh.nodes[mesh.tets[4 * e + i]][0] / 4;
+      mesh.regions[e] = x < middle ? 0 : 1;
+    }
   }
   return mesh;
 }
@@ -151,26 +163,44 @@ std::string describe(MeshKind kind) {
 }
 
 const std::vector<Body>& get_bodies() {
+  // Spruce along x; 2, 3 are the radial and the tangential directions.
+  static const spec::Material spruce{.density_kg_m3 = 400,
+                                     .orthotropic = spec::Orthotropic{.young_modulus_pa = {10.8e9, 0.84e9, 0.46e9},
+                                                                      .shear_modulus_pa = {0.69e9, 0.032e9, 0.66e9},
+                                                                      .poisson_ratio = {0.372, 0.435, 0.467}}};
+  const auto solid = [](double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
+    return std::vector<spec::Material>{
+        {.young_modulus_pa = young_modulus_pa, .poisson_ratio = poisson_ratio, .density_kg_m3 = density_kg_m3}};
+  };
+  const auto pair = [&](double nu_steel, double nu_aluminium) {
+    return std::vector<spec::Material>{solid(200e9, nu_steel, 7850)[0], solid(70e9, nu_aluminium, 2700)[0]};
+  };
   // A fineness is cells along the shortest edge of a box (negative: not shaken), rings of a cylinder, or the nodes of a shape.
   static const std::vector<Body> bodies{
-      {"cube", 200e9, 0.3, 7850, false, true, {3, 6, 10}},
-      {"bar", 70e9, 0.33, 2700, false, true, {-1, 2, 4}},
-      {"plate", 200e9, 0.3, 7850, false, true, {-1, 2, 3}},
-      {"cantilever", 70e9, 0.33, 2700, false, true, {-1, 2, 4}},
-      {"ball", 200e9, 0.3, 7850, true, true, {300, 1200, 6000}},
-      {"thin-shell", 200e9, 0.3, 7850, true, true, {800, 3000, 9000}},
-      {"ring", 100e9, 0.34, 8500, true, true, {300, 1200, 6000}},
-      {"cube-nu045", 200e9, 0.45, 7850, false, false, {3, 6}},
-      {"box", 200e9, 0.3, 7850, false, false, {-3, 5, 8}},
-      {"slab", 200e9, 0.3, 7850, false, false, {-1, 2, 3}},
-      {"prism", 200e9, 0.3, 7850, false, false, {2, 5}},
-      {"ruler", 200e9, 0.3, 7850, false, false, {-1, -2}},
-      {"thick-shell", 200e9, 0.3, 8000, true, false, {600, 2500, 8000}},
-      {"pipe", 200e9, 0.3, 8000, true, false, {500, 2500, 8000}},
-      {"cylinder-2", 200e9, 0.3, 7850, true, false, {2, 4, 7}},
-      {"cylinder-10", 200e9, 0.3, 7850, true, false, {2, 4}},
-      {"disc", 200e9, 0.3, 7850, true, false, {3, 5, 8}},
-      {"chime", 68.3518e9, 0.329801, 2700, true, false, {1000, 5000}},
+      {"cube", solid(200e9, 0.3, 7850), false, true, {3, 6, 10}},
+      {"bar", solid(70e9, 0.33, 2700), false, true, {-1, 2, 4}},
+      {"plate", solid(200e9, 0.3, 7850), false, true, {-1, 2, 3}},
+      {"cantilever", solid(70e9, 0.33, 2700), false, true, {-1, 2, 4}},
+      {"ball", solid(200e9, 0.3, 7850), true, true, {300, 1200, 6000}},
+      {"thin-shell", solid(200e9, 0.3, 7850), true, true, {800, 3000, 9000}},
+      {"ring", solid(100e9, 0.34, 8500), true, true, {300, 1200, 6000}},
+      {"cube-nu045", solid(200e9, 0.45, 7850), false, false, {3, 6}},
+      {"box", solid(200e9, 0.3, 7850), false, false, {-3, 5, 8}},
+      {"slab", solid(200e9, 0.3, 7850), false, false, {-1, 2, 3}},
+      {"prism", solid(200e9, 0.3, 7850), false, false, {2, 5}},
+      {"ruler", solid(200e9, 0.3, 7850), false, false, {-1, -2}},
+      {"thick-shell", solid(200e9, 0.3, 8000), true, false, {600, 2500, 8000}},
+      {"pipe", solid(200e9, 0.3, 8000), true, false, {500, 2500, 8000}},
+      {"cylinder-2", solid(200e9, 0.3, 7850), true, false, {2, 4, 7}},
+      {"cylinder-10", solid(200e9, 0.3, 7850), true, false, {2, 4}},
+      {"disc", solid(200e9, 0.3, 7850), true, false, {3, 5, 8}},
+      {"slender-bar", solid(200e9, 0.3, 7850), false, false, {1000, 5000}},
+      {"chime", solid(68.3518e9, 0.329801, 2700), true, false, {1000, 5000}},
+      {"spruce-bar", {spruce}, false, false, {1, 2, 3}},
+      {"spruce-block", {spruce}, false, false, {3, 6}},
+      {"rod-two", pair(0, 0), false, false, {1, 2, 4}},
+      {"bar-two", pair(0.3, 0.33), false, false, {1, 2, 4}},
+      {"rubber-ball", solid(10e6, 0.4999, 1100), true, false, {300, 1200}, true},
   };
   return bodies;
 }
@@ -194,9 +224,13 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
       {"bar", {{0.3, 0.03, 0.012}, {n == 1 ? 30 : 16 * n, 2 * n, n}}},
       {"cantilever", {{0.3, 0.03, 0.012}, {n == 1 ? 30 : 16 * n, 2 * n, n}}},
       {"ruler", {{0.3, 0.025, 0.001}, {80 * n, 6 * n, n}}},
-      {"plate", {{0.2, 0.2, 0.005}, {16 * n, 16 * n, n}}}};
+      {"plate", {{0.2, 0.2, 0.005}, {16 * n, 16 * n, n}}},
+      {"spruce-bar", {{0.3, 0.04, 0.015}, {16 * n, 3 * n, n}}},
+      {"spruce-block", {{0.05, 0.065, 0.085}, {n, static_cast<int>(1.3 * n), static_cast<int>(1.7 * n)}}},
+      {"rod-two", {{0.3, 0.03, 0.02}, {14 * n, 2 * n, n}}},
+      {"bar-two", {{0.3, 0.03, 0.02}, {14 * n, 2 * n, n}}}};
   if (const auto found = boxes.find(body.name); found != boxes.end()) {
-    TetMesh mesh = finish(make_lattice(found->second.first, found->second.second, shaken), kind);
+    TetMesh mesh = finish(make_lattice(found->second.first, found->second.second, shaken, body.materials.size() == 2), kind);
     if (body.name == "cantilever") {
       double low = 0;
       for (const Vec3& x : mesh.nodes) low = std::min(low, x[0]);
@@ -205,13 +239,15 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
     }
     return mesh;
   }
-  if (body.name == "ball") return make_shape_mesh("sphere", {{"radius", 0.05}}, n, kind);
+  if (body.name == "slender-bar") return make_shape_mesh("bar", {{"length", 0.3}, {"width", 0.02}, {"thickness", 0.01}}, n, kind);
+  if (body.name == "ball" || body.name == "rubber-ball") return make_shape_mesh("sphere", {{"radius", 0.05}}, n, kind);
   if (body.name == "thick-shell") return make_shape_mesh("sphere", {{"radius", 6.0}, {"wall", 4.2}}, n, kind);
   if (body.name == "thin-shell") return make_shape_mesh("sphere", {{"radius", 0.05}, {"wall", 0.005}}, n, kind);
   if (body.name == "ring") return make_shape_mesh("tube", {{"length", 0.012}, {"outer-radius", 0.04}, {"wall", 0.01}}, n, kind);
   if (body.name == "pipe") return make_shape_mesh("tube", {{"length", 10.0}, {"outer-radius", 2.2}, {"wall", 0.4}}, n, kind);
   if (body.name == "chime") return make_shape_mesh("tube", {{"length", 0.505}, {"outer-radius", 0.0125}, {"wall", 0.001}}, n, kind);
-  const double length = body.name == "disc" ? 0.02 : body.name == "cylinder-2" ? 0.04 : 0.2;
+  const std::map<std::string, double> lengths_m{{"disc", 0.02}, {"cylinder-2", 0.04}, {"cylinder-10", 0.2}};
+  const double length = lengths_m.at(body.name);
   TetMesh mesh = finish(make_cylinder(0.02, length, n, std::max(1, static_cast<int>(std::lround(n * length / 0.02)))), kind);
   if (kind == MeshKind::T10Curved) curve_cylinder(mesh, 0.02);
   return mesh;
@@ -234,16 +270,16 @@ double Outcome::median_width() const {
   return widths[widths.size() / 2];
 }
 
-Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t>& held, const estimate::Solid& solid, bool lumped,
-              double low_hz, double high_hz, int max_modes, double tolerance) {
+Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t>& held, std::span<const spec::Material> materials,
+              bool lumped, double low_hz, double high_hz, int max_modes, double tolerance) {
   const spec::Mass mass = lumped ? spec::Mass::lumped : spec::Mass::consistent;
   const fem::Distribution pieces = fem::distribute(comm, mesh, held);
-  spec::Material material;
-  const double mu = solid.elasticity_pa[35], lambda = solid.elasticity_pa[1];
-  material.young_modulus_pa = mu * (3 * lambda + 2 * mu) / (lambda + mu);
-  material.poisson_ratio = lambda / (2 * (lambda + mu));
-  material.density_kg_m3 = solid.density_kg_m3;
-  const fem::System system = fem::assemble(comm, pieces.local, material, mass);
+  fem::Materials solid;
+  solid.list.assign(materials.begin(), materials.end());
+  if (materials.size() > 1) solid.of_tet = pieces.local.region;
+  std::vector<estimate::Solid> solids;
+  for (const spec::Material& material : materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  const fem::System system = fem::assemble(comm, pieces.local, solid, mass);
   eigen::NodeLayout layout;
   layout.position.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + pieces.local.free_nodes);
   layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + pieces.local.free_nodes);
@@ -262,7 +298,7 @@ Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t
   for (const double l : modes.lambda) outcome.freq_hz.push_back(std::sqrt(l) / (2 * std::numbers::pi));
   const bool cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double begin = find_cpu_s();
-  outcome.bars = estimate::calc_error_bars(comm, pieces.local, system.stiffness, system.mass, std::span(&solid, 1), {}, mass,
+  outcome.bars = estimate::calc_error_bars(comm, pieces.local, system.stiffness, system.mass, solids, solid.of_tet, mass,
                                            {modes.lambda, modes.residual, modes.shapes, low_hz, cut ? outcome.freq_hz.back() : high_hz});
   outcome.estimate_cpu_s = find_cpu_s() - begin;
   return outcome;
@@ -272,9 +308,8 @@ Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, doub
   const std::vector<Truth> truth = read_truth(body.name);
   std::vector<std::int32_t> held;
   const TetMesh mesh = make_mesh(body, fineness, kind, held);
-  Outcome outcome = solve(comm, mesh, held, estimate::make_isotropic(body.young_modulus_pa, body.poisson_ratio, body.density_kg_m3),
-                          kind == MeshKind::T4Lumped || kind == MeshKind::T10Lumped, 0.2 * truth.front().freq_hz, 30 * truth.back().freq_hz,
-                          static_cast<int>(truth.size()), tolerance);
+  Outcome outcome = solve(comm, mesh, held, body.materials, kind == MeshKind::T4Lumped || kind == MeshKind::T10Lumped,
+                          0.2 * truth.front().freq_hz, 30 * truth.back().freq_hz, static_cast<int>(truth.size()), tolerance);
   for (std::size_t m = 0; m < outcome.freq_hz.size(); ++m) {
     outcome.true_hz.push_back(truth[m].freq_hz);
     outcome.truth_cents.push_back(1200 * std::log2(1 + truth[m].uncertainty));

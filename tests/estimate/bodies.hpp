@@ -5,9 +5,11 @@
 
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "jobs/spec/material.hpp"
 #include "precompute/estimate/error_bars.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 
@@ -26,18 +28,17 @@ std::string describe(MeshKind kind);
 
 struct Body {
   std::string name;
-  double young_modulus_pa = 0.0;
-  double poisson_ratio = 0.0;
-  double density_kg_m3 = 0.0;
-  bool round = false;         // has curved faces
-  bool training = false;      // the safety factors were chosen on it
-  std::vector<int> fineness;  // meshes from coarse to fine, in numbers that make_mesh knows
+  std::vector<spec::Material> materials;  // by region of the mesh
+  bool round = false;                     // has curved faces
+  bool training = false;                  // the safety factors were chosen on it
+  std::vector<int> fineness;              // meshes from coarse to fine, in numbers that make_mesh knows
+  bool locks = false;                     // T4 are not for it
 };
 
 const std::vector<Body>& get_bodies();
 const Body& get_body(const std::string& name);
 
-/// The mesh number `fineness` of a body and the nodes that are held.
+/// The mesh number `fineness` of a body, its regions the places of its materials, and the nodes that are held.
 mesh::TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std::int32_t>& held);
 
 /// Computed modes beside the truth.
@@ -60,8 +61,8 @@ struct Outcome {
 Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, double tolerance = 1e-8);
 
 /// The same for any mesh, without truth, up to `high_hz`. Collective.
-Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held, const estimate::Solid& solid, bool lumped,
-              double low_hz, double high_hz, int max_modes, double tolerance = 1e-8);
+Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held, std::span<const spec::Material> materials,
+              bool lumped, double low_hz, double high_hz, int max_modes, double tolerance = 1e-8);
 
 /// One body of the list on one mesh.
 struct Case {
