@@ -100,7 +100,8 @@ class Search {
   double measure_exponent(double Trial::*quantity, double fallback, double least, double most) const;
   double find_dimension() const;
   Forecast forecast(const Setting& setting, double ratio) const;
-  void forecast_next();
+  Forecast forecast_next() const;
+  std::string describe_surface(double cents) const;
   void check_forecast(const Setting& setting);
   std::string describe_reached() const;
   [[noreturn]] void give_up(const std::string& why) const;
@@ -140,7 +141,7 @@ Forecast Search::forecast(const Setting& setting, double ratio) const {
   next.setting = setting;
   const double growth = std::pow(ratio, -find_dimension());
   next.nodes = static_cast<double>(last.nodes) * growth;
-  next.worst_cents = predict_worst(current_.solved.bars, setting.refinements > 0, ratio) + last.algebraic_cents;
+  next.worst_cents = predict_worst(current_.solved.bars, setting.refinements > last.setting.refinements, ratio) + last.algebraic_cents;
   next.cpu_seconds = last.cpu_seconds * std::pow(growth, measure_exponent(&Trial::cpu_seconds, kCpuExponent, 1.0, 2.2));
   next.bytes = static_cast<double>(last.peak_bytes) * std::pow(growth, kByteExponent);
   return next;
@@ -165,8 +166,35 @@ std::string Search::describe_reached() const {
                             describe(best->setting), best->nodes, best->cpu_seconds);
 }
 
+std::string describe(const Forecast& next) {
+  return fmt::format("next stricter: {}, about {:.0f} nodes, {}, {:.1f} CPU s, {:.2g} GB",
+                     next.needs_new_mesh ? "a mesh file with edges half as long" : describe(next.setting), next.nodes,
+                     next.worst_cents > 0 ? fmt::format("{:.2g} cents", next.worst_cents) : std::string("cents unknown before it is tried"),
+                     next.cpu_seconds, next.bytes / 1e9);
+}
+
 void Search::give_up(const std::string& why) const {
-  throw SolveError(fmt::format("{}: key 'accuracy_cents': {}; {}", run_.job.file.string(), describe_reached(), why));
+  throw SolveError(
+      fmt::format("{}: key 'accuracy_cents': {}; {}; {}", run_.job.file.string(), describe_reached(), why, describe(forecast_next())));
+}
+
+/// Why a mesh file whose surface is not that of the body ends at `cents`, and what would mend it.
+std::string Search::describe_surface(double cents) const {
+  const mesh::CheckReport& check = current_.body.check;
+  const std::string end =
+      fmt::format("refined without end this mesh would come to {:.3g}, because its surface is not that of the body", cents);
+  if (check.straightened > 0)
+    return end + fmt::format(
+                     ": it is of second order, but {} of its {} elements folded over and were made straight-sided, which leaves "
+                     "their faces flat; make the elements smaller where the surface bends, or give the surface itself (\"body\")",
+                     check.straightened, check.tets);
+  if (check.order == 2 && check.curved == 0)
+    return end +
+           ": it is of second order, but all its edges are straight; move the mid-side nodes onto the true surface, or give the surface "
+           "itself (\"body\")";
+  if (check.order == 2)
+    return end + " between its nodes, although it is of second order; take a finer mesh of second order, or the surface itself (\"body\")";
+  return end + "; take a finer mesh, one of second order on the true surface, or the surface itself (\"body\")";
 }
 
 /// Rank 0 decides on a body that is meshed here.
@@ -223,11 +251,7 @@ Decision Search::decide_on_file() {
   int more = 1;
   while (more < kMostRefinements && predict_worst(bars, true, std::pow(0.5, more)) > asked_) ++more;
   const double facets = predict_worst(bars, true, 1e-3);
-  if (last.modes > 0 && facets > asked_)
-    give_up(
-        fmt::format("refined without end this mesh would come to {:.3g}, because its surface is not that of the body; take a finer mesh, "
-                    "one of second order on the true surface, or the surface itself (\"body\")",
-                    facets));
+  if (last.modes > 0 && facets > asked_) give_up(describe_surface(facets));
   setting.refinements += more;
   if (setting.refinements > kMostRefinements)
     give_up(fmt::format("{} uniform refinements would not do; take a finer mesh where the body is thin or has sharp corners",
@@ -293,24 +317,30 @@ void Search::attempt(const Setting& setting) {
                                                    trial.worst_hz, asked_));
 }
 
-void Search::forecast_next() {
+Forecast Search::forecast_next() const {
   const Trial& last = report_.trials.back();
-  if (last.modes == 0) return;
+  constexpr double kHalf = 0.5;  // of the edges, where the error bars do not say how much finer
   if (run_.job.body) {
-    const double ratio = std::min(find_ratio(current_.solved.bars, 0.5 * last.worst_cents, kFinestStep), kLeastStep);
-    report_.next = forecast(make_setting(last.setting.element, ratio), ratio);
-    return;
+    const double ratio =
+        last.modes == 0 ? kHalf : std::min(find_ratio(current_.solved.bars, 0.5 * last.worst_cents, kFinestStep), kLeastStep);
+    return forecast(make_setting(last.setting.element, ratio), ratio);
   }
   Setting setting = last.setting;
   if (last.setting.element == spec::Element::T4) {
     setting.element = spec::Element::T10;
     constexpr double kMidNodes = 7.0;  // times the nodes; twice the couplings of a row
-    report_.next = {setting, kMidNodes * static_cast<double>(last.nodes), 0.0, 2 * last.cpu_seconds * std::pow(kMidNodes, kCpuExponent),
-                    2 * static_cast<double>(last.peak_bytes) * std::pow(kMidNodes, kByteExponent)};
-    return;
+    return {setting,
+            false,
+            kMidNodes * static_cast<double>(last.nodes),
+            0.0,
+            2 * last.cpu_seconds * std::pow(kMidNodes, kCpuExponent),
+            2 * static_cast<double>(last.peak_bytes) * std::pow(kMidNodes, kByteExponent)};
   }
-  ++setting.refinements;
-  report_.next = forecast(setting, 0.5);
+  const bool is_refined = is_refinable_ && setting.refinements < kMostRefinements;
+  if (is_refined) ++setting.refinements;  // keeps the facets, which forecast() knows
+  Forecast next = forecast(setting, kHalf);
+  next.needs_new_mesh = !is_refined;
+  return next;
 }
 
 AccurateBody Search::solve() {
@@ -341,17 +371,12 @@ AccurateBody Search::solve() {
     MPI_Bcast(&decision, sizeof decision, MPI_BYTE, 0, run_.comm);
   }
   if (run_.rank == 0) {
-    forecast_next();
+    report_.next = forecast_next();
     const Trial& last = report_.trials.back();
     const std::string reached = last.modes == 0 ? std::string("no mode in the band, and none on the coarser meshes")
                                                 : fmt::format("error bars up to {:.3g} cents of {:g} asked", last.worst_cents, asked_);
     run_.stations.say(fmt::format("chosen: {}, {} nodes: {}, {:.1f} CPU s", describe(last.setting), last.nodes, reached, last.cpu_seconds));
-    if (report_.next.nodes > 0)
-      run_.stations.say(fmt::format("next stricter: {}, about {:.0f} nodes, {}, {:.1f} CPU s, {:.2g} GB", describe(report_.next.setting),
-                                    report_.next.nodes,
-                                    report_.next.worst_cents > 0 ? fmt::format("{:.2g} cents", report_.next.worst_cents)
-                                                                 : std::string("cents unknown before it is tried"),
-                                    report_.next.cpu_seconds, report_.next.bytes / 1e9));
+    run_.stations.say(describe(report_.next));
   }
   current_.report = report_;
   return std::move(current_);
@@ -398,6 +423,7 @@ Json::Value describe_accuracy(const AccuracyReport& report) {
   if (!report.trials.empty()) root["chosen"] = root["trials"][static_cast<Json::ArrayIndex>(report.trials.size() - 1)];
   if (report.next.nodes > 0) {
     Json::Value& next = root["next_stricter"] = describe_setting(report.next.setting);
+    if (report.next.needs_new_mesh) next["needs_new_mesh"] = true;
     next["nodes"] = std::round(report.next.nodes);
     next["worst_cents"] = report.next.worst_cents > 0 ? Json::Value(report.next.worst_cents) : Json::Value();
     next["cpu_seconds"] = report.next.cpu_seconds;

@@ -28,8 +28,9 @@ struct Trial {
 /// What the next stricter setting would be and cost, as far as can be told without trying.
 struct Forecast {
   Setting setting;
+  bool needs_new_mesh = false;  // edges half as long, in another mesh file: the run cannot refine this one (further)
   double nodes = 0.0;
-  double worst_cents = 0.0;
+  double worst_cents = 0.0;  // 0: unknown
   double cpu_seconds = 0.0;
   double bytes = 0.0;
 };
@@ -51,8 +52,8 @@ struct AccurateBody {
 /// whose error bars tell by their rates of convergence how fine the mesh has to be, with tetrahedra of four and of ten nodes; then that
 /// one; then finer ones while they do not meet it. Bodies are meshed as fine as is needed; a mesh file is taken with either element and
 /// refined uniformly, which cannot mend the facets it was made with. Says on the way what it tries, and at the end what the next stricter
-/// setting would cost. Collective. Throws on every rank what the solve throws, and SolveError with what was reached when no setting within
-/// reach meets it.
+/// setting would cost. Collective. Throws on every rank what the solve throws, and SolveError when no setting within reach meets it, with
+/// what was reached, why no more, and what the next stricter setting would cost.
 AccurateBody solve_to_accuracy(Run& run);
 
 /// The setting in words: "T10, body meshed with edges of 0.0021 m, tolerance 1e-07".

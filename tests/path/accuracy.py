@@ -10,6 +10,8 @@ usage: accuracy.py BIN_DIR
 import json
 import math
 import pathlib
+import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -56,6 +58,26 @@ def check(folder, name, job, truth):
     return chosen
 
 
+def fold(source, target):
+    """Pulls every fifth mid-side node of the sphere's surface (radius 50 mm) far inwards, so that its elements fold over. Gmsh 4.1, binary."""
+    data = bytearray(source.read_bytes())
+    elements = data.index(b"$Elements\n") + 10 + 4 * 8  # after the counts: one block (3 int32, a count), then tag and ten nodes each
+    (tets,) = struct.unpack_from("<Q", data, elements + 12)
+    middles = {node for e in range(tets) for node in struct.unpack_from("<6Q", data, elements + 20 + 88 * e + 40)}
+    nodes = data.index(b"$Nodes\n") + 7 + 4 * 8 + 12
+    (count,) = struct.unpack_from("<Q", data, nodes)
+    on_surface = 0
+    for node in sorted(middles):
+        place = nodes + 8 + 8 * count + 24 * (node - 1)
+        x = struct.unpack_from("<3d", data, place)
+        if abs(math.dist((0, 0, 0), x) - 0.05) < 1e-6:
+            on_surface += 1
+            if on_surface % 5 == 0:
+                struct.pack_into("<3d", data, place, *(0.3 * c for c in x))
+    assert on_surface >= 20, on_surface
+    target.write_bytes(data)
+
+
 with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     folder = pathlib.Path(scratch)
     bar = {"body": {"shape": "bar", "length_m": 0.3, "width_m": 0.02, "thickness_m": 0.01}, "material": STEEL, "band_hz": [20, 6000]}
@@ -76,7 +98,17 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     mesh("--shape", "sphere", "--radius", "0.05", "--nodes", "300", "-o", "facets.msh")
     text = run(folder, "facets", {"mesh": "facets.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
     assert "accuracy_cents" in text and "reached" in text and "surface" in text, text
+    assert "next stricter: T10, refined 1 time" in text and "CPU s" in text.split("next stricter")[1] and "second order on the true surface" in text, text
     assert not (folder / "facets.hdf").exists()
+
+    # The same ball of second order is not advised to be of second order: its parabolas miss the sphere, or its folded elements are flat.
+    mesh("--shape", "sphere", "--radius", "0.05", "--nodes", "300", "--order", "2", "-o", "curved.msh")
+    text = run(folder, "curved", {"mesh": "curved.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.05}, code=3)
+    assert "although it is of second order" in text and "straight-sided" not in text and "next stricter: T10, refined 1 time" in text, text
+    fold(folder / "curved.msh", folder / "folded.msh")
+    text = run(folder, "folded", {"mesh": "folded.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
+    assert re.search(r"it is of second order, but \d+ of its \d+ elements folded over and were made straight-sided", text), text
+    assert "on the true surface" not in text and "next stricter: T10, refined 1 time" in text, text
 
     # Where no mode is, none is said to be right to 0 cents.
     text = run(folder, "silent", {**bar, "band_hz": [20, 300], "accuracy_cents": 10})
