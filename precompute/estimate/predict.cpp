@@ -30,7 +30,7 @@ double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio
     return factor * s / (1.0 - s);
   };
   // Interpolation raises lambda and a lumped mass lowers it. Where both matter they are trusted to cancel within limits only.
-  double mesh = enlarge(kind == Kind::kT4 ? 2.0 : 3.5, interpolation);
+  double mesh = enlarge(kind == Kind::kT4 ? 2.0 : 4.5, interpolation);
   if (lumping > 0.0 && kind == Kind::kT4)
     mesh = enlarge(2.0, std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
   else if (lumping > 0.0)  // how far up, and how far down
