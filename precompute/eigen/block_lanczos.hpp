@@ -14,7 +14,7 @@ inline constexpr const char* kBlockLanczosType = "blocklanczos";
 /// after set_count_known); it stops when it has them, or when everything it sees in the interval and something beyond it has converged:
 /// copies of repeated eigenvalues that are still missing need another run with these deflated. Otherwise it seeks the nev wanted ones. It
 /// heeds ncv (size of the basis; a full one is restarted with its best Ritz vectors), tol, max_it (in blocks), the convergence and stopping
-/// tests, monitors, the deflation and the initial space, and -eps_blocklanczos_block_size (8). Errors are PETSc's. Collective.
+/// tests, monitors, the deflation and the initial space, and -eps_blocklanczos_block_size. Errors are PETSc's. Collective.
 PetscErrorCode register_block_lanczos();
 
 /// Columns per block; PETSC_DEFAULT: 16. Logically collective.
