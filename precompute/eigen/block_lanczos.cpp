@@ -86,6 +86,7 @@ class Iteration {
   Orthogonality::State get_state() const { return {t_.data(), room_, size_, width_, previous_}; }
   int orthonormalise(Small& r);
   bool orthonormalise_by_cholesky(Small& r);
+  void project_after_all();
   int orthonormalise_by_columns(Small& r);
   Small sum_products(const Columns& a, const Columns& b) const;
   std::vector<double> sum_squares(const Columns& a, const Columns& b) const;
@@ -393,6 +394,30 @@ int Iteration::orthonormalise_by_columns(Small& r) {
   return kept;
 }
 
+// The projection that a step was spared, of the block that came of it. What it takes away is rounding beside the operator.
+void Iteration::project_after_all() {
+  is_spared_ = false;
+  const Columns next = w_.part(0, width_);
+  const Columns next_mass = z_.part(0, width_);
+  const Columns all = everything_.part(0, fixed_.count + size_);
+  for (int pass = 0; pass < 2; ++pass) {
+    multiply_mass();
+    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, next_mass).data(), locked_.count, next);
+    subtract_product(all, sum_products(all, next_mass).data(), all.count, next);
+  }
+  const Small before = coupling_;  // (width, width)
+  Small r;
+  next_width_ = orthonormalise(r);
+  const auto n = static_cast<std::size_t>(width_);
+  const auto kept = static_cast<std::size_t>(next_width_);
+  coupling_.assign(kept * n, 0.0);
+  for (std::size_t j = 0; j < n; ++j) {
+    for (std::size_t k = 0; k < n; ++k) {
+      for (std::size_t i = 0; i < kept; ++i) coupling_[j * kept + i] += r[k * kept + i] * before[j * n + k];
+    }
+  }
+}
+
 // One block more. False when the space is exhausted.
 bool Iteration::step() {
   invert();
@@ -405,6 +430,7 @@ bool Iteration::step() {
     }
   }
   next_width_ = orthonormalise(coupling_);
+  if (is_spared_ && next_width_ == width_ && !agree(orthogonality_.is_still_good(get_state(), coupling_, next_width_))) project_after_all();
   orthogonality_.advance(get_state(), coupling_, next_width_, is_spared_);
   for (int j = next_width_; j < block_; ++j) {
     std::fill_n(w_.column(j), w_.rows, 0.0);
@@ -643,6 +669,12 @@ void Iteration::clear_nearest(const Ritz& ritz, int count) {
 
 void Iteration::run() {
   start();
+  if (width_ == 0) {  // nothing beside what is deflated
+    eps_->nconv = 0;
+    eps_->reason = EPS_CONVERGED_TOL;
+    PetscScalar* all = everything_.values;
+    return check(BVRestoreArray(eps_->V, &all));
+  }
   next_check_ = std::min(static_cast<int>(1.3 * static_cast<double>(eps_->nev)) + 2 * block_, room_);
   while (true) {
     const bool goes_on = step();

@@ -23,7 +23,19 @@ namespace carillon::eigen {
 namespace {
 
 constexpr double kGoodEnough = 2e-8;                                       // largest entry of V^T M V_j that is left standing
+constexpr double kTolerable = 2e-7;                                        // the same, where R turns out smaller than foreseen
 constexpr double kRounding = 10 * std::numeric_limits<double>::epsilon();  // the same after a projection
+
+// By how much R shrinks a column at most: the reciprocal of the largest entry of R^-1. 0 if R is not square or singular.
+double calc_divisor(const std::vector<double>& r, int next_width, int width) {
+  if (next_width != width) return 0;
+  std::vector<double> inverse = r;
+  PetscBLASInt size = next_width, info = 0;
+  dtrtri_("U", "N", &size, inverse.data(), &size, &info);
+  double largest = 0;
+  for (const double x : inverse) largest = std::max(largest, std::abs(x));
+  return info == 0 && std::isfinite(largest) ? 1 / largest : 0;
+}
 
 }  // namespace
 
@@ -43,11 +55,15 @@ bool Orthogonality::is_good(const State& state, const double* alpha) {
   BLASgemm_("N", "N", &m, &b, &m, &one, state.t, &stride, last_.data(), &m, &zero, foreseen_.data(), &m);
   BLASgemm_("N", "N", &m, &b, &b, &minus, last_.data(), &m, alpha, &b, &one, foreseen_.data(), &m);
   BLASgemm_("N", "N", &m, &b, &old, &minus, before_.data(), &m, r, &stride, &one, foreseen_.data(), &m);
-  double largest = noise_;
+  largest_ = noise_;
   for (std::size_t j = 0; j < width; ++j) {
-    for (int i = 0; i < state.previous; ++i) largest = std::max(largest, std::abs(foreseen_[j * size + static_cast<std::size_t>(i)]));
+    for (int i = 0; i < state.previous; ++i) largest_ = std::max(largest_, std::abs(foreseen_[j * size + static_cast<std::size_t>(i)]));
   }
-  return noise_ > 0 && largest < kGoodEnough * divisor_;
+  return noise_ > 0 && largest_ < kGoodEnough * divisor_;
+}
+
+bool Orthogonality::is_still_good(const State& state, const std::vector<double>& r, int next_width) const {
+  return largest_ < kTolerable * calc_divisor(r, next_width, state.width);
 }
 
 void Orthogonality::learn(const State& state, const double* c, int stride) {
@@ -69,15 +85,7 @@ void Orthogonality::advance(const State& state, const std::vector<double>& r, in
   const auto known = static_cast<std::size_t>(state.previous);  // rows beyond are projected out in every step
   const std::size_t all = m + next;
   since_spared_ = is_spared ? 0 : since_spared_ + 1;
-  divisor_ = 0;
-  if (next == b) {
-    std::vector<double> inverse = r;
-    PetscBLASInt size = next_width, info = 0;
-    dtrtri_("U", "N", &size, inverse.data(), &size, &info);
-    double largest = 0;
-    for (const double x : inverse) largest = std::max(largest, std::abs(x));
-    if (info == 0 && std::isfinite(largest)) divisor_ = 1 / largest;
-  }
+  divisor_ = calc_divisor(r, next_width, state.width);
   std::vector<double> product(all * next);
   for (std::size_t j = 0; j < next; ++j) {
     for (std::size_t i = 0; i < m; ++i) {

@@ -28,11 +28,15 @@ class Orthogonality {
   /// After the first pass of a projection: c = V^T M w as it was measured, (size, width) with stride `stride`. What was not foreseen is
   /// rounding, and expected again.
   void learn(const State& state, const double* c, int stride);
+  /// After a step that was spared the projection: whether w, made a block with R (next_width, width), did without indeed. R is known only
+  /// then, and where the space is nearly exhausted it shrinks w by far more than the R before.
+  bool is_still_good(const State& state, const std::vector<double>& r, int next_width) const;
   /// After the step: its R (next_width, width), and whether the projection was left out.
   void advance(const State& state, const std::vector<double>& r, int next_width, bool is_spared);
 
  private:
   std::vector<double> foreseen_;  // V^T M w, (size, width)
+  double largest_ = 0;            // of it and of noise_
   std::vector<double> last_;      // V^T M V_j, (size, width)
   std::vector<double> before_;    // V^T M V_{j-1}, (size, width of that block)
   double noise_ = 0;              // what rounding adds to V^T M w; 0: not yet measured
