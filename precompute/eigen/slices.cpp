@@ -74,22 +74,23 @@ Sweep::Part Sweep::take() {
   const double parts = std::ceil(static_cast<double>(rest_.count()) / static_cast<double>(most_));
   const double share = static_cast<double>(rest_.count()) / parts;
   const auto below_low = static_cast<double>(rest_.below_low);
-  Part part{rest_.low, rest_};
+  Part part{rest_.low, rest_.below_low, rest_};
   double few = rest_.low;    // too few of the slice's eigenvalues lie below it,
   double many = rest_.high;  // and too many below this
   double under = 0;          // the shift
   bool is_cluster = false;
   for (int trial = 0;; ++trial) {
     const double foreseen = std::midpoint(rest_.low, counts_.find_lambda(below_low + share, kNearEnd));
-    part.sigma = std::midpoint(few, many);
-    if (trial < kTrials) part.sigma = std::clamp(foreseen, std::lerp(few, many, kNearEnd), std::lerp(many, few, kNearEnd));
+    part.sigma = is_cluster ? many : std::midpoint(few, many);
+    if (trial < kTrials && !is_cluster) part.sigma = std::clamp(foreseen, std::lerp(few, many, kNearEnd), std::lerp(many, few, kNearEnd));
     const std::int64_t below = count_below_(part.sigma);
     counts_.add(part.sigma, below);
+    part.below_sigma = below;
     under = static_cast<double>(below) - below_low;
-    if (under >= 0.2 * share && under <= static_cast<double>(most_)) break;
+    if (is_cluster || (under >= 0.2 * share && under <= static_cast<double>(most_))) break;
     (under < share ? few : many) = part.sigma;
     is_cluster = many - few < kNarrow * many;
-    if (is_cluster) break;
+    if (is_cluster && (part.sigma == many || many == rest_.high)) break;  // Else once more, above it: all of it is below the shift then.
   }
   const double reach = part.sigma - rest_.low;
   const double wanted = std::max(share, 1.25 * under);

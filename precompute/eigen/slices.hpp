@@ -50,6 +50,7 @@ class Sweep {
 
   struct Part {
     double sigma = 0;
+    std::int64_t below_sigma = 0;
     Slice slice;  // below_high is a guess
   };
   /// The next slice about its shift; the last count was taken there. Only while it is not the last.

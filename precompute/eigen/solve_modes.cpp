@@ -58,6 +58,11 @@ double calc_lambda(double freq_hz) {
   return omega_rad_s * omega_rad_s;
 }
 
+std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
+  std::sort(counts.begin(), counts.end(), [](const Inertia& a, const Inertia& b) { return a.lambda < b.lambda; });
+  return counts;
+}
+
 class BandSolver {
  public:
   BandSolver(const Problem& problem, const Options& options);
@@ -72,10 +77,12 @@ class BandSolver {
   Slice cut(const Slice& band);
   void solve_in_slices(const Slice& band);
   void find_missing(const Slice& slice, double sigma);
+  void run_rounds(const Slice& slice, ShiftedFactor& factor, double sigma, int first);
   double run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round);
   std::int64_t count_found(double low, double high) const;
   double find_margin(double lambda) const;
   void move_doubtful_counts();
+  bool move_counts_to_band();
   double find_end_of_search() const;
   void prove();
   void describe_proof();
@@ -86,6 +93,8 @@ class BandSolver {
   void finish();
   void refine(ModeErrors& errors);
   void report(Phase phase, std::int64_t done) const;
+  bool is_below_band(double lambda) const { return lambda < low_ * (1 - kEdgeTolerance); }
+  bool is_above_band(double lambda) const { return lambda > high_ * (1 + kEdgeTolerance); }
   double to_hz(double scaled_lambda) const {
     return std::sqrt(std::max(scaling_.from_scaled(scaled_lambda), 0.0)) / (2 * std::numbers::pi);
   }
@@ -173,8 +182,13 @@ void BandSolver::solve_dense_band() {
   const auto count_under = [&](double lambda) {
     return std::lower_bound(pairs.lambda.begin(), pairs.lambda.end(), lambda) - pairs.lambda.begin();
   };
-  const double low = low_ * (1 - kEdgeNudge);
-  const double high = high_ * (1 + kEdgeNudge);
+  // As far outside the band, and short of the next mode there.
+  double low = low_ * (1 - kEdgeNudge);
+  double high = high_ * (1 + kEdgeNudge);
+  for (const double lambda : pairs.lambda) {
+    if (is_below_band(lambda)) low = std::max(low, std::midpoint(lambda, low_));
+    if (is_above_band(lambda)) high = std::min(high, std::midpoint(lambda, high_));
+  }
   modes_.count_below_low = count_under(low);
   modes_.band_count = count_under(high) - modes_.count_below_low;
   modes_.mechanism_count = count_under(low_ * 1e-4) - modes_.rigid_count;
@@ -300,8 +314,13 @@ void BandSolver::find_missing(const Slice& slice, double sigma) {
     sigma = counter_->take(sigma, 1e-5).lambda;
   }
   ShiftedFactor& factor = cholmod != nullptr ? *cholmod : counter_->get_factor();
+  run_rounds(slice, factor, sigma, 0);
+}
+
+// Runs with the factor at sigma until the slice holds what it was counted to hold, or runs find nothing new.
+void BandSolver::run_rounds(const Slice& slice, ShiftedFactor& factor, double sigma, int first) {
   int idle = 0;
-  for (int round = 0; round < kRounds && idle < kIdleRounds; ++round) {
+  for (int round = first; round < kRounds && idle < kIdleRounds; ++round) {
     const std::int64_t missing = slice.count() - count_found(slice.low * (1 - kEdgeTolerance), slice.high * (1 + kEdgeTolerance));
     if (missing <= 0) break;
     const std::size_t before = found_.lambda.size();
@@ -317,10 +336,21 @@ void BandSolver::solve_in_slices(const Slice& band) {
     report(Phase::kFactor, static_cast<std::int64_t>(found_.lambda.size()));
     return counter_->take(lambda).below;
   });
+  Slice counted = band;  // between shifts, where counts are exact
   while (!sweep.is_last()) {
     const Sweep::Part part = sweep.take();
+    counted.high = part.sigma;
+    counted.below_high = part.below_sigma;
     const double solved_to = run_round(part.slice, counter_->get_factor(), part.sigma, part.slice.count(), kGuess);
-    sweep.advance(solved_to, band.below_low + count_found(band.low * (1 - kEdgeTolerance), solved_to));
+    if (count_found(counted.low, counted.high) >= counted.count()) {
+      sweep.advance(solved_to, band.below_low + count_found(band.low * (1 - kEdgeTolerance), solved_to));
+    } else {
+      // Copies are missing below the shift, and above it no doubt too. Left for later they would count as modes of the slices to come.
+      run_rounds(counted, counter_->get_factor(), part.sigma, 1);
+      sweep.advance(part.sigma, part.below_sigma);
+    }
+    counted.low = part.sigma;
+    counted.below_low = part.below_sigma;
   }
   const Slice& rest = sweep.get_rest();
   if (rest.count() > 0) find_missing(rest, std::midpoint(rest.low, rest.high));
@@ -359,9 +389,26 @@ void BandSolver::move_doubtful_counts() {
   }
 }
 
-std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
-  std::sort(counts.begin(), counts.end(), [](const Inertia& a, const Inertia& b) { return a.lambda < b.lambda; });
-  return counts;
+// A mode between an end of the band and the count beside it would be counted and is not of the band: the count is taken anew between them.
+// True if one was.
+bool BandSolver::move_counts_to_band() {
+  bool has_moved = false;
+  for (const bool is_high : {false, true}) {
+    const std::vector<Inertia> counts = sort_counts(counter_->get_taken());
+    const Inertia old = is_high ? counts.back() : counts.front();
+    double nearest = old.lambda;
+    for (const double lambda : found_.lambda) {
+      if (is_high && is_above_band(lambda)) nearest = std::min(nearest, lambda);
+      if (!is_high && is_below_band(lambda)) nearest = std::max(nearest, lambda);
+    }
+    if (nearest == old.lambda) continue;
+    counter_->forget(old.lambda);
+    const std::int64_t below = counter_->take(std::midpoint(nearest, is_high ? high_ : low_), kEdgeTolerance / 10).below;
+    modes_.band_count -= std::abs(below - old.below);
+    if (!is_high) modes_.count_below_low = below;
+    has_moved = true;
+  }
+  return has_moved;
 }
 
 // Beyond it max_modes asks for nothing: the last mode wanted, or the end of the last slice while that is not found.
@@ -393,15 +440,15 @@ void BandSolver::prove() {
       }
       find_missing(part, std::midpoint(part.low, part.high));
     }
-    if (is_complete) return;
+    if (is_complete && !move_counts_to_band()) return;
   }
 }
 
 void BandSolver::describe_proof() {
   Proof& proof = modes_.proof;
-  for (const Inertia& taken : sort_counts(counter_->get_taken()))
-    proof.counts.push_back({to_hz(taken.lambda), taken.below, find_margin(taken.lambda)});
-  proof.found = static_cast<std::int64_t>(found_.lambda.size());
+  const std::vector<Inertia> counts = sort_counts(counter_->get_taken());
+  for (const Inertia& taken : counts) proof.counts.push_back({to_hz(taken.lambda), taken.below, find_margin(taken.lambda)});
+  proof.found = count_found(counts.front().lambda, counts.back().lambda);
   proof.factor_backward_error = counter_->get_worst_backward_error();
   proof.method = fmt::format("signs of the pivots of K - lambda M = L D L^T ({})", modes_.factor.solver);
 }
@@ -409,7 +456,7 @@ void BandSolver::describe_proof() {
 // What of the modes, ascending, is in the band and wanted.
 void BandSolver::check_range(std::vector<std::size_t>& order, const std::vector<double>& lambda) {
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
-  std::erase_if(order, [&](std::size_t i) { return lambda[i] < low_ * (1 - kEdgeTolerance) || lambda[i] > high_ * (1 + kEdgeTolerance); });
+  std::erase_if(order, [&](std::size_t i) { return is_below_band(lambda[i]) || is_above_band(lambda[i]); });
   // The counts were taken a little outside the band.
   const auto within = static_cast<std::int64_t>(order.size());
   if (!options_.max_modes || within < std::min(modes_.band_count, *options_.max_modes)) modes_.band_count = within;

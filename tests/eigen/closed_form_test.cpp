@@ -136,6 +136,54 @@ TEST(SolveModes, counts_a_mode_on_the_end_of_the_band_as_in_it) {
   }
 }
 
+TEST(SolveModes, leaves_out_modes_that_lie_just_outside_the_band) {
+  const test::System system = test::make_system(make_cube_between_walls(8));
+  const std::vector<double> all = calc_cube_eigenvalues(8);
+  for (const double away : {2e-8, 4e-7, 1e-6, 1.5e-6}) {  // of lambda
+    for (const auto how : {Method::kAutomatic, Method::kDense}) {
+      if (how == Method::kDense && away != 4e-7) continue;  // slow
+      Options options;
+      options.low_hz = to_hz(all[3] * (1 + away));
+      options.high_hz = to_hz(all[60] * (1 - away));
+      options.method = how;
+      const Modes modes = solve_modes(system.problem, options);
+      expect_band(modes, all, options);
+      const auto counted = modes.proof.counts.back().below - modes.proof.counts.front().below;
+      EXPECT_EQ(counted, modes.band_count) << away;
+      EXPECT_EQ(modes.proof.found, modes.band_count) << away;
+      EXPECT_EQ(modes.count_below_low, modes.proof.counts.front().below) << away;
+    }
+  }
+}
+
+// Below the last shift of a slice all copies are found before the next slice begins, and a group larger than any slice is no obstacle.
+TEST(SolveModes, finds_more_equal_modes_than_a_slice_holds) {
+  int size = 1;
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  if (size > 2) GTEST_SKIP() << "two ranks show it, more take long on fewer cores";
+  constexpr int kEqual = 110;
+  constexpr int kOthers = 40;
+  Network many;
+  std::vector<double> all;
+  for (int copy = 0; copy < kEqual + kOthers; ++copy) {
+    const double rate = kRate * (copy < kEqual ? 1.0 : 1.0 + 0.01 * (copy - kEqual + 1));
+    Network cube = make_cube_between_walls(2, rate);
+    for (Vec3& x : cube.nodes) x[0] += 0.5 * copy;
+    many = copy == 0 ? cube : test::join(many, cube);
+    const std::vector<double> own = calc_cube_eigenvalues(2, rate);
+    all.insert(all.end(), own.begin(), own.end());
+  }
+  std::sort(all.begin(), all.end());
+  const test::System system = test::make_system(many);  // 3600 unknowns
+  Options options;
+  options.low_hz = 10;
+  options.high_hz = to_hz(4.7 * kRate / kMass);  // the lowest group of every cube
+  const Modes modes = solve_modes(system.problem, options);
+  expect_band(modes, all, options);
+  EXPECT_EQ(modes.band_count, 3 * (kEqual + kOthers));
+  EXPECT_LE(modes.factor.factorisations, 25);
+}
+
 TEST(SolveModes, joins_slices_without_a_gap_or_a_double) {
   int size = 1;
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
