@@ -675,7 +675,7 @@ void Iteration::run() {
     PetscScalar* all = everything_.values;
     return check(BVRestoreArray(eps_->V, &all));
   }
-  next_check_ = std::min(static_cast<int>(1.3 * static_cast<double>(eps_->nev)) + 2 * block_, room_);
+  next_check_ = std::min(static_cast<int>(1.7 * static_cast<double>(eps_->nev)) + 2 * block_, room_);
   while (true) {
     const bool goes_on = step();
     ++eps_->its;

@@ -191,10 +191,11 @@ void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {
   for (std::size_t j = 0; j < modes; ++j) {
     const double* column = phi.column(static_cast<PetscInt>(j));
     double lanes[8] = {};
-    for (PetscInt i = 0; i < phi.rows; i += 8) {
-      for (PetscInt lane = 0; lane < std::min<PetscInt>(8, phi.rows - i); ++lane)
-        lanes[lane] = std::max(lanes[lane], std::abs(column[i + lane]));
+    PetscInt i = 0;
+    for (; i + 8 <= phi.rows; i += 8) {
+      for (PetscInt lane = 0; lane < 8; ++lane) lanes[lane] = std::max(lanes[lane], std::abs(column[i + lane]));
     }
+    for (; i < phi.rows; ++i) lanes[0] = std::max(lanes[0], std::abs(column[i]));
     largest[j] = *std::max_element(lanes, lanes + 8);
   }
   MPI_Allreduce(MPI_IN_PLACE, largest.data(), static_cast<int>(modes), MPI_DOUBLE, MPI_MAX, comm);

@@ -182,7 +182,9 @@ void set_goal(EPS eps, const KrylovRequest& request, Family family) {
     const PetscInt wanted = std::min(request.count, room);
     check(EPSSetWhichEigenpairs(eps, EPS_ALL));
     check(EPSSetInterval(eps, request.low, request.high));
-    check(EPSSetDimensions(eps, wanted, std::min(n, 5 * wanted / 2 + 6 * kBlock), PETSC_DEFAULT));
+    // Twice the modes and eight blocks, as runs from the bottom of a spectrum take; more with neighbours on both sides, or after a guess.
+    const PetscInt neighbours = std::min(locked, wanted / 2) + (request.is_count_known ? 0 : wanted / 4);
+    check(EPSSetDimensions(eps, wanted, std::min(n, 2 * wanted + 9 * kBlock + neighbours), PETSC_DEFAULT));
     return;
   }
   // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the

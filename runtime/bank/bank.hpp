@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -130,7 +131,7 @@ double calc_shape_scale(double largest);
 /// `value` in steps of `scale`, rounded to nearest. |value| <= 32767 scale.
 inline std::int16_t find_step(double value, double scale) {
   const double steps = scale > 0.0 ? value / scale : 0.0;
-  return static_cast<std::int16_t>(static_cast<std::int32_t>(steps + (steps < 0.0 ? -0.5 : 0.5)));
+  return static_cast<std::int16_t>(static_cast<std::int32_t>(steps + std::copysign(0.5, steps)));
 }
 
 /// Fills shape_scale and shape from shapes given as doubles: `row(v)` returns the (m, 3) values of vertex v.
