@@ -182,9 +182,8 @@ void set_goal(EPS eps, const KrylovRequest& request, Family family) {
     const PetscInt wanted = std::min(request.count, room);
     check(EPSSetWhichEigenpairs(eps, EPS_ALL));
     check(EPSSetInterval(eps, request.low, request.high));
-    // Twice the modes and eight blocks, as runs from the bottom of a spectrum take; more with neighbours on both sides, or after a guess.
-    const PetscInt neighbours = std::min(locked, wanted / 2) + (request.is_count_known ? 0 : wanted / 4);
-    check(EPSSetDimensions(eps, wanted, std::min(n, 2 * wanted + 9 * kBlock + neighbours), PETSC_DEFAULT));
+    const auto basis = calc_basis_size(wanted, locked, request.is_count_known) - kBlock;  // SLEPc's basis is without the residuals.
+    check(EPSSetDimensions(eps, wanted, static_cast<PetscInt>(std::min<std::int64_t>(n, basis)), PETSC_DEFAULT));
     return;
   }
   // A basis of this size converges without a restart, as a rule; a restart throws away half of its solves. A shift within the band has the
@@ -261,7 +260,7 @@ void FoundModes::reset(Mat stiffness, PetscInt capacity) {
   columns_ = make_columns(capacity);
 }
 
-void FoundModes::add(Vec shape, double eigenvalue) {
+void FoundModes::add(double eigenvalue, const std::function<bool(Vec shape)>& write) {
   const auto count = static_cast<PetscInt>(lambda.size());
   if (count == capacity_) {
     capacity_ = capacity_ + capacity_ / 8 + 8;
@@ -275,9 +274,9 @@ void FoundModes::add(Vec shape, double eigenvalue) {
   }
   Vec column = nullptr;
   check(MatDenseGetColumnVecWrite(columns_, count, &column));
-  check(VecCopy(shape, column));
+  const bool is_new = write(column);
   check(MatDenseRestoreColumnVecWrite(columns_, count, &column));
-  lambda.push_back(eigenvalue);
+  if (is_new) lambda.push_back(eigenvalue);
 }
 
 petsc::MatHandle FoundModes::copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const {
@@ -321,6 +320,11 @@ petsc::MatHandle FoundModes::take(const std::vector<std::size_t>& order) {
   return result;
 }
 
+std::int64_t calc_basis_size(std::int64_t wanted, std::int64_t locked, bool is_count_known) {
+  const std::int64_t neighbours = std::min(locked, wanted / 2) + (is_count_known ? 0 : wanted / 4);
+  return 2 * wanted + 10 * kBlock + neighbours;
+}
+
 KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   MPI_Comm comm = MPI_COMM_NULL;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(request.stiffness), &comm));
@@ -357,8 +361,6 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
 
   check(EPSSolve(eps));
 
-  petsc::VecHandle shape;
-  check(MatCreateVecs(request.stiffness, shape.out(), nullptr));
   EPSConvergedReason reason = EPS_CONVERGED_ITERATING;
   check(EPSGetConvergedReason(eps, &reason));
   PetscInt converged = 0;
@@ -366,10 +368,12 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   double highest = request.sigma;
   for (PetscInt i = 0; i < converged; ++i) {
     PetscScalar lambda = 0;
-    check(EPSGetEigenpair(eps, i, &lambda, nullptr, shape, nullptr));
+    check(EPSGetEigenvalue(eps, i, &lambda, nullptr));
     if (lambda < request.low || lambda > request.high) continue;
-    if ((family == Family::plain || family == Family::dense) && !clear_of_locked(request, shape)) continue;
-    found.add(shape, lambda);
+    found.add(lambda, [&](Vec shape) {
+      check(EPSGetEigenvector(eps, i, shape, nullptr));
+      return (family != Family::plain && family != Family::dense) || clear_of_locked(request, shape);
+    });
     highest = std::max(highest, lambda);
   }
   // The block method ends when the interval is done, the others with the farthest of what is nearest.

@@ -18,8 +18,8 @@ class FoundModes {
  public:
   /// Forgets all modes and makes room for `capacity` with K's rows. Collective.
   void reset(Mat stiffness, PetscInt capacity);
-  /// Copies a pair. Collective.
-  void add(Vec shape, double eigenvalue);
+  /// Adds a pair whose shape `write` puts into the vector it is given; nothing where that returns false. Collective.
+  void add(double eigenvalue, const std::function<bool(Vec shape)>& write);
   /// The modes with low < lambda < high and the other vectors in a matrix of their own; null if there are none. Collective.
   petsc::MatHandle copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const;
   /// The columns by the order given, and nothing else; this object is empty afterwards. Collective.
@@ -58,6 +58,10 @@ struct KrylovStatistics {
   double solve_seconds = 0;
   double solved_to = 0;  // From sigma up to here no eigenvalue is missing, as far as the run can tell; at most the interval's end.
 };
+
+/// Columns of the block method's basis, residuals included, for `wanted` eigenvalues with `locked` columns held away: twice the modes and
+/// eight blocks are what runs from the bottom of a spectrum take; it is more with neighbours on both sides, or after a guess.
+std::int64_t calc_basis_size(std::int64_t wanted, std::int64_t locked, bool is_count_known);
 
 /// Adds the eigenpairs of K x = lambda M x that it finds in the interval to `found`; fewer than there are when some did not converge, or
 /// copies of repeated eigenvalues stayed hidden. Collective.

@@ -49,9 +49,8 @@ constexpr double kSafeMargin = 1e-7;       // Counts nearer to a mode (relative 
 constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
 constexpr int kRounds = 60;                // Krylov runs per interval at most until its count is met,
 constexpr int kIdleRounds = 2;             // and so many without a new mode.
-constexpr double kLockedMargin = 0.5;      // Of a slice's width: modes found that near are held away (800 modes: 2144 solves, at 0.1 2272).
-constexpr int kGuess = -1;                 // The round of a run whose count is a guess.
-constexpr double kKrylovTolerance = 0.1;   // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
+constexpr double kLockedMargin = 0.5;  // Of a slice's width: modes found that near are held away (818 modes: 2,181 solves, at 0.1 2,272).
+constexpr double kKrylovTolerance = 0.1;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -62,6 +61,12 @@ std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
   std::sort(counts.begin(), counts.end(), [](const Inertia& a, const Inertia& b) { return a.lambda < b.lambda; });
   return counts;
 }
+
+// Modes of a slice that are still to be found.
+struct Missing {
+  std::int64_t count = 0;
+  bool is_known = true;  // by inertia, or guessed
+};
 
 class BandSolver {
  public:
@@ -78,7 +83,7 @@ class BandSolver {
   void solve_in_slices(const Slice& band);
   void find_missing(const Slice& slice, double sigma);
   void run_rounds(const Slice& slice, ShiftedFactor& factor, double sigma, int first);
-  double run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round);
+  double run_round(const Slice& slice, ShiftedFactor& factor, double sigma, Missing missing, int round);
   std::int64_t count_found(double low, double high) const;
   double find_margin(double lambda) const;
   void move_doubtful_counts();
@@ -247,8 +252,11 @@ void BandSolver::solve_sparse_band() {
   sought_to_ = wanted.high;
   PetscInt rows = 0;
   check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
-  check_memory(comm_, static_cast<std::int64_t>(rows) * 8 * (wanted.count() + 5 * std::min(wanted.count(), kSliceModes) / 2 + 100),
-               options_.memory_limit_bytes, fmt::format("The search for {} modes", wanted.count()));
+  const bool is_cut = wanted.count() > kSliceModes;
+  const std::int64_t locked = is_cut ? kSliceModes / 2 : modes_.rigid_count;
+  const std::int64_t basis = calc_basis_size(std::min(wanted.count(), kSliceModes), locked, !is_cut);
+  check_memory(comm_, static_cast<std::int64_t>(rows) * 8 * (wanted.count() + locked + basis), options_.memory_limit_bytes,
+               fmt::format("The search for {} modes", wanted.count()));
   found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted.count()));
   solve_in_slices(wanted);
   prove();
@@ -260,9 +268,8 @@ std::int64_t BandSolver::count_found(double low, double high) const {
   return std::count_if(found_.lambda.begin(), found_.lambda.end(), [&](double lambda) { return lambda >= low && lambda < high; });
 }
 
-// One Krylov run; adds to found_ what lies in the slice and was not there. Returns up to where from sigma on it left nothing out. `round`
-// below zero: `missing` is a guess.
-double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sigma, std::int64_t missing, int round) {
+// One Krylov run; adds to found_ what lies in the slice and was not there. Returns up to where from sigma on it left nothing out.
+double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sigma, Missing missing, int round) {
   const Timer timer(modes_.seconds.iterate);
   KrylovRequest request;
   request.stiffness = problem_.stiffness;
@@ -272,13 +279,13 @@ double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double s
   request.sigma = sigma;
   request.low = slice.low * (1 - kEdgeTolerance);
   request.high = slice.high * (1 + kEdgeTolerance);
-  request.count = petsc::to_petsc_int(missing);
-  request.is_count_known = round >= 0;
+  request.count = petsc::to_petsc_int(missing.count);
+  request.is_count_known = missing.is_known;
   // Those below the slice are nearer the shift than its upper end when it starts at the bottom. Copies that rounding alone brings in come
   // late: later runs ask for some more, beyond the slice.
   const bool is_below = sigma - slice.low * 0.5 > slice.high - sigma || sigma < slice.low;
   const std::int64_t below = slice.below_low - modes_.rigid_count;
-  request.nearest = petsc::to_petsc_int(missing + (is_below || 5 * below <= slice.count() ? below : 0) + std::clamp(round, 0, 4) * 10);
+  request.nearest = petsc::to_petsc_int(missing.count + (is_below || 5 * below <= slice.count() ? below : 0) + std::min(round, 4) * 10);
   request.method = options_.method;
   request.tolerance = kKrylovTolerance * options_.tolerance;
   request.position = &problem_.nodes.position;
@@ -324,7 +331,7 @@ void BandSolver::run_rounds(const Slice& slice, ShiftedFactor& factor, double si
     const std::int64_t missing = slice.count() - count_found(slice.low * (1 - kEdgeTolerance), slice.high * (1 + kEdgeTolerance));
     if (missing <= 0) break;
     const std::size_t before = found_.lambda.size();
-    run_round(slice, factor, sigma, missing, round);
+    run_round(slice, factor, sigma, {missing, true}, round);
     idle = found_.lambda.size() > before ? 0 : idle + 1;
   }
 }
@@ -341,7 +348,7 @@ void BandSolver::solve_in_slices(const Slice& band) {
     const Sweep::Part part = sweep.take();
     counted.high = part.sigma;
     counted.below_high = part.below_sigma;
-    const double solved_to = run_round(part.slice, counter_->get_factor(), part.sigma, part.slice.count(), kGuess);
+    const double solved_to = run_round(part.slice, counter_->get_factor(), part.sigma, {part.slice.count(), false}, 0);
     if (count_found(counted.low, counted.high) >= counted.count()) {
       sweep.advance(solved_to, band.below_low + count_found(band.low * (1 - kEdgeTolerance), solved_to));
     } else {
