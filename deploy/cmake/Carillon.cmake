@@ -8,7 +8,8 @@ function(carillon_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(carillon_${name} STATIC ${arg_SOURCES})
   add_library(carillon::${name} ALIAS carillon_${name})
-  target_include_directories(carillon_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_include_directories(carillon_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/carillon>)
   target_compile_features(carillon_${name} PUBLIC cxx_std_20)
   target_link_libraries(carillon_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   carillon_warnings(carillon_${name})
@@ -59,7 +60,7 @@ endfunction()
 
 # The environment and the command line under which tests start MPI programs: one thread a rank, more ranks than cores allowed, root allowed.
 set(CARILLON_MPI_ENVIRONMENT
-  "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OPENBLAS_NUM_THREADS=1;OMP_NUM_THREADS=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_hwloc_base_binding_policy=none;OMPI_MCA_mpi_yield_when_idle=1")
+  "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OPENBLAS_NUM_THREADS=1;OMP_NUM_THREADS=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_hwloc_base_binding_policy=none;OMPI_MCA_mpi_yield_when_idle=1;HWLOC_COMPONENTS=-gl")
 function(carillon_mpi_command out ranks)
   set(${out} mpirun -np ${ranks} --oversubscribe --bind-to none PARENT_SCOPE)
 endfunction()

@@ -142,21 +142,31 @@ def rotate(quaternion, points):
 # ------------------------------------------------------------------ VTK
 
 
+def start_server():
+    """Xvfb on a free display from :100 on, out of the way of programs (hwloc in Open MPI) that look at :0 to :9; its number, or None."""
+    first = 100 + os.getpid() % 900
+    for number in range(first, first + 20):
+        read_end, write_end = os.pipe()
+        server = subprocess.Popen(["Xvfb", f":{number}", "-displayfd", str(write_end), "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"],
+                                  pass_fds=[write_end], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                  preexec_fn=lambda: ctypes.CDLL(None).prctl(1, signal.SIGTERM))  # PR_SET_PDEATHSIG: it ends with us
+        os.close(write_end)
+        with os.fdopen(read_end) as pipe:
+            if pipe.readline().strip():
+                atexit.register(lambda: (server.terminate(), server.wait()))
+                return number
+        server.wait()
+    return None
+
+
 def open_display():
     """VTK of Debian draws through X: a virtual server of our own, gone when we are."""
     if shutil.which("Xvfb") is None:
         if os.environ.get("DISPLAY"):
             return
         raise SystemError_("Xvfb is missing, and there is no display to draw on; install the package xvfb")
-    read_end, write_end = os.pipe()
-    server = subprocess.Popen(["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"],
-                              pass_fds=[write_end], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                              preexec_fn=lambda: ctypes.CDLL(None).prctl(1, signal.SIGTERM))  # PR_SET_PDEATHSIG: it ends with us
-    os.close(write_end)
-    atexit.register(lambda: (server.terminate(), server.wait()))
-    with os.fdopen(read_end) as pipe:
-        number = pipe.readline().strip()
-    if not number:
+    number = start_server()
+    if number is None:
         raise SystemError_("the virtual display Xvfb did not start; try 'Xvfb :99' by hand to see why")
     # VTK ends the process when it cannot connect, so somebody else tries first.
     x11 = ctypes.CDLL("libX11.so.6")

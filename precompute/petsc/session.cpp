@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdlib>
 #include <limits>
+#include <string_view>
 #include <vector>
 
 #include "runtime/config/error.hpp"
@@ -65,12 +66,33 @@ void agree_on(MPI_Comm comm, int kind, const std::string& text) {
   throw_kind(header[0], shared);
 }
 
+// Ranks that all run on this machine, as their launcher says.
+bool is_on_one_host() {
+  const char* all = std::getenv("OMPI_COMM_WORLD_SIZE");
+  const char* here = std::getenv("OMPI_COMM_WORLD_LOCAL_SIZE");
+  if (all != nullptr || here != nullptr) return all != nullptr && here != nullptr && std::string_view(all) == here;
+  // Started alone, by nobody's launcher.
+  return std::getenv("PMIX_RANK") == nullptr && std::getenv("PMI_RANK") == nullptr && std::getenv("SLURM_PROCID") == nullptr;
+}
+
+// Open MPI asks every library for networks what it could do, 0.2 s by the clock; on one machine its own way through shared memory is
+// what it takes in the end.
+void spare_the_search_for_networks() {
+  if (is_on_one_host()) setenv("OMPI_MCA_pml", "ob1", 0);
+}
+
+// hwloc, which Open MPI asks for cores and caches, opens every X display from :0 to :9 to list graphics cards, and Xlib ends the process
+// when such a server ends in between.
+void spare_the_search_for_displays() { setenv("HWLOC_COMPONENTS", "-gl", 0); }
+
 }  // namespace
 
 Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_options) {
   int is_initialized = 0;
   MPI_Initialized(&is_initialized);
   if (is_initialized == 0) {
+    spare_the_search_for_networks();
+    spare_the_search_for_displays();
     if (MPI_Init(&argc, &argv) != MPI_SUCCESS) throw SystemError("MPI does not start. Start the program with mpirun, or alone.");
     started_mpi_ = true;
   }

@@ -66,7 +66,7 @@ def make_environment():
         kept["OPENBLAS_CORETYPE"] = kernels
     return kept | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive", "OMPI_ALLOW_RUN_AS_ROOT": "1",
                    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none",
-                   "OMPI_MCA_mpi_yield_when_idle": "1"}
+                   "OMPI_MCA_mpi_yield_when_idle": "1", "HWLOC_COMPONENTS": "-gl"}
 
 
 def run_measured(command, cwd, environment=None, timeout_s=3600):
