@@ -87,11 +87,10 @@ std::array<Moduli, 2> calc_bounds(const Material& material) {
   }
   const Elasticity c = calc_own(*material.orthotropic);
   const Square3 s = calc_compliance(*material.orthotropic);
-  const double c_diagonal = c[0] + c[7] + c[14], c_off = c[1] + c[2] + c[8], c_shear = c[21] + c[28] + c[35];
   const double s_diagonal = s[0][0] + s[1][1] + s[2][2], s_off = s[0][1] + s[0][2] + s[1][2];
   double s_shear = 0.0;
   for (const double g : material.orthotropic->shear_modulus_pa) s_shear += 1 / g;
-  return {Moduli{(c_diagonal + 2 * c_off) / 9, (c_diagonal - c_off + 3 * c_shear) / 15},
+  return {Moduli{(c[0] + c[7] + c[14] + 2 * (c[1] + c[2] + c[8])) / 9, calc_mean_shear_pa(c)},
           Moduli{1 / (s_diagonal + 2 * s_off), 15 / (4 * s_diagonal - 4 * s_off + 3 * s_shear)}};
 }
 
@@ -108,7 +107,10 @@ double find_loss_factor(const std::vector<LossRow>& table, double freq_hz) {
 }  // namespace
 
 // Jacobi's rotations (Golub and Van Loan, section 8.5).
-std::array<double, 6> calc_eigenvalues(Elasticity a) {
+std::array<double, 6> calc_eigenvalues(const Elasticity& elasticity_pa) {
+  Elasticity a = elasticity_pa;  // shear rows and columns times sqrt(2): Kelvin's form, whose eigenvalues do not depend on the axes
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) a[6 * i + j] *= (i < 3 ? 1.0 : std::numbers::sqrt2) * (j < 3 ? 1.0 : std::numbers::sqrt2);
   for (int sweep = 0; sweep < 30; ++sweep)
     for (int p = 0; p < 6; ++p)
       for (int q = p + 1; q < 6; ++q) {
@@ -199,13 +201,11 @@ Equivalent calc_equivalent(std::span<const Material> materials, std::span<const 
   return {9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear)), mass / volume};
 }
 
+double calc_mean_shear_pa(const Elasticity& c) { return (c[0] + c[7] + c[14] - c[1] - c[2] - c[8] + 3 * (c[21] + c[28] + c[35])) / 15; }
+
 double calc_definiteness(const Elasticity& elasticity_pa) {
-  Elasticity kelvin = elasticity_pa;  // shear rows and columns times sqrt(2): then the eigenvalues do not depend on the axes
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) kelvin[6 * i + j] *= (i < 3 ? 1.0 : std::numbers::sqrt2) * (j < 3 ? 1.0 : std::numbers::sqrt2);
-  const auto values = calc_eigenvalues(kelvin);
-  const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
-  return *least / *greatest;
+  const auto values = calc_eigenvalues(elasticity_pa);
+  return values.front() / values.back();
 }
 
 }  // namespace carillon::spec

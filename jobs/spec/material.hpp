@@ -84,8 +84,11 @@ struct Equivalent {
 /// and the mean density. `volume_m3` has one positive entry a material.
 Equivalent calc_equivalent(std::span<const Material> materials, std::span<const double> volume_m3);
 
-/// The eigenvalues of C [Pa], ascending: how stiff the solid is in six strains (engineering shear strains).
-std::array<double, 6> calc_eigenvalues(Elasticity elasticity_pa);
+/// The eigenvalues of C in Kelvin's form [Pa], ascending: how stiff the solid is in its six own strains, the same for any axes.
+std::array<double, 6> calc_eigenvalues(const Elasticity& elasticity_pa);
+
+/// The shear modulus of C by Voigt's average over all orientations.
+double calc_mean_shear_pa(const Elasticity& elasticity_pa);
 
 /// The least eigenvalue of C over the greatest; a material is refused below 1e-9.
 double calc_definiteness(const Elasticity& elasticity_pa);

@@ -23,9 +23,12 @@ namespace {
 
 using petsc::check;
 
-constexpr double kTieTolerance = 1e-4;          // Far above the errors of shapes, so that rounding breaks no tie.
-constexpr double kRoundOff = 10;                // Refined modes of thin shelves come out at 1 to 2.
-constexpr int kStrip = 4 * NodeMatrix::kStrip;  // Columns at a time: wide enough for BLAS to run at full speed in the Gram matrix.
+constexpr double kTieTolerance = 1e-4;  // Far above the errors of shapes, so that rounding breaks no tie.
+constexpr double kRoundOff = 10;        // Refined modes of thin shelves come out at 1 to 2.
+using Row = NodeMatrix::Row;
+constexpr int kStrip = NodeMatrix::kStrip;
+constexpr int kWide = 4 * kStrip;  // Columns at a time in a Gram matrix: wide enough for BLAS to run at full speed.
+constexpr double kNear = 1e-4;     // Relative to lambda: nearer ones serve to measure a residual.
 
 std::vector<double> read_diagonal(Mat matrix) {
   petsc::VecHandle diagonal;
@@ -44,44 +47,64 @@ void sum_over_ranks(MPI_Comm comm, std::vector<double>& values) {
   MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, comm);
 }
 
-// Sums of `kSums` terms each over the rows. Eight of each at a time, so that they need not wait for one another.
-template <std::size_t kSums, typename Terms>
-std::array<double, kSums> sum_rows(std::ptrdiff_t rows, Terms&& terms) {
-  constexpr std::ptrdiff_t kLanes = 8;
-  double lanes[kSums][kLanes] = {};
-  std::ptrdiff_t i = 0;
-  for (; i + kLanes <= rows; i += kLanes) {
-    for (std::ptrdiff_t lane = 0; lane < kLanes; ++lane) {
-      const std::array<double, kSums> term = terms(i + lane);
-      for (std::size_t k = 0; k < kSums; ++k) lanes[k][lane] += term[k];
+// Sums over the rows for sixteen columns each; r = K phi - lambda M phi with a lambda that is given.
+enum Sum : int { kPhiMPhi, kPhiR, kRR, kRMPhi, kMPhiMPhi, kDiagonal, kSums };
+using Sums = std::array<Row, kSums>;
+typedef double Vector __attribute__((vector_size(64), may_alias));
+constexpr int kVectors = kStrip / 8;
+
+// Loops over the sums are unrolled: GCC 12 sends them through memory otherwise.
+#if defined(__x86_64__)
+__attribute__((target_clones("avx512f", "arch=haswell", "default")))
+#endif
+void add_sums(std::size_t rows, const Row* phi_rows, const Row* m_rows, const Row* k_rows, const double* diagonal, const Row& lambda,
+              Row* total_rows) {
+  const auto* phi = reinterpret_cast<const Vector*>(phi_rows);
+  const auto* m_phi = reinterpret_cast<const Vector*>(m_rows);
+  const auto* k_phi = reinterpret_cast<const Vector*>(k_rows);
+  auto* total = reinterpret_cast<Vector*>(total_rows);
+#pragma GCC unroll 2
+  for (int v = 0; v < kVectors; ++v) {
+    Vector sum[kSums];
+#pragma GCC unroll 6
+    for (int k = 0; k < kSums; ++k) sum[k] = Vector{};
+    const Vector by = reinterpret_cast<const Vector*>(&lambda)[v];
+    for (std::size_t i = 0; i < rows; ++i) {
+      const Vector own = phi[i * kVectors + v];
+      const Vector m = m_phi[i * kVectors + v];
+      const Vector r = k_phi[i * kVectors + v] - by * m;
+      const Vector d = diagonal[i] * own;
+      sum[kPhiMPhi] += own * m;
+      sum[kPhiR] += own * r;
+      sum[kRR] += r * r;
+      sum[kRMPhi] += r * m;
+      sum[kMPhiMPhi] += m * m;
+      sum[kDiagonal] += d * d;
     }
+#pragma GCC unroll 6
+    for (int k = 0; k < kSums; ++k) total[k * kVectors + v] += sum[k];
   }
-  for (; i < rows; ++i) {
-    const std::array<double, kSums> term = terms(i);
-    for (std::size_t k = 0; k < kSums; ++k) lanes[k][0] += term[k];
-  }
-  std::array<double, kSums> sums{};
-  for (std::size_t k = 0; k < kSums; ++k) sums[k] = std::accumulate(lanes[k], lanes[k] + kLanes, 0.0);
-  return sums;
 }
 
-// Some columns of a block with K and M times them.
-struct Strip {
-  Columns phi, m_phi, k_phi;
-};
-
-// (phi^T M phi, phi^T K phi) of each column.
-std::vector<double> calc_energies(MPI_Comm comm, const Strip& strip) {
-  std::vector<double> energies;
-  for (int j = 0; j < strip.phi.count; ++j) {
-    const double* phi = strip.phi.column(j);
-    const double* m_phi = strip.m_phi.column(j);
-    const double* k_phi = strip.k_phi.column(j);
-    const auto sums = sum_rows<2>(strip.phi.rows, [=](std::ptrdiff_t i) { return std::array{phi[i] * m_phi[i], phi[i] * k_phi[i]}; });
-    energies.insert(energies.end(), sums.begin(), sums.end());
+// K and M times columns first ... first + 15 of phi, a few nodes at a time: their sums, and M phi.
+void multiply_and_sum(const Operators& operators, const Columns& phi, int first, const Row& lambda, std::vector<Row>& packed,
+                      std::vector<Row>& packed_for_mass, Sums& total, const Columns& m_phi) {
+  constexpr std::size_t kNodes = 32;
+  Row m_rows[3 * kNodes];
+  Row k_rows[3 * kNodes];
+  operators.stiffness.pack(phi, first, packed);
+  if (!operators.mass.is_diagonal()) operators.mass.pack(phi, first, packed_for_mass);
+  const std::vector<Row>& for_mass = operators.mass.is_diagonal() ? packed : packed_for_mass;
+  total = {};
+  const auto nodes = static_cast<std::size_t>(phi.rows / 3);
+  for (std::size_t node = 0; node < nodes; node += kNodes) {
+    const std::size_t count = std::min(kNodes, nodes - node);
+    operators.stiffness.multiply_rows(packed.data(), node, count, k_rows);
+    operators.mass.multiply_rows(for_mass.data(), node, count, m_rows);
+    add_sums(3 * count, packed.data() + 3 * node, m_rows, k_rows, operators.stiffness_diagonal.data() + 3 * node, lambda, total.data());
+    NodeMatrix::unpack(m_rows, node, count, m_phi);
   }
-  sum_over_ranks(comm, energies);
-  return energies;
+  MPI_Allreduce(MPI_IN_PLACE, total.data(), kSums * kStrip, MPI_DOUBLE, MPI_SUM, operators.comm);
 }
 
 }  // namespace
@@ -91,6 +114,8 @@ Operators::Operators(Mat stiffness_mat, Mat mass_mat)
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness_mat), &comm));
 }
 
+// The residual comes from a lambda at hand: r = (K - lambda' M) phi - delta M phi, delta = lambda - lambda'. Its norm then loses nothing to
+// cancellation as long as delta is small; where it is not, the sums are taken again.
 ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>& lambda, Mat shapes) {
   const std::size_t modes = lambda.size();
   ModeErrors errors;
@@ -98,40 +123,41 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
   const LocalColumns access(shapes);
   const Columns phi = access.view();
   const auto rows = static_cast<std::size_t>(phi.rows);
-  std::vector<double> m_space(rows * kStrip);
-  std::vector<double> k_space(rows * kStrip);
+  std::vector<double> m_space(rows * kWide);
+  std::vector<Row> packed, packed_for_mass;
   std::vector<double> gram(modes * modes, 0.0);
-  std::vector<double> square(modes);         // phi^T M phi
-  std::vector<double> sums(3 * modes, 0.0);  // squares of the residual, of M phi and of diag(K) phi
-  for (int first = 0; first < phi.count; first += kStrip) {
-    const int width = std::min(kStrip, phi.count - first);
-    const Strip strip{phi.part(first, width), {m_space.data(), phi.rows, phi.rows, width}, {k_space.data(), phi.rows, phi.rows, width}};
-    operators.mass.multiply(strip.phi, strip.m_phi);
-    operators.stiffness.multiply(strip.phi, strip.k_phi);
-    const std::vector<double> energies = calc_energies(operators.comm, strip);
-    for (int c = 0; c < width; ++c) {
-      const auto j = static_cast<std::size_t>(first + c);
-      square[j] = energies[static_cast<std::size_t>(2 * c)];
-      lambda[j] = energies[static_cast<std::size_t>(2 * c + 1)] / square[j];
-      const double* m_phi = strip.m_phi.column(c);
-      const double* k_phi = strip.k_phi.column(c);
-      const double* own = strip.phi.column(c);
-      const double* diagonal = operators.stiffness_diagonal.data();
-      const auto squares = sum_rows<3>(phi.rows, [=, value = lambda[j]](std::ptrdiff_t i) {
-        const double rest = k_phi[i] - value * m_phi[i];
-        const double term = diagonal[i] * own[i];
-        return std::array{rest * rest, m_phi[i] * m_phi[i], term * term};
-      });
-      std::copy(squares.begin(), squares.end(), sums.begin() + static_cast<std::ptrdiff_t>(3 * j));
+  std::vector<double> square(modes);  // phi^T M phi
+  for (int wide = 0; wide < phi.count; wide += kWide) {
+    const Columns m_phi{m_space.data(), phi.rows, phi.rows, std::min(kWide, phi.count - wide)};
+    for (int first = wide; first < wide + m_phi.count; first += kStrip) {
+      const int width = std::min(kStrip, phi.count - first);
+      Row near{};
+      std::copy_n(lambda.data() + first, width, near.column);
+      Sums sums;
+      const auto calc_delta = [&](int c) { return sums[kPhiR].column[c] / sums[kPhiMPhi].column[c]; };
+      constexpr int kMoreTries = 2;
+      for (int i = 0;; ++i) {
+        multiply_and_sum(operators, phi, first, near, packed, packed_for_mass, sums, m_phi.part(first - wide, width));
+        bool is_near = true;
+        for (int c = 0; c < width; ++c) is_near = is_near && std::abs(calc_delta(c)) <= kNear * std::abs(near.column[c] + calc_delta(c));
+        if (is_near || i == kMoreTries) break;
+        for (int c = 0; c < width; ++c) near.column[c] += calc_delta(c);
+      }
+      for (int c = 0; c < width; ++c) {
+        const auto j = static_cast<std::size_t>(first + c);
+        const double delta = calc_delta(c);
+        const double residual = sums[kRR].column[c] - 2 * delta * sums[kRMPhi].column[c] + delta * delta * sums[kMPhiMPhi].column[c];
+        square[j] = sums[kPhiMPhi].column[c];
+        lambda[j] = near.column[c] + delta;
+        const double scale = lambda[j] * std::sqrt(sums[kMPhiMPhi].column[c]);
+        errors.residual.push_back(std::sqrt(std::max(residual, 0.0)) / scale);
+        errors.floor.push_back(kRoundOff * PETSC_MACHINE_EPSILON * std::sqrt(sums[kDiagonal].column[c]) / scale);
+      }
     }
-    multiply_transposed(phi.part(0, first + width), strip.m_phi, gram.data() + static_cast<std::size_t>(first) * modes, phi.count);
+    multiply_transposed(phi.part(0, wide + m_phi.count), m_phi, gram.data() + static_cast<std::size_t>(wide) * modes, phi.count);
   }
-  sum_over_ranks(operators.comm, sums);
   MPI_Allreduce(MPI_IN_PLACE, gram.data(), static_cast<int>(gram.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
   for (std::size_t j = 0; j < modes; ++j) {
-    const double scale = lambda[j] * std::sqrt(sums[3 * j + 1]);
-    errors.residual.push_back(std::sqrt(sums[3 * j]) / scale);
-    errors.floor.push_back(kRoundOff * PETSC_MACHINE_EPSILON * std::sqrt(sums[3 * j + 2]) / scale);
     for (std::size_t i = 0; i < j; ++i)
       errors.orthonormality = std::max(errors.orthonormality, std::abs(gram[j * modes + i]) / std::sqrt(square[i] * square[j]));
     const double factor = 1 / std::sqrt(square[j]);
@@ -159,9 +185,9 @@ void orthonormalise_shapes(const Operators& operators, Mat shapes) {
   const Columns phi = access.view();
   const auto modes = static_cast<std::size_t>(phi.count);
   std::vector<double> gram(modes * modes, 0.0);
-  std::vector<double> space(static_cast<std::size_t>(phi.rows) * kStrip);
-  for (int first = 0; first < phi.count; first += kStrip) {
-    const int width = std::min(kStrip, phi.count - first);
+  std::vector<double> space(static_cast<std::size_t>(phi.rows) * kWide);
+  for (int first = 0; first < phi.count; first += kWide) {
+    const int width = std::min(kWide, phi.count - first);
     const Columns m_phi{space.data(), phi.rows, phi.rows, width};
     operators.mass.multiply(phi.part(first, width), m_phi);
     multiply_transposed(phi.part(0, first + width), m_phi, gram.data() + static_cast<std::size_t>(first) * modes, phi.count);

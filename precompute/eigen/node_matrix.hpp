@@ -18,11 +18,26 @@ class NodeMatrix {
  public:
   static constexpr int kStrip = 16;
 
+  /// A row of sixteen columns.
+  struct alignas(64) Row {
+    double column[kStrip];
+  };
+
   /// Copies the matrix: AIJ, rows in blocks of three, whole nodes per rank. Collective.
   explicit NodeMatrix(Mat matrix);
 
   /// y = A x for all columns; x and y: this rank's rows, must not overlap. Collective.
   void multiply(const Columns& x, const Columns& y) const;
+
+  /// Columns first ... first + 15 of x, zeros beyond its last, as rows, with those that other ranks own behind this rank's: what
+  /// multiply_rows takes. Collective.
+  void pack(const Columns& x, int first, std::vector<Row>& packed) const;
+
+  /// y (3 nodes): the rows of A x of `nodes` own nodes from `begin` on.
+  void multiply_rows(const Row* packed, std::size_t begin, std::size_t nodes, Row* y) const;
+
+  /// Puts the rows of such a product into the columns of y, sixteen at most.
+  static void unpack(const Row* rows, std::size_t begin, std::size_t nodes, const Columns& y);
 
   bool is_diagonal() const { return kind_ == Kind::kDiagonal; }
 
@@ -30,7 +45,6 @@ class NodeMatrix {
   enum class Kind { kDiagonal, kScalars, kBlocks };
   void read(Mat matrix);
   void plan_exchange(Mat matrix, const std::vector<PetscInt>& ghosts);
-  void multiply_strip(const double* x, double* y) const;
 
   Kind kind_ = Kind::kDiagonal;
   std::size_t nodes_ = 0;                // own

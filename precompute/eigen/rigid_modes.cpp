@@ -131,10 +131,8 @@ void fill_motion(const NodeLayout& nodes, std::int32_t c, const Body& body, cons
 // of a translation.
 bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& basis, double unit) {
   for (int pass = 0; pass < 2; ++pass) {
-    for (Vec other : basis) {
-      check(MatMult(mass, candidate, work));
-      check(VecAXPY(candidate, -calc_dot(other, work), other));
-    }
+    check(MatMult(mass, candidate, work));
+    for (Vec other : basis) check(VecAXPY(candidate, -calc_dot(other, work), other));
   }
   const double after = calc_mass_norm(mass, candidate, work);
   if (!(after > kLineTolerance * unit)) return false;

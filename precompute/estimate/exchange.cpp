@@ -16,39 +16,53 @@ NodeExchange::NodeExchange(MPI_Comm comm, const fem::LocalMesh& local, const std
   int ranks = 1;
   MPI_Comm_size(comm, &ranks);
   if (ranks == 1) return;
-  const auto count = static_cast<std::int32_t>(local.nodes_m.size());
-  std::vector<std::vector<std::int32_t>> announced(ranks), asked(ranks), asked_local(ranks);
-  for (std::int32_t n = 0; n < local.owned_nodes; ++n) announced[local.node_in_mesh[n] % ranks].push_back(local.node_in_mesh[n]);
-  for (std::int32_t n = local.owned_nodes; n < count; ++n) {
-    if (place[n] < 0) continue;
-    asked[local.node_in_mesh[n] % ranks].push_back(local.node_in_mesh[n]);
-    asked_local[local.node_in_mesh[n] % ranks].push_back(place[n]);
-  }
-  const auto known = exchange_lists(comm, announced);
-  const auto questions = exchange_lists(comm, asked);
-  std::unordered_map<std::int32_t, std::int32_t> owner_of;
-  for (int r = 0; r < ranks; ++r)
-    for (const std::int32_t id : known[r]) owner_of[id] = r;
-  std::vector<std::vector<std::int32_t>> answers(ranks);
-  for (int r = 0; r < ranks; ++r)
-    for (const std::int32_t id : questions[r]) answers[r].push_back(owner_of.at(id));
-  const auto owners = exchange_lists(comm, answers);
-
-  std::vector<std::vector<std::int32_t>> halo(ranks), halo_ids(ranks);
-  for (int r = 0; r < ranks; ++r)
-    for (std::size_t i = 0; i < owners[r].size(); ++i) {
-      halo[owners[r][i]].push_back(asked_local[r][i]);
-      halo_ids[owners[r][i]].push_back(asked[r][i]);
+  using Lists = std::vector<std::vector<std::int32_t>>;
+  Lists announced, asked, asked_local;
+  petsc::run_agreed(comm, [&] {
+    for (Lists* lists : {&announced, &asked, &asked_local}) lists->resize(ranks);
+    for (std::int32_t n = 0; n < static_cast<std::int32_t>(local.nodes_m.size()); ++n) {
+      const std::int32_t id = local.node_in_mesh[n];
+      if (n < local.owned_nodes) {
+        announced[id % ranks].push_back(id);
+      } else if (place[n] >= 0) {
+        asked[id % ranks].push_back(id);
+        asked_local[id % ranks].push_back(place[n]);
+      }
     }
-  const auto wanted = exchange_lists(comm, halo_ids);
-  std::unordered_map<std::int32_t, std::int32_t> local_of;
-  for (std::int32_t n = 0; n < local.owned_nodes; ++n) local_of[local.node_in_mesh[n]] = place[n];
-  for (int r = 0; r < ranks; ++r) {
-    if (halo[r].empty() && wanted[r].empty()) continue;
-    Neighbour neighbour{r, std::move(halo[r]), {}};
-    for (const std::int32_t id : wanted[r]) neighbour.owned.push_back(local_of.at(id));
-    neighbours_.push_back(std::move(neighbour));
-  }
+  });
+  const Lists known = exchange_lists(comm, announced);
+  const Lists questions = exchange_lists(comm, asked);
+  Lists answers;
+  petsc::run_agreed(comm, [&] {
+    std::unordered_map<std::int32_t, std::int32_t> owner_of;
+    for (int r = 0; r < ranks; ++r)
+      for (const std::int32_t id : known[r]) owner_of[id] = r;
+    answers.resize(ranks);
+    for (int r = 0; r < ranks; ++r)
+      for (const std::int32_t id : questions[r]) answers[r].push_back(owner_of.at(id));
+  });
+  const Lists owners = exchange_lists(comm, answers);
+
+  Lists halo, halo_ids;
+  petsc::run_agreed(comm, [&] {
+    for (Lists* lists : {&halo, &halo_ids}) lists->resize(ranks);
+    for (int r = 0; r < ranks; ++r)
+      for (std::size_t i = 0; i < owners[r].size(); ++i) {
+        halo[owners[r][i]].push_back(asked_local[r][i]);
+        halo_ids[owners[r][i]].push_back(asked[r][i]);
+      }
+  });
+  const Lists wanted = exchange_lists(comm, halo_ids);
+  petsc::run_agreed(comm, [&] {
+    std::unordered_map<std::int32_t, std::int32_t> local_of;
+    for (std::int32_t n = 0; n < local.owned_nodes; ++n) local_of[local.node_in_mesh[n]] = place[n];
+    for (int r = 0; r < ranks; ++r) {
+      if (halo[r].empty() && wanted[r].empty()) continue;
+      Neighbour neighbour{r, std::move(halo[r]), {}};
+      for (const std::int32_t id : wanted[r]) neighbour.owned.push_back(local_of.at(id));
+      neighbours_.push_back(std::move(neighbour));
+    }
+  });
 }
 
 void NodeExchange::reserve(std::size_t width) {
@@ -62,6 +76,7 @@ void NodeExchange::reserve(std::size_t width) {
     send_.resize(bytes);
     receive_.resize(bytes);
   }
+  requests_.reserve(2 * (neighbours_.size() + bytes / piece_bytes_));
 }
 
 template <typename T, typename Take>

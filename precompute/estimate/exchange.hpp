@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "precompute/fem/distribute.hpp"
+#include "precompute/petsc/session.hpp"
 
 namespace carillon::estimate {
 
@@ -23,7 +24,8 @@ void for_pieces(std::size_t bytes, std::size_t piece_bytes, const Post& post) {
   for (std::size_t at = 0; at < bytes; at += piece_bytes) post(at, static_cast<int>(std::min(piece_bytes, bytes - at)));
 }
 
-/// Sends out[r] to rank r and returns what came, by rank. T: trivially copyable. Collective.
+/// Sends out[r] to rank r and returns what came, by rank. T: trivially copyable. Collective. Throws on every rank when memory runs out on
+/// one.
 template <typename T>
 std::vector<std::vector<T>> exchange_lists(MPI_Comm comm, const std::vector<std::vector<T>>& out, std::size_t piece_bytes = kPieceBytes) {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -32,10 +34,18 @@ std::vector<std::vector<T>> exchange_lists(MPI_Comm comm, const std::vector<std:
   std::vector<std::int64_t> sent(ranks), got(ranks);
   for (std::size_t r = 0; r < ranks; ++r) sent[r] = static_cast<std::int64_t>(out[r].size());
   MPI_Alltoall(sent.data(), 1, MPI_INT64_T, got.data(), 1, MPI_INT64_T, comm);
-  std::vector<std::vector<T>> in(ranks);
+  std::vector<std::vector<T>> in;
   std::vector<MPI_Request> requests;
+  petsc::run_agreed(comm, [&] {
+    in.resize(ranks);
+    std::size_t messages = 0;
+    for (std::size_t r = 0; r < ranks; ++r) {
+      in[r].resize(static_cast<std::size_t>(got[r]));
+      messages += 2 + (in[r].size() + out[r].size()) * sizeof(T) / piece_bytes;
+    }
+    requests.reserve(messages);
+  });
   for (std::size_t r = 0; r < ranks; ++r) {
-    in[r].resize(static_cast<std::size_t>(got[r]));
     auto* bytes = reinterpret_cast<char*>(in[r].data());
     for_pieces(in[r].size() * sizeof(T), piece_bytes, [&](std::size_t at, int count) {
       MPI_Irecv(bytes + at, count, MPI_BYTE, static_cast<int>(r), kTag, comm, &requests.emplace_back());

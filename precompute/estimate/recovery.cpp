@@ -1,8 +1,7 @@
 // Method: at every vertex a polynomial (linear for T4, quadratic for T10) is fitted by least squares to the strains that the elements
-// around
-//   have at their best points (centroid; the four points of degree 2). The fit is linear in the strains, so it is kept as weights. Where
-//   the samples do not fix a term of the highest degree (a corner with one element), a small ridge lets it be zero. Terms of lower degree
-//   have none: what one element can follow is recovered exactly in every patch, or bending, whose strains are linear through the
+//   around have at their best points (centroid; the four points of degree 2). The fit is linear in the strains, so it is kept as weights.
+//   Where the samples do not fix a term of the highest degree (a corner with one element), a small ridge lets it be zero. Terms of lower
+//   degree have none: what one element can follow is recovered exactly in every patch, or bending, whose strains are linear through the
 //   thickness, would be taken for an error wherever patches are one-sided, as on all of a slender bar.
 // Source: Zienkiewicz and Zhu 1992, IJNME 33, 1331 ("superconvergent patch recovery").
 // Deviations: ridge instead of wider patches, which would reach beyond the neighbours' ranks; strains scaled by the root of the elasticity.
@@ -101,9 +100,7 @@ std::array<float, 36> calc_root(const Solid& solid) {
 float find_dilatation(const Solid& solid) {
   const double mean = fem::calc_mean_lambda(solid.elasticity_pa);
   if (mean == 0.0) return 1.0F;
-  const auto& c = solid.elasticity_pa;
-  const double shear = (c[0] + c[7] + c[14] - c[1] - c[2] - c[8] + 3 * (c[21] + c[28] + c[35])) / 15;
-  const double full = (fem::kFullLambda + 2.0 / 3) * shear;
+  const double full = (fem::kFullLambda + 2.0 / 3) * spec::calc_mean_shear_pa(solid.elasticity_pa);
   return static_cast<float>(std::sqrt(full / (full + mean)));
 }
 

@@ -12,6 +12,7 @@
 #include <unordered_map>
 
 #include "precompute/estimate/exchange.hpp"
+#include "precompute/mesh/faces.hpp"
 
 namespace carillon::estimate {
 namespace {
@@ -60,7 +61,7 @@ std::vector<Face> find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
   MPI_Comm_size(comm, &ranks);
   // Faces fall into buckets by their lowest corner: a face then meets its twin among the few faces of one node.
   struct Sided {
-    std::array<std::int32_t, 2> rest;  // of its corners, ascending
+    std::int64_t rest;  // of its corners, ascending, as one number
     Face face;
   };
   const auto sort_corners = [&](std::int32_t e, int f) {
@@ -79,7 +80,7 @@ std::vector<Face> find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
   for (std::int32_t e = 0; e < local.tet_count(); ++e)
     for (int f = 0; f < 4; ++f) {
       const FaceKey key = sort_corners(e, f);
-      all[end[key[0]]++] = {{key[1], key[2]}, {e, f}};
+      all[end[key[0]]++] = {std::int64_t{key[1]} << 32 | key[2], {e, f}};
     }
   std::vector<Face> faces;
   std::size_t first = 0;
@@ -117,13 +118,6 @@ std::vector<Face> find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
   return faces;
 }
 
-/// The edge of mesh::kEdges between two corners of an element.
-int find_edge(int a, int b) {
-  for (int e = 0; e < 6; ++e)
-    if ((mesh::kEdges[e][0] == a && mesh::kEdges[e][1] == b) || (mesh::kEdges[e][0] == b && mesh::kEdges[e][1] == a)) return e;
-  return 0;
-}
-
 struct Corner {
   std::int32_t vertex = 0;  // in the whole mesh
   Vec3 normal{};            // unit
@@ -134,7 +128,7 @@ struct Corner {
 Vec3 find_tangent(const fem::LocalMesh& local, const Face& face, int a, int b) {
   const Vec3 &xa = local.nodes_m[get_node(local, face.tet, a)], &xb = local.nodes_m[get_node(local, face.tet, b)];
   if (local.order == 1) return subtract(xb, xa);
-  const Vec3& xm = local.nodes_m[get_node(local, face.tet, 4 + find_edge(a, b))];
+  const Vec3& xm = local.nodes_m[get_node(local, face.tet, 4 + mesh::find_edge(a, b))];
   return {4 * xm[0] - 3 * xa[0] - xb[0], 4 * xm[1] - 3 * xa[1] - xb[1], 4 * xm[2] - 3 * xa[2] - xb[2]};
 }
 
@@ -192,7 +186,7 @@ std::vector<SurfaceEdge> find_surface_edges(MPI_Comm comm, const fem::LocalMesh&
     const double third = std::sqrt(dot(area, area)) / 6;
     const bool held = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
     for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, edge = find_edge(loop[i], loop[j]);
+      const int j = (i + 1) % 3, edge = mesh::find_edge(loop[i], loop[j]);
       const Vec3 &xa = local.nodes_m[nodes[i]], &xb = local.nodes_m[nodes[j]], &na = normals[3 * f + i], &nb = normals[3 * f + j];
       const Vec3 along = subtract(xb, xa);
       double gap = dot(subtract(nb, na), along) / 8;

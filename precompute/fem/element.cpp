@@ -307,8 +307,7 @@ double calc_mean_lambda(const spec::Elasticity& c) {
   double dilatation = 0.0;
   for (int i = 0; i < 3; ++i) dilatation += row[i][6] / row[i][i];
   const double bulk = 1 / dilatation;
-  const double shear = (c[0] + c[7] + c[14] - c[1] - c[2] - c[8] + 3 * (c[21] + c[28] + c[35])) / 15;
-  return std::max(bulk - (kFullLambda + 2.0 / 3) * shear, 0.0);
+  return std::max(bulk - (kFullLambda + 2.0 / 3) * spec::calc_mean_shear_pa(c), 0.0);
 }
 
 Solid::Solid(const spec::Material& material, bool full)

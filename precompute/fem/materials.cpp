@@ -44,7 +44,7 @@ std::map<std::int32_t, std::string> share_names(MPI_Comm comm, const std::map<st
   std::string text;
   petsc::run_agreed(comm, [&] {
     if (rank != 0) return;
-    for (const auto& [tag, name] : names) text += fmt::format("{} {}", tag, name) + '\0';
+    for (const auto& [tag, name] : names) text += fmt::format("{} {} ", tag, name.size()) + name;  // a name may hold any byte
     if (text.size() > std::numeric_limits<int>::max()) throw InputError("the names of the mesh's regions are longer than 2 GB in all");
   });
   auto size = static_cast<int>(text.size());
@@ -54,9 +54,10 @@ std::map<std::int32_t, std::string> share_names(MPI_Comm comm, const std::map<st
   std::map<std::int32_t, std::string> shared;
   petsc::run_agreed(comm, [&] {
     for (std::size_t begin = 0; begin < text.size();) {
-      const std::size_t end = text.find('\0', begin), blank = text.find(' ', begin);
-      shared[std::stoi(text.substr(begin, blank - begin))] = text.substr(blank + 1, end - blank - 1);
-      begin = end + 1;
+      const std::size_t blank = text.find(' ', begin), name = text.find(' ', blank + 1) + 1;
+      const std::size_t size = std::stoull(text.substr(blank + 1, name - blank - 2));
+      shared[std::stoi(text.substr(begin, blank - begin))] = text.substr(name, size);
+      begin = name + size;
     }
   });
   return shared;

@@ -42,10 +42,9 @@ static_assert(std::is_trivially_copyable_v<Decision>, "Decisions are sent as byt
 
 double calc_mean_edge(MPI_Comm comm, const fem::LocalMesh& local) {
   std::array<double, 2> sum{};  // of lengths, of edges
-  const int width = local.nodes_per_tet();
-  for (std::int32_t e = 0; e < local.tet_count(); ++e)
+  for (auto tet = local.tets.begin(); tet != local.tets.end(); tet += local.nodes_per_tet())
     for (const auto& [a, b] : mesh::kEdges) {
-      const mesh::Vec3 &p = local.nodes_m[local.tets[e * width + a]], &q = local.nodes_m[local.tets[e * width + b]];
+      const mesh::Vec3 &p = local.nodes_m[tet[a]], &q = local.nodes_m[tet[b]];
       sum[0] += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
       sum[1] += 1;
     }
@@ -201,11 +200,7 @@ std::string Search::describe_surface(double cents) const {
 Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
   const estimate::ErrorBars& bars = current_.solved.bars;
-  if (last.modes == 0) {
-    const Trial* before = find_before(last);
-    if (before != nullptr && before->modes == 0) return {1, last.setting};  // twice none: there is none
-    return {0, make_setting(last.setting.element, 0.5)};
-  }
+  if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
   if (last.setting.element == spec::Element::T4 && quadratic_) {
     // Ten nodes were tried first; the cheaper of the two forecasts goes on.
     const double ratio = find_ratio(bars, kGoal * asked_, kFinestStep / 4);
@@ -262,6 +257,8 @@ Decision Search::decide_on_file() {
 Decision Search::decide() {
   const Trial& last = report_.trials.back();
   if (last.modes > 0 && last.worst_cents <= asked_) return {1, last.setting};
+  if (const Trial* before = find_before(last); last.modes == 0 && before != nullptr && before->modes == 0)
+    return {1, last.setting};  // twice none: there is none
   if (last.modes > 0 && last.algebraic_cents > 0.2 * asked_) tolerance_ = std::max(tolerance_ * 1e-2, 1e-12);
   if (report_.trials.size() >= kMostTrials) give_up(fmt::format("{} settings were tried; ask for less, or give the mesh", kMostTrials));
   return run_.job.body ? decide_on_body() : decide_on_file();
@@ -354,7 +351,7 @@ AccurateBody Search::solve() {
     petsc::run_agreed(run_.comm, [&] { is_refinable_ = run_.rank == 0 && !slabs::is_parallel_format(run_.job.mesh); });
   }
   for (Decision decision{0, setting}; decision.is_done == 0;) {
-    const std::string reached = report_.trials.empty() ? "" : describe_reached() + "; ";
+    const std::string reached = report_.trials.empty() ? "" : describe_reached() + ". ";
     try {
       if (!report_.trials.empty()) check_forecast(decision.setting);
       attempt(decision.setting);

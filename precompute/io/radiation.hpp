@@ -1,25 +1,14 @@
 // How loud a mode is: its radiation gain from the motion of the outer surface. Equations: docs/equations.md, radiation.
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <span>
-#include <vector>
-
-#include "runtime/bank/bank.hpp"
+#include "runtime/bank/surface.hpp"
 
 namespace carillon::io {
 
+using bank::calc_normal;
+using bank::find_outer_triangles;
+using bank::Triangle;
 using bank::Vec3;
-using Triangle = std::array<std::int32_t, 3>;
-
-/// The triangles that face the open air: those of closed shells (connected through edges) that enclose a positive volume. The wall of a
-/// closed cavity encloses a negative one; it moves air that cannot get out. A body open to the outside, such as a bowl, is one shell.
-/// Not collective.
-std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles);
-
-/// Twice the area times the unit normal of a triangle.
-Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle);
 
 /// Calculates the pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s):
 ///   g = rho0 omega / (4 pi sqrt(1 + (k a)^2)) * flow,   k = omega / c0,  a = sqrt(A / 4 pi),

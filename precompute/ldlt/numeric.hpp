@@ -15,12 +15,15 @@ struct FreeNumbers {
   void operator()(double* p) const;
 };
 
+/// When a large buffer gets its memory: all of it at once takes two thirds of the time, and is for what will be used from end to end.
+enum class Pages { kWhenTouched, kAtOnce };
+
 /// Uninitialised numbers, aligned for vectors. Large ones are pages of their own, which go back to the system at once: update matrices come
 /// and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
 class Buffer {
  public:
   Buffer() = default;
-  explicit Buffer(std::int64_t count);
+  explicit Buffer(std::int64_t count, Pages pages_come = Pages::kWhenTouched);
   double* data() const { return data_.get(); }
   std::int64_t size() const { return size_; }
 

@@ -154,20 +154,22 @@ class Solver {
     }
   }
 
-  /// to <- D^-1 from, n rows.
-  void divide_by_pivots(std::size_t first_row, int n, int width, const double* from, double* to) const {
+  /// to <- D^-1 from, n rows of kWidth.
+  template <int kWidth>
+  void divide_by_pivots(std::size_t first_row, int n, const double* from, double* to) const {
     const double* diagonal = numbers_.d_diagonal.data() + first_row;
     const double* off = numbers_.d_off.data() + first_row;
-    for (int k = 0; k < n; ++k) {
-      const double* row = from + k * width;
-      double* out = to + k * width;
-      const double before = k > 0 ? off[k - 1] : 0;
-      for (int c = 0; c < width; ++c) out[c] = diagonal[k] * row[c];
+    for (int k = 0; k < n; ++k, from += kWidth, to += kWidth) {
+      for (int c = 0; c < kWidth; ++c) to[c] = diagonal[k] * from[c];
       if (off[k] != 0)
-        for (int c = 0; c < width; ++c) out[c] += off[k] * row[width + c];
-      if (before != 0)
-        for (int c = 0; c < width; ++c) out[c] += before * row[c - width];
+        for (int c = 0; c < kWidth; ++c) to[c] += off[k] * from[kWidth + c];
+      if (k > 0 && off[k - 1] != 0)
+        for (int c = 0; c < kWidth; ++c) to[c] += off[k - 1] * from[c - kWidth];
     }
+  }
+
+  void divide_by_pivots(std::size_t first_row, int n, int width, const double* from, double* to) const {
+    width == 16 ? divide_by_pivots<16>(first_row, n, from, to) : divide_by_pivots<8>(first_row, n, from, to);
   }
 
   void send(int rank, int tag, const Ints& nodes) {

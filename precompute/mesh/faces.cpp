@@ -41,9 +41,23 @@ std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t
   std::vector<Face> faces(unsorted.size());
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
   for (const Face& face : unsorted) faces[next[static_cast<std::size_t>(face.a)]++] = face;
-  for (std::size_t i = 0; i + 1 < begin.size(); ++i)
-    std::sort(faces.begin() + static_cast<std::ptrdiff_t>(begin[i]), faces.begin() + static_cast<std::ptrdiff_t>(begin[i + 1]),
-              [](const Face& x, const Face& y) { return std::tie(x.b, x.c, x.tet, x.local) < std::tie(y.b, y.c, y.tet, y.local); });
+  // Faces come in the order of elements, so a stable sort by the other corners is all; the faces of one lowest corner are some twenty.
+  const auto get_key = [](const Face& face) { return std::int64_t{face.b} << 32 | face.c; };
+  constexpr std::size_t kFew = 64;
+  for (std::size_t n = 0; n + 1 < begin.size(); ++n) {
+    const auto first = faces.begin() + static_cast<std::ptrdiff_t>(begin[n]),
+               last = faces.begin() + static_cast<std::ptrdiff_t>(begin[n + 1]);
+    if (begin[n + 1] - begin[n] > kFew) {
+      std::stable_sort(first, last, [&](const Face& x, const Face& y) { return get_key(x) < get_key(y); });
+      continue;
+    }
+    for (auto next = first; next < last; ++next) {
+      const Face face = *next;
+      auto to = next;
+      for (; to != first && get_key(face) < get_key(to[-1]); --to) *to = to[-1];
+      *to = face;
+    }
+  }
   return faces;
 }
 

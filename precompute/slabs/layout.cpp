@@ -249,8 +249,8 @@ std::string ask_child(const std::filesystem::path& file) {
 
 void check_array(const std::filesystem::path& file, std::int64_t file_bytes, const Array& array) {
   const bool is_inside = array.offset >= 0 && array.rows >= 0 && array.columns >= 0 && array.columns <= 16 && array.bytes > 0 &&
-                         array.bytes <= 8 && array.offset <= file_bytes && array.rows <= file_bytes &&
-                         array.rows * array.columns * array.bytes <= file_bytes - array.offset;
+                         array.bytes <= 8 && array.offset <= file_bytes &&
+                         array.rows <= (file_bytes - array.offset) / std::max<std::int64_t>(array.columns * array.bytes, 1);
   if (!is_inside)
     refuse(file, fmt::format("array '{}' reaches beyond the end of the file ({} bytes); write it again", array.name, file_bytes));
 }

@@ -5,7 +5,8 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
+#include <array>
 #include <fstream>
 
 #include "precompute/mesh/check_parts.hpp"

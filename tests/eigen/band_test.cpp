@@ -14,25 +14,6 @@
 namespace carillon::eigen {
 namespace {
 
-using petsc::check;
-using test::make_block;
-using test::Network;
-using test::to_hz;
-
-// Eigenvalues of the band, zero modes left out by the lower end.
-std::vector<double> pick(const std::vector<double>& all, double low_hz, double high_hz) {
-  std::vector<double> picked;
-  for (const double lambda : all) {
-    if (lambda > 0 && to_hz(lambda) >= low_hz && to_hz(lambda) <= high_hz) picked.push_back(lambda);
-  }
-  return picked;
-}
-
-void expect_eigenvalues(const Modes& modes, const std::vector<double>& expected) {
-  ASSERT_EQ(modes.lambda.size(), expected.size());
-  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(modes.lambda[i] / expected[i], 1.0, 1e-9) << i;
-}
-
 // The block that most tests use: 5 x 5 x 10 masses, free, 750 unknowns; the band holds its lowest 60 modes or so.
 const Network& get_block() {
   static const Network block = make_block(5, 5, 10);

@@ -13,10 +13,6 @@
 namespace carillon::eigen {
 namespace {
 
-using petsc::check;
-using test::Network;
-using test::to_hz;
-
 constexpr double kRate = 4e6;  // [N/m]
 constexpr double kMass = 0.5;  // [kg]
 

@@ -17,11 +17,6 @@
 namespace carillon::eigen {
 namespace {
 
-using petsc::check;
-using test::make_block;
-using test::Network;
-using test::to_hz;
-
 TEST(Proof, counts_what_dense_lapack_counts) {
   const Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {50, 0, 0}));
   const std::vector<double> all = test::calc_all_eigenvalues(two);

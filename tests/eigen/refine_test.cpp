@@ -15,9 +15,6 @@
 namespace carillon::eigen {
 namespace {
 
-using petsc::check;
-using test::to_hz;
-
 // Adds to every mode an error of this size relative to its largest entry, of all frequencies and the same on any number of ranks.
 void spoil(Mat shapes, double size) {
   PetscInt first = 0;

@@ -17,11 +17,6 @@
 namespace carillon::eigen {
 namespace {
 
-using petsc::check;
-using test::make_block;
-using test::Network;
-using test::to_hz;
-
 // Bunches of masses, each tied to all others of its bunch, on a hub: an elimination takes every bunch alone before the hub. Their masses
 // are such that, with the hub held, the lowest eigenvalue of bunch j is `tuned` (1 + j spacing), j = -count/2 ... count/2.
 Network make_bunches(int count, double tuned, double spacing) {
@@ -64,18 +59,6 @@ Network make_bunches(int count, double tuned, double spacing) {
   }
   tie(network, hub, hub + kHub, hub, hub + kHub, 1e2);
   return network;
-}
-
-std::vector<double> pick(const std::vector<double>& all, double low_hz, double high_hz) {
-  std::vector<double> picked;
-  for (const double lambda : all)
-    if (lambda > 0 && to_hz(lambda) >= low_hz && to_hz(lambda) <= high_hz) picked.push_back(lambda);
-  return picked;
-}
-
-void expect_eigenvalues(const Modes& modes, const std::vector<double>& expected) {
-  ASSERT_EQ(modes.lambda.size(), expected.size());
-  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(modes.lambda[i] / expected[i], 1.0, 1e-9) << i;
 }
 
 // A pivot within a bunch vanishes near the upper end of the band, and again near every shift that is tried instead, though no eigenvalue of

@@ -11,10 +11,6 @@
 namespace carillon::eigen {
 namespace {
 
-using petsc::check;
-using test::make_block;
-using test::Network;
-
 // Rigid modes must be M-orthonormal and free of force; returns how many there are.
 std::size_t count_and_check(const test::System& system) {
   std::vector<std::int64_t> per_component;

@@ -1,5 +1,6 @@
 #include "tests/eigen/spring_network.hpp"
 
+#include <gtest/gtest.h>
 #include <petscblaslapack.h>
 
 #include <algorithm>
@@ -10,8 +11,6 @@
 
 namespace carillon::eigen::test {
 namespace {
-
-using petsc::check;
 
 // Numbers of the free nodes, -1 where held.
 std::vector<int> number_free_nodes(const Network& network, int& count) {
@@ -175,6 +174,18 @@ Network join(const Network& a, const Network& b) {
   for (const int c : b.component) both.component.push_back(c + components);
   for (const int node : b.held) both.held.push_back(node + shift);
   return both;
+}
+
+std::vector<double> pick(const std::vector<double>& all, double low_hz, double high_hz) {
+  std::vector<double> picked;
+  for (const double lambda : all)
+    if (lambda > 0 && to_hz(lambda) >= low_hz && to_hz(lambda) <= high_hz) picked.push_back(lambda);
+  return picked;
+}
+
+void expect_eigenvalues(const Modes& modes, const std::vector<double>& expected) {
+  ASSERT_EQ(modes.lambda.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(modes.lambda[i] / expected[i], 1.0, 1e-9) << i;
 }
 
 }  // namespace carillon::eigen::test

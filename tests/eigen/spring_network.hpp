@@ -5,6 +5,7 @@
 
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/handle.hpp"
+#include "precompute/petsc/session.hpp"
 
 namespace carillon::eigen::test {
 
@@ -45,4 +46,21 @@ Network join(const Network& a, const Network& b);
 
 double to_hz(double lambda);
 
+/// The eigenvalues of a band; zeros are left out.
+std::vector<double> pick(const std::vector<double>& all, double low_hz, double high_hz);
+/// Fails the test unless the modes have exactly these eigenvalues, to 1e-9 of each.
+void expect_eigenvalues(const Modes& modes, const std::vector<double>& expected);
+
 }  // namespace carillon::eigen::test
+
+namespace carillon::eigen {
+
+// What every test of these networks says.
+using petsc::check;
+using test::expect_eigenvalues;
+using test::make_block;
+using test::Network;
+using test::pick;
+using test::to_hz;
+
+}  // namespace carillon::eigen

@@ -115,7 +115,7 @@ TEST(Convergence, of_an_orthotropic_ball_that_is_nearly_incompressible) {
     const auto exact = calc_omega(fine, make_orthotropic_rubber(play), Form::automatic, 0.05, 1.0);
     const auto mean = study_orthotropic("T10 curved", exact, play, Form::automatic);
     const auto plain = study_orthotropic("T10 displacement form", exact, play, Form::displacement);
-    EXPECT_GT(3 * std::log(mean[0] / mean[1]) / std::log(540.0 / 160.0), 3.0);
+    EXPECT_GT(3 * std::log(mean[0] / mean[1]) / std::log(540.0 / 160.0), 3.8);
     if (play < 1e-3) {
       EXPECT_GT(plain[1], 10 * mean[1]);
     }

@@ -35,7 +35,9 @@ TEST(Refine, gives_the_nodes_that_a_lattice_twice_as_fine_has) {
     const mesh::TetMesh fine = refine_mesh(shapes::make_box({0.3, 0.02, 0.01}, {3, 2, 1}, order));
     mesh::TetMesh lattice = shapes::make_box({0.3, 0.02, 0.01}, {6, 4, 2}, order);
     EXPECT_EQ(fine.tet_count(), lattice.tet_count());
-    if (order == 1) EXPECT_EQ(fine.nodes.size(), lattice.nodes.size());
+    if (order == 1) {
+      EXPECT_EQ(fine.nodes.size(), lattice.nodes.size());
+    }
     for (const auto& [name, nodes] : fine.node_sets) {
       // Sets of faces: all nodes on them and no others.
       const std::size_t axis = static_cast<std::size_t>(name[0] - 'x');

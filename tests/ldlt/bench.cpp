@@ -7,7 +7,10 @@
 #include <cmath>
 #include <cstring>
 #include <ctime>
+#include <exception>
+#include <memory>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "precompute/fem/assemble.hpp"
@@ -88,17 +91,11 @@ void run_mumps(const fem::System& system, double sigma, int rank) {
                analysis, numeric, entries < 0 ? -1e6 * entries : 1.0 * entries, flops, negative);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  petsc::Session session(argc, argv);
-  if (argc < 2) {
-    fmt::print(stderr, "usage: bench_ldlt MESH [--mumps]\n");
-    return 2;
-  }
-  petsc::pin_blas_threads();
+void run(const std::string& file, bool with_mumps, int rank) {
   mesh::TetMesh body;
-  if (session.rank() == 0) body = mesh::read_mesh(argv[1]);
+  petsc::run_agreed(PETSC_COMM_WORLD, [&] {
+    if (rank == 0) body = mesh::read_mesh(file);
+  });
   const fem::Distribution pieces = fem::distribute(PETSC_COMM_WORLD, body, {});
   spec::Material ceramic;
   ceramic.young_modulus_pa = 5.4543e9;
@@ -106,6 +103,24 @@ int main(int argc, char** argv) {
   ceramic.density_kg_m3 = 2700;
   const fem::System system = fem::assemble(PETSC_COMM_WORLD, pieces.local, ceramic, spec::Mass::consistent);
   const double omega = 2 * std::numbers::pi * 12'000.0;
-  run_own(system, omega * omega, session.rank());
-  if (argc > 2 && std::strcmp(argv[2], "--mumps") == 0) run_mumps(system, omega * omega, session.rank());
+  run_own(system, omega * omega, rank);
+  if (with_mumps) run_mumps(system, omega * omega, rank);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const petsc::Session session(argc, argv);
+  const bool with_mumps = argc == 3 && std::strcmp(argv[2], "--mumps") == 0;
+  if (argc < 2 || argv[1][0] == '-' || argc > 2 + with_mumps) {
+    if (session.rank() == 0) fmt::print(stderr, "usage: bench_ldlt MESH [--mumps]\n");
+    return 1;
+  }
+  petsc::pin_blas_threads();
+  try {
+    run(argv[1], with_mumps, session.rank());
+  } catch (const std::exception& error) {
+    if (session.rank() == 0) fmt::print(stderr, "bench_ldlt: {}\n", error.what());
+    return 1;
+  }
 }

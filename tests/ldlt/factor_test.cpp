@@ -29,8 +29,9 @@ using test::Pencil;
 
 // A random block of three rows may be nearly singular, and pivots are not sought outside the blocks.
 constexpr double kRandomTolerance = 1e-10;
-// Of 600 lattices and shifts the median is 1e-15, 99 % lie below 1.3e-13, and the worst had 1.1e-12.
-constexpr double kLatticeTolerance = 3e-12;
+// Of 600 lattices and shifts the factorisation alone has 1e-15 at the median, 99 % lie below 1.3e-13, and the worst had 1.1e-12.
+constexpr double kLatticeTolerance = 1e-12;
+constexpr double kSolveTolerance = 1e-12;  // Solves are refined where the factorisation is bad.
 
 int find_ranks() {
   int ranks = 1;
@@ -87,7 +88,7 @@ void expect_counts_and_solves(Pencil& pencil, int shift_count, double tolerance 
     ASSERT_TRUE(factor.factorise(sigma)) << sigma << ", backward error " << factor.get_backward_error();
     EXPECT_EQ(factor.get_negative_pivots(), count_below(lambda, sigma)) << sigma;
     EXPECT_LT(factor.get_backward_error(), tolerance);
-    EXPECT_LT(solve_and_measure(factor, pencil, sigma, 3), tolerance) << sigma;
+    EXPECT_LT(solve_and_measure(factor, pencil, sigma, 3), kSolveTolerance) << sigma;
   }
 }
 
@@ -277,7 +278,8 @@ TEST(factor, counts_and_solves_alike_with_every_instruction_set_of_this_processo
     for (const double sigma : pick_shifts(lambda, 4)) {
       ASSERT_TRUE(factor.factorise(sigma)) << kernels->name << " " << sigma;
       EXPECT_EQ(factor.get_negative_pivots(), count_below(lambda, sigma)) << kernels->name;
-      for (const int columns : {1, 8, 13, 32}) EXPECT_LT(solve_and_measure(factor, pencil, sigma, columns), 1e-12) << kernels->name;
+      for (const int columns : {1, 8, 13, 32})
+        EXPECT_LT(solve_and_measure(factor, pencil, sigma, columns), kSolveTolerance) << kernels->name;
     }
   }
   set_kernels(nullptr);

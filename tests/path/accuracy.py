@@ -113,4 +113,6 @@ with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
     # Where no mode is, none is said to be right to 0 cents.
     text = run(folder, "silent", {**bar, "band_hz": [20, 300], "accuracy_cents": 10})
     assert "no mode in the band" in text.split("chosen:")[1] and "error bars up to" not in text, text
+    text = run(folder, "silent-file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 300], "accuracy_cents": 10})
+    assert "no mode in the band" in text.split("chosen: T10, refined 1 time,")[1], text
     print("as right as was asked, each time")

@@ -73,6 +73,24 @@ TEST(OrthotropicMaterials, have_the_elasticity_whose_inverse_is_their_compliance
   EXPECT_NEAR(c[6 * 5 + 5], 0.6e9, 1e-3);   // xy is 31
 }
 
+TEST(Elasticity, has_the_eigenvalues_of_an_isotropic_solid) {
+  Material steel;
+  steel.young_modulus_pa = 2e11;
+  steel.poisson_ratio = 0.3;
+  const auto values = calc_eigenvalues(steel.calc_elasticity_pa());
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(values[i] / (2e11 / 1.3), 1, 1e-14) << i;  // 2 mu, five times
+  EXPECT_NEAR(values[5] / (2e11 / 0.4), 1, 1e-14);                                   // 3 K
+  EXPECT_NEAR(calc_mean_shear_pa(steel.calc_elasticity_pa()) / (2e11 / 2.6), 1, 1e-14);
+}
+
+TEST(Elasticity, has_the_same_eigenvalues_and_mean_shear_for_any_axes) {
+  const auto straight = parse_job(wood(kSpruce), "/j.json").material.calc_elasticity_pa();
+  const auto oblique = parse_job(wood(kSpruce + ", \"axes\": [[1, 2, 2], [2, 1, -2]]"), "/j.json").material.calc_elasticity_pa();
+  const auto expected = calc_eigenvalues(straight), found = calc_eigenvalues(oblique);
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(found[i] / expected[i], 1, 1e-12) << i;
+  EXPECT_NEAR(calc_mean_shear_pa(oblique) / calc_mean_shear_pa(straight), 1, 1e-13);
+}
+
 class RoundTrip : public testing::TestWithParam<std::pair<const char*, std::string>> {};
 TEST_P(RoundTrip, of_a_job_resolves_to_itself) {
   const JobSpec job = parse_job(GetParam().second, "/jobs/a/job.json");

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <cstdio>
 #include <ctime>
+#include <exception>
+#include <stdexcept>
 
 #include "precompute/ldlt/interface.hpp"
 
@@ -10,7 +12,7 @@ namespace {
 
 std::int32_t read_int(std::FILE* file) {
   std::int32_t value = 0;
-  if (std::fread(&value, sizeof value, 1, file) != 1) std::fputs("time_planning: the file ends too early\n", stderr);
+  if (std::fread(&value, sizeof value, 1, file) != 1 || value < 0) throw std::runtime_error("the file ends too early or is no interface");
   return value;
 }
 
@@ -25,11 +27,11 @@ carillon::ldlt::Lists read_lists(std::FILE* file, std::int32_t count) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   std::FILE* file = argc > 1 ? std::fopen(argv[1], "rb") : nullptr;
   if (file == nullptr) {
     std::fputs("usage: time_planning FILE\n", stderr);
-    return 2;
+    return 1;
   }
   carillon::ldlt::Interface interface;
   const std::int32_t nodes = read_int(file);
@@ -41,4 +43,7 @@ int main(int argc, char** argv) {
   const std::clock_t start = std::clock();
   order_interface(interface);
   std::printf("%.6f\n", static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "time_planning: %s\n", error.what());
+  return 1;
 }
