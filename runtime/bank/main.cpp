@@ -1,4 +1,4 @@
-// carillon-bank: what is in a bank; is it whole and sane.
+// carillon-bank: what is in a bank; is it whole and sane; another density, stiffness, size or damping.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/edits.hpp"
 #include "runtime/bank/report.hpp"
 
 namespace {
@@ -33,7 +34,7 @@ void check(const std::string& file) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Looks at a mode bank.");
+  CLI::App app("Looks at a mode bank, and edits it.");
   app.name("carillon-bank");
   app.require_subcommand(1);
   std::string file;
@@ -45,6 +46,17 @@ int run(int argc, char** argv) {
   info->add_option("--modes", modes, "Rows of the table of modes")->capture_default_str();
   CLI::App* checking = app.add_subcommand("check", "Is it whole and sane: one line per property; exit code 0 when it is, 2 otherwise");
   checking->add_option("BANK", file, "The bank file")->required();
+  bank::Edits edits;
+  std::string edited;
+  std::vector<double> alphas;
+  CLI::App* editing =
+      app.add_subcommand("edit", "The bank of the same body with another density, stiffness, size or damping, without a solve");
+  editing->add_option("BANK", file, "The bank file")->required();
+  editing->add_option("OUT", edited, "The new bank file")->required();
+  editing->add_option("--density", edits.density_scale, "Times this much")->capture_default_str();
+  editing->add_option("--stiffness", edits.stiffness_scale, "Times this much; Poisson's ratio stays")->capture_default_str();
+  editing->add_option("--size", edits.size_scale, "All lengths times this much")->capture_default_str();
+  editing->add_option("--alphas", alphas, "Rayleigh damping in place of the bank's law: alpha1 [s] and alpha2 [1/s]")->expected(2);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -52,6 +64,9 @@ int run(int argc, char** argv) {
   }
   if (*checking) {
     check(file);
+  } else if (*editing) {
+    if (alphas.size() == 2) edits.alphas = {alphas[0], alphas[1]};
+    bank::write_bank(bank::calc_edited(bank::read_bank(file), edits), edited);
   } else {
     const bank::Bank bank = bank::read_bank(file);
     fmt::print("{}", json ? bank::format_info_json(bank, file) : bank::format_info(bank, file, modes));

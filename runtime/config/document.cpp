@@ -15,12 +15,13 @@ namespace carillon::config {
 
 struct DocumentData {
   std::filesystem::path file;
+  int first_line = 1;
   std::string text;
   Json::Value root;
 
   int line_at(std::ptrdiff_t offset) const {
     const auto end = text.begin() + std::clamp<std::ptrdiff_t>(offset, 0, static_cast<std::ptrdiff_t>(text.size()));
-    return 1 + static_cast<int>(std::count(text.begin(), end, '\n'));
+    return first_line + static_cast<int>(std::count(text.begin(), end, '\n'));
   }
   [[noreturn]] void fail(std::ptrdiff_t offset, const std::string& message) const {
     throw InputError(fmt::format("{}:{}: {}", file.string(), line_at(offset), message));
@@ -64,7 +65,7 @@ std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& valu
 }
 
 /// Turns jsoncpp's report ("* Line 3, Column 5\n  Missing ',' ...") into "file:3: ...".
-[[noreturn]] void fail_syntax(const std::filesystem::path& file, const std::string& report) {
+[[noreturn]] void fail_syntax(const DocumentData& data, const std::string& report) {
   int line = 1;
   int column = 1;
   std::string reason = report;
@@ -73,8 +74,8 @@ std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& valu
     reason = report.substr(start, report.find('\n', start + 1) - start);
   }
   reason.erase(0, reason.find_first_not_of(" \n"));
-  throw InputError(
-      fmt::format("{}:{}: this is not JSON (column {}): {}; mend the text there", file.string(), line, column, reason.substr(0, 200)));
+  throw InputError(fmt::format("{}:{}: this is not JSON (column {}): {}; mend the text there", data.file.string(),
+                               line - 1 + data.first_line, column, reason.substr(0, 200)));
 }
 
 /// Depth of brackets outside strings and comments, so that the parser's recursion is bounded before it starts.
@@ -109,9 +110,10 @@ const std::filesystem::path& Document::file() const { return data_->file; }
 
 Document read_document(const std::filesystem::path& file) { return parse_document(read_file(file, "JSON file", kMaxBytes), file); }
 
-Document parse_document(std::string_view text, const std::filesystem::path& file) {
+Document parse_document(std::string_view text, const std::filesystem::path& file, int first_line) {
   auto data = std::make_shared<DocumentData>();
   data->file = file;
+  data->first_line = first_line;
   if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);  // UTF-8 byte order mark
   data->text = std::string(text);
   check_depth(*data);
@@ -124,12 +126,13 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   const std::unique_ptr<Json::CharReader> reader(builder.newCharReader());
   std::string report;
   try {
-    if (!reader->parse(data->text.data(), data->text.data() + data->text.size(), &data->root, &report)) fail_syntax(file, report);
+    if (!reader->parse(data->text.data(), data->text.data() + data->text.size(), &data->root, &report)) fail_syntax(*data, report);
   } catch (const Json::Exception& error) {
-    throw InputError(fmt::format("{}:1: this is not JSON: {}; mend the text", file.string(), error.what()));
+    throw InputError(fmt::format("{}:{}: this is not JSON: {}; mend the text", file.string(), first_line, error.what()));
   }
   if (!data->root.isObject())
-    throw InputError(fmt::format("{}:1: the file must hold one JSON object in braces, and holds {}", file.string(), kind_of(data->root)));
+    throw InputError(
+        fmt::format("{}:{}: the file must hold one JSON object in braces, and holds {}", file.string(), first_line, kind_of(data->root)));
   return Document(std::move(data));
 }
 
@@ -381,6 +384,21 @@ std::string find_nearest(std::string_view word, const std::vector<std::string>& 
     if (contained || (candidate.size() >= 4 && word.find(candidate) != std::string_view::npos)) return candidate;
   }
   return nearest;
+}
+
+std::string quote(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
 }
 
 }  // namespace carillon::config

@@ -124,7 +124,7 @@ class Document {
   const std::filesystem::path& file() const;
 
  private:
-  friend Document parse_document(std::string_view, const std::filesystem::path&);
+  friend Document parse_document(std::string_view, const std::filesystem::path&, int);
   explicit Document(std::shared_ptr<DocumentData> data);
   std::shared_ptr<DocumentData> data_;
 };
@@ -133,10 +133,13 @@ class Document {
 /// a syntax error (line and column), a duplicate key, a root that is no object.
 Document read_document(const std::filesystem::path& file);
 
-/// The same from text; `file` names it in messages and anchors relative paths.
-Document parse_document(std::string_view text, const std::filesystem::path& file);
+/// The same from text; `file` names it in messages and anchors relative paths, `first_line` is the number of its first line there.
+Document parse_document(std::string_view text, const std::filesystem::path& file, int first_line = 1);
 
 /// The entry of `known` with the smallest Damerau-Levenshtein distance to `word`; empty when none is within half of the word's length.
 std::string find_nearest(std::string_view word, const std::vector<std::string>& known);
+
+/// A text as JSON writes it, in quotation marks; what is no UTF-8 stays as it is.
+std::string quote(std::string_view text);
 
 }  // namespace carillon::config

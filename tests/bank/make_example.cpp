@@ -6,7 +6,10 @@
 #include "tests/bank/example_bank.hpp"
 
 int main(int argc, char** argv) try {
-  if (argc < 2) return 2;
+  if (argc < 2) {
+    std::fputs("usage: make_example_bank OUT [squares a side] [modes]\n", stderr);
+    return 1;
+  }
   const int n = argc > 2 ? std::atoi(argv[2]) : 2;
   const int modes = argc > 3 ? std::atoi(argv[3]) : 5;
   carillon::bank::write_bank(carillon::bank::example::make_bank(n, static_cast<std::size_t>(modes)), argv[1]);

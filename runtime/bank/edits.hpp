@@ -1,0 +1,25 @@
+// Another density, stiffness, size or damping of a body without another solve.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+
+struct Edits {
+  double density_scale = 1.0;
+  double stiffness_scale = 1.0;                   // of both Lame constants: Poisson's ratio stays
+  double size_scale = 1.0;                        // of all lengths
+  std::optional<std::array<double, 2>> alphas{};  // Rayleigh damping in place of the bank's law: alpha1 [s], alpha2 [1/s]
+};
+
+/// The bank of the edited body: what a solve of it gives, on the same mesh. Modes, decays, shapes, surface, rigid-body data, material,
+/// band, proof and radiation gains all follow, and the provenance says what was done to what. Decays follow the damping law with its
+/// numbers as they are, at the new frequencies. `radiation_gain` is OSG02's, as in every bank. Throws InputError when a scale is not within
+/// 1e-6 to 1e6, when an alpha is negative or not finite, and for a body of several materials: one scale means nothing there. Not for an
+/// audio thread.
+Bank calc_edited(const Bank& bank, const Edits& edits);
+
+}  // namespace carillon::bank

@@ -1,0 +1,22 @@
+// Which triangles of a surface face the open air.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+
+using Triangle = std::array<std::int32_t, 3>;
+
+/// Twice the area times the unit normal of a triangle [m^2].
+Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle);
+
+/// The triangles that face the open air, in their order: those of closed shells (connected through edges) that enclose a positive volume.
+/// The wall of a closed cavity encloses a negative one; it moves air that cannot get out. A body open to the outside, such as a bowl, is
+/// one shell. Indices must lie inside `vertices_m`. Pure; any thread.
+std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles);
+
+}  // namespace carillon::bank

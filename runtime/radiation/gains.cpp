@@ -1,0 +1,200 @@
+// Method:     the outer surface is taken as a sphere of the same area, each triangle seen in its direction from the centre of the enclosed
+//             volume. U_lm = (1 / a^2) sum over triangles of (phi . n) A Y_lm, phi the mean of its corners; a sphere that moves with
+//             U_lm Y_lm sends the far pressure rho0 c0 U_lm Y_lm / (k |h_l'(ka)| r), and different (l, m) are orthogonal over directions,
+//             so that g^2 = (rho0 c0)^2 / 4 pi  sum_l U_l^2 / (k |h_l'(ka)|)^2 with U_l^2 = sum_m U_lm^2. What Parseval's sum leaves of
+//             (phi . n)^2 goes to the next order. All weights of a vertex are added up before the modes are looked at.
+// Source:     Morse & Ingard, Theoretical Acoustics (1968), 7.2; Pierce, Acoustics (1981), 4.1-4.2.
+// Deviations: exact for spheres; any other body radiates as if its surface lay on one. The monopole is the true flow of volume, for every
+//             body, and so is the level of what it sends at wavelengths long against it.
+#include "runtime/radiation/gains.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <numbers>
+
+#include "runtime/bank/surface.hpp"
+
+namespace carillon::radiation {
+namespace {
+
+using bank::Vec3;
+using std::numbers::pi;
+
+constexpr std::size_t kOrders = kMostLobes + 1;
+constexpr std::size_t kHarmonics = kOrders * kOrders;
+
+double calc_dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/// Real orthonormal spherical harmonics of a unit vector at l^2 + l + m, by the recurrence of the normalised associated Legendre functions.
+std::array<double, kHarmonics> calc_harmonics(const Vec3& direction) {
+  const auto [x, y, z] = direction;
+  std::array<double, kHarmonics> harmonics{};
+  double cosine = 1.0, sine = 0.0;         // sin(theta)^m times cos(m phi) and sin(m phi)
+  double diagonal = std::sqrt(0.25 / pi);  // P_mm / sin(theta)^m
+  for (int m = 0; m <= kMostLobes; ++m) {
+    double before = 0.0, here = diagonal;
+    for (int l = m; l <= kMostLobes; ++l) {
+      const double scale = m == 0 ? 1.0 : std::numbers::sqrt2;
+      harmonics[l * l + l + m] = scale * here * cosine;
+      if (m > 0) harmonics[l * l + l - m] = scale * here * sine;
+      const double l1 = l + 1.0, m2 = static_cast<double>(m) * m;
+      const double a = std::sqrt((4.0 * l1 * l1 - 1.0) / (l1 * l1 - m2));
+      const double b = l == m ? 0.0 : std::sqrt((static_cast<double>(l) * l - m2) / (4.0 * l * l - 1.0));
+      const double next = a * (z * here - b * before);
+      before = here;
+      here = next;
+    }
+    const double turned = x * cosine - y * sine;
+    sine = y * cosine + x * sine;
+    cosine = turned;
+    diagonal *= std::sqrt((2.0 * m + 3.0) / (2.0 * m + 2.0));
+  }
+  return harmonics;
+}
+
+/// 1 / |h_l'(x)| for l = 0 .. kMostLobes + 1, h_l the spherical Hankel function of x > 0: upward recurrence, which is stable for h.
+std::array<double, kOrders + 1> calc_radiation_factors(double x) {
+  using Complex = std::complex<double>;
+  std::array<Complex, kOrders + 1> h;
+  const Complex wave = std::polar(1.0, x);
+  h[0] = Complex(0.0, -1.0) * wave / x;
+  h[1] = -wave * Complex(1.0 / x, 1.0 / (x * x));
+  for (std::size_t l = 1; l + 1 < h.size(); ++l) h[l + 1] = (2.0 * l + 1.0) / x * h[l] - h[l - 1];
+  std::array<double, kOrders + 1> factors;
+  factors[0] = 1.0 / std::abs(h[1]);  // h_0' = -h_1
+  for (std::size_t l = 1; l < h.size(); ++l) factors[l] = 1.0 / std::abs(h[l - 1] - (l + 1.0) / x * h[l]);
+  return factors;
+}
+
+/// The outer skin as a sphere.
+struct Skin {
+  std::vector<bank::Triangle> triangles;
+  std::vector<Vec3> normals_m2;  // area times unit normal
+  Vec3 centre_m{};               // of the enclosed volume
+  double radius_m = 0.0;         // of the sphere of the same area
+  double volume_m3 = 0.0;        // cavities and all
+};
+
+Skin make_skin(const bank::Bank& bank) {
+  Skin skin;
+  skin.triangles = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
+  if (skin.triangles.empty()) throw InputError("the surface of the bank has no outside: no closed shell of it encloses a volume");
+  const Vec3 base = bank.vertices_m[skin.triangles[0][0]];
+  double area = 0.0, volume = 0.0;  // volume: six times
+  Vec3 moment{};
+  for (const bank::Triangle& triangle : skin.triangles) {
+    Vec3 normal = bank::calc_normal(bank.vertices_m, triangle), sum{}, corner{};
+    for (int k = 0; k < 3; ++k) {
+      corner[k] = bank.vertices_m[triangle[0]][k] - base[k];
+      for (const std::int32_t v : triangle) sum[k] += bank.vertices_m[v][k] - base[k];
+    }
+    const double tetrahedron = calc_dot(corner, normal);
+    volume += tetrahedron;
+    for (int k = 0; k < 3; ++k) {
+      moment[k] += tetrahedron * sum[k] / 4.0;
+      normal[k] /= 2.0;
+    }
+    area += std::sqrt(calc_dot(normal, normal));
+    skin.normals_m2.push_back(normal);
+  }
+  for (int k = 0; k < 3; ++k) skin.centre_m[k] = base[k] + moment[k] / volume;
+  skin.radius_m = std::sqrt(area / (4.0 * pi));
+  skin.volume_m3 = volume / 6.0;
+  return skin;
+}
+
+/// Weight of the motion of each vertex in every U_lm: (V) arrays of (3, kHarmonics), zero for vertices inside the skin.
+using Weights = std::array<std::array<double, kHarmonics>, 3>;
+
+std::vector<Weights> calc_weights(const bank::Bank& bank, const Skin& skin) {
+  std::vector<Weights> weights(bank.vertex_count());
+  for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
+    Vec3 direction{};
+    for (int k = 0; k < 3; ++k) {
+      for (const std::int32_t v : skin.triangles[t]) direction[k] += bank.vertices_m[v][k] / 3.0;
+      direction[k] -= skin.centre_m[k];
+    }
+    const double length = std::sqrt(calc_dot(direction, direction));
+    for (double& x : direction) x = length > 0.0 ? x / length : 0.0;
+    const std::array<double, kHarmonics> harmonics = calc_harmonics(direction);
+    for (const std::int32_t v : skin.triangles[t]) {
+      for (int k = 0; k < 3; ++k) {
+        const double share = skin.normals_m2[t][k] / (3.0 * skin.radius_m * skin.radius_m);
+        for (std::size_t i = 0; i < kHarmonics; ++i) weights[v][k][i] += share * harmonics[i];
+      }
+    }
+  }
+  return weights;
+}
+
+/// What one mode sends out in each order: U_l^2 summed over m, and the rest.
+using Power = std::array<double, kOrders + 1>;
+
+std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
+  const auto weights = calc_weights(bank, skin);
+  const std::size_t modes = bank.mode_count();
+  std::vector<std::array<double, kHarmonics>> flow(modes);
+  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
+    const auto& [x, y, z] = weights[v];
+    for (std::size_t m = 0; m < modes; ++m) {
+      const Vec3 phi = bank.shape_at(v, m);
+      for (std::size_t i = 0; i < kHarmonics; ++i) flow[m][i] += phi[0] * x[i] + phi[1] * y[i] + phi[2] * z[i];
+    }
+  }
+  std::vector<Power> powers(modes);
+  for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
+    const Vec3& normal = skin.normals_m2[t];
+    const double area = std::sqrt(calc_dot(normal, normal));
+    if (!(area > 0.0)) continue;
+    for (std::size_t m = 0; m < modes; ++m) {
+      double through = 0.0;
+      for (const std::int32_t v : skin.triangles[t]) through += calc_dot(bank.shape_at(v, m), normal) / 3.0;
+      powers[m][kOrders] += through * through / (area * skin.radius_m * skin.radius_m);
+    }
+  }
+  for (std::size_t m = 0; m < modes; ++m) {
+    double told_apart = 0.0;
+    for (std::size_t l = 0; l < kOrders; ++l) {
+      for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) powers[m][l] += flow[m][i] * flow[m][i];
+      told_apart += powers[m][l];
+    }
+    powers[m][kOrders] = std::max(0.0, powers[m][kOrders] - told_apart);
+  }
+  return powers;
+}
+
+void check_sizes(const bank::Bank& bank) {
+  const std::size_t modes = bank.mode_count(), vertices = bank.vertex_count();
+  bool inside = bank.shape.size() == 3 * vertices * modes && bank.shape_scale.size() == modes && bank.radiation_gain.size() == modes;
+  for (const bank::Triangle& triangle : bank.triangles)
+    for (const std::int32_t v : triangle) inside = inside && v >= 0 && static_cast<std::size_t>(v) < vertices;
+  if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
+}
+
+}  // namespace
+
+std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
+  check_sizes(bank);
+  if (kind == GainKind::kOsg02) return bank.radiation_gain;
+  const Skin skin = make_skin(bank);
+  const std::vector<Power> powers = calc_powers(bank, skin);
+  std::vector<double> gains(bank.mode_count());
+  for (std::size_t m = 0; m < gains.size(); ++m) {
+    const double k = std::sqrt(bank.eigenvalue_rad2_s2[m]) / bank::kSoundSpeedMs;
+    const auto factors = calc_radiation_factors(k * skin.radius_m);
+    double sum = 0.0;
+    for (std::size_t l = 0; l < factors.size(); ++l) sum += powers[m][l] * factors[l] * factors[l];
+    gains[m] = bank::kAirDensityKgM3 * bank::kSoundSpeedMs / k * std::sqrt(sum / (4.0 * pi));
+  }
+  return gains;
+}
+
+double calc_sphere_radius_m(const bank::Bank& bank) {
+  check_sizes(bank);
+  return std::cbrt(make_skin(bank).volume_m3 * 3.0 / (4.0 * pi));
+}
+
+}  // namespace carillon::radiation

@@ -1,0 +1,27 @@
+// How loud a mode is: from its shape on the outer surface to the pressure in the far field. Made once, when a bank is loaded.
+#pragma once
+
+#include <vector>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::radiation {
+
+enum class GainKind {
+  kOsg02,  // the bank's own: one pulsating sphere, no cancellation (O'Brien, Shen, Gatchalian 2002)
+  kSphere  // spherical multipoles about the body's centre, with cancellation
+};
+
+/// Multipoles that are told apart; what moves in finer patterns radiates as one of order kMostLobes + 1.
+inline constexpr int kMostLobes = 8;
+
+/// The pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s) of every mode, (m); for kSphere the root mean square
+/// over all directions of the far field, taken back to 1 m. kSphere is exact for a sphere that moves in patterns of order kMostLobes and
+/// below, to what the 16-bit shapes hold: nothing below 1e-6 of the pressure of a pulsating sphere of the same velocity is to be trusted.
+/// Throws InputError when arrays of the bank disagree or its surface has no outside. Not for an audio thread; any other, several at once.
+std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind);
+
+/// Radius [m] of the sphere that has the volume inside the outer surface, cavities and all. InputError as above.
+double calc_sphere_radius_m(const bank::Bank& bank);
+
+}  // namespace carillon::radiation

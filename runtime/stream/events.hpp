@@ -1,0 +1,82 @@
+// What physics tells the sound, whoever does the physics: impulses and lasting contacts at points of surfaces, and where bodies and
+// listener are.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <variant>
+
+namespace carillon::stream {
+
+using Vec3 = std::array<double, 3>;
+using Quaternion = std::array<double, 4>;  // w x y z, unit
+
+/// Course of a contact force in time: sin^1.5 (Hertz), or the Gaussian of O'Brien, Shen and Gatchalian 2002, of the same variance.
+enum class PulseShape : std::uint8_t { kHertz, kGaussian };
+
+/// One contact pulse on one body; a contact between two sounding bodies gives two of these, with opposite impulses. Vectors are in the
+/// frame of the body's mesh.
+struct Impulse {
+  double time_s = 0.0;        // centre of the pulse, finer than any step or sample
+  std::int32_t body = 0;      // index in the scene
+  std::int32_t other = -1;    // the other body's index; -1: the ground, or unknown
+  std::int32_t triangle = 0;  // of the body's bank
+  PulseShape shape = PulseShape::kHertz;
+  Vec3 barycentric{1.0, 0.0, 0.0};  // of the contact point in that triangle, sum 1
+  Vec3 impulse_n_s{};               // on the body
+  double duration_s = 0.0;          // contact time; 0: an ideal impulse
+};
+
+enum class ContactState : std::uint8_t { kBegin, kHold, kEnd };
+
+/// One sample of a contact that lasts, on one of its two bodies; both get one, with the same id. Between records values change linearly.
+/// Vectors are in the frame of the body's mesh.
+struct Contact {
+  double time_s = 0.0;
+  std::uint64_t id = 0;  // of the pair and the spot; the same while the touch lasts
+  std::int32_t body = 0;
+  std::int32_t other = -1;
+  std::int32_t triangle = 0;
+  ContactState state = ContactState::kHold;
+  Vec3 barycentric{1.0, 0.0, 0.0};
+  Vec3 normal{};                 // unit, from the other body into this one
+  Vec3 slip_m_s{};               // velocity of this surface against the other's
+  double force_n = 0.0;          // normal, at least 0
+  double sweep_m_s = 0.0;        // speed of the contact over this body's surface; 0 for a box that slides flat
+  double other_sweep_m_s = 0.0;  // over the other's
+  double spin_rad_s = 0.0;       // relative angular speed about the tangents: rolling
+  double patch_radius_m = 0.0;   // Hertz radius of the touch under force_n, above 0
+  double impedance_n_s_m = 0.0;  // of the other body at the point, as a dashpot; 0: takes nothing
+};
+
+/// Where a body is: its centre of mass and attitude.
+struct Motion {
+  double time_s = 0.0;
+  std::int32_t body = 0;
+  Vec3 position_m{};
+  Vec3 velocity_m_s{};
+  Quaternion rotation{1.0, 0.0, 0.0, 0.0};
+};
+
+/// Where the listener is; microphones lie in this frame (x right, y forward, z up).
+struct Listener {
+  double time_s = 0.0;
+  Vec3 position_m{};
+  Vec3 velocity_m_s{};
+  Quaternion rotation{1.0, 0.0, 0.0, 0.0};
+};
+
+/// Physics has run so far: nothing earlier than this follows.
+struct Mark {
+  double time_s = 0.0;
+};
+
+using Event = std::variant<Mark, Impulse, Contact, Motion, Listener>;
+
+double get_time_s(const Event& event) noexcept;
+
+/// What is wrong with an event, as part of a sentence; nullptr when it can be played: all numbers finite, indices not negative, barycentric
+/// coordinates in [-1e-6, 1 + 1e-6] with sum 1, quaternions of unit length to 1e-3, forces, durations and radii not negative.
+const char* find_fault(const Event& event) noexcept;
+
+}  // namespace carillon::stream

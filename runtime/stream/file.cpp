@@ -1,0 +1,259 @@
+// Method: one JSON object a line, so that a file can be read, cut and mended with a text editor; numbers in the shortest form that reads
+// back as
+//   the same double.
+// Source: jsonlines.org for lines; Steele and White (1990) for the shortest form (in fmt, by Dragonbox).
+// Deviations: the first line is a header.
+#include "runtime/stream/file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "runtime/config/document.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::stream {
+namespace {
+
+constexpr std::uint64_t kMostBytes = 1u << 30;
+constexpr double kMostBack = 1.0;           // s
+constexpr long long kMostBodies = 1 << 20;  // more than any scene holds
+constexpr long long kInt32 = std::numeric_limits<std::int32_t>::max();
+constexpr long long kInt64 = std::numeric_limits<std::int64_t>::max();
+const std::vector<std::string> kShapeNames{"hertz", "gaussian"};     // in the order of PulseShape
+const std::vector<std::string> kStateNames{"begin", "hold", "end"};  // in the order of ContactState
+
+using Out = std::back_insert_iterator<std::string>;
+
+/// A sign and a point or an exponent stay, so that no reader takes it for an integer: -0.0 has to come back.
+std::string format_number(double x) {
+  std::string text = fmt::format("{}", x);
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";
+  return text;
+}
+
+template <std::size_t n>
+std::string format_numbers(const std::array<double, n>& x) {
+  std::string text = "[";
+  for (const double value : x) text += (text.size() > 1 ? ", " : "") + format_number(value);
+  return text + "]";
+}
+
+void write(Out out, const Mark& e) { fmt::format_to(out, R"({{"mark": {{"time_s": {}}}}})", format_number(e.time_s)); }
+
+void write(Out out, const Impulse& e) {
+  fmt::format_to(out, R"({{"impulse": {{"time_s": {}, "body": {}, "other": {}, "triangle": {}, "barycentric": {}, )",
+                 format_number(e.time_s), e.body, e.other, e.triangle, format_numbers(e.barycentric));
+  fmt::format_to(out, R"("impulse_n_s": {}, "duration_s": {}, "shape": "{}"}}}})", format_numbers(e.impulse_n_s),
+                 format_number(e.duration_s), kShapeNames[static_cast<std::size_t>(e.shape)]);
+}
+
+void write(Out out, const Contact& e) {
+  fmt::format_to(out, R"({{"contact": {{"time_s": {}, "id": {}, "body": {}, "other": {}, "triangle": {}, "state": "{}", )",
+                 format_number(e.time_s), e.id, e.body, e.other, e.triangle, kStateNames[static_cast<std::size_t>(e.state)]);
+  fmt::format_to(out, R"("barycentric": {}, "normal": {}, "slip_m_s": {}, "force_n": {}, )", format_numbers(e.barycentric),
+                 format_numbers(e.normal), format_numbers(e.slip_m_s), format_number(e.force_n));
+  fmt::format_to(out, R"("sweep_m_s": {}, "other_sweep_m_s": {}, "spin_rad_s": {}, "patch_radius_m": {}, "impedance_n_s_m": {}}}}})",
+                 format_number(e.sweep_m_s), format_number(e.other_sweep_m_s), format_number(e.spin_rad_s), format_number(e.patch_radius_m),
+                 format_number(e.impedance_n_s_m));
+}
+
+template <class Moving>
+void write_moving(Out out, const Moving& e) {
+  fmt::format_to(out, R"("position_m": {}, "velocity_m_s": {}, "rotation": {}}}}})", format_numbers(e.position_m),
+                 format_numbers(e.velocity_m_s), format_numbers(e.rotation));
+}
+
+void write(Out out, const Motion& e) {
+  fmt::format_to(out, R"({{"motion": {{"time_s": {}, "body": {}, )", format_number(e.time_s), e.body);
+  write_moving(out, e);
+}
+
+void write(Out out, const Listener& e) {
+  fmt::format_to(out, R"({{"listener": {{"time_s": {}, )", format_number(e.time_s));
+  write_moving(out, e);
+}
+
+/// Reads the keys that `Event` has; who calls it finishes the object.
+class EventReader {
+ public:
+  EventReader(config::Object object, const std::vector<RecordedBody>& bodies) : in_(std::move(object)), bodies_(bodies) {}
+
+  Mark read_mark() { return finish(Mark{in_.number("time_s")}); }
+
+  Impulse read_impulse() {
+    Impulse e;
+    read_place(e);
+    e.impulse_n_s = in_.numbers<3>("impulse_n_s");
+    e.duration_s = in_.number("duration_s");
+    e.shape = static_cast<PulseShape>(find(kShapeNames, in_.choice_or("shape", kShapeNames, kShapeNames.front())));
+    return finish(e);
+  }
+
+  Contact read_contact() {
+    Contact e;
+    read_place(e);
+    e.id = static_cast<std::uint64_t>(in_.integer("id", 0, kInt64));
+    e.state = static_cast<ContactState>(find(kStateNames, in_.choice("state", kStateNames)));
+    e.normal = in_.numbers<3>("normal");
+    e.slip_m_s = in_.numbers<3>("slip_m_s");
+    e.force_n = in_.number("force_n");
+    e.sweep_m_s = in_.number("sweep_m_s");
+    e.other_sweep_m_s = in_.number("other_sweep_m_s");
+    e.spin_rad_s = in_.number("spin_rad_s");
+    e.patch_radius_m = in_.number("patch_radius_m");
+    e.impedance_n_s_m = in_.number_or("impedance_n_s_m", 0.0);
+    return finish(e);
+  }
+
+  Motion read_motion() {
+    Motion e;
+    e.body = read_body("body", 0);
+    read_moving(e);
+    return finish(e);
+  }
+
+  Listener read_listener() {
+    Listener e;
+    read_moving(e);
+    return finish(e);
+  }
+
+ private:
+  static std::ptrdiff_t find(const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) - names.begin();
+  }
+
+  std::int32_t read_body(std::string_view key, long long lowest) {
+    const long long body = in_.integer(key, lowest, kInt32);
+    if (body >= static_cast<long long>(bodies_.size())) {
+      in_.fail(key, fmt::format("there is no body {}; the first line names {}, counted from 0", body, bodies_.size()));
+    }
+    return static_cast<std::int32_t>(body);
+  }
+
+  template <class Touching>
+  void read_place(Touching& e) {
+    e.time_s = in_.number("time_s");
+    e.body = read_body("body", 0);
+    e.other = in_.has("other") ? read_body("other", -1) : -1;
+    const long long triangle = in_.integer("triangle", 0, kInt32);
+    const RecordedBody& body = bodies_[static_cast<std::size_t>(e.body)];
+    if (triangle >= body.triangles) {
+      in_.fail("triangle",
+               fmt::format("the bank of \"{}\" has {} triangles, counted from 0, and no triangle {}", body.name, body.triangles, triangle));
+    }
+    e.triangle = static_cast<std::int32_t>(triangle);
+    e.barycentric = in_.numbers<3>("barycentric");
+  }
+
+  template <class Moving>
+  void read_moving(Moving& e) {
+    e.time_s = in_.number("time_s");
+    e.position_m = in_.numbers<3>("position_m");
+    e.velocity_m_s = in_.numbers<3>("velocity_m_s");
+    e.rotation = in_.numbers<4>("rotation");
+  }
+
+  template <class T>
+  T finish(const T& event) {
+    in_.finish();
+    if (const char* fault = find_fault(event); fault != nullptr) in_.fail("", fmt::format("{}; mend the event", fault));
+    return event;
+  }
+
+  config::Object in_;
+  const std::vector<RecordedBody>& bodies_;
+};
+
+Event parse_event(config::Object line, const std::vector<RecordedBody>& bodies) {
+  const auto finish = [&](const Event& event) {
+    line.finish();
+    return event;
+  };
+  if (const auto mark = line.object_if("mark")) return finish(EventReader(*mark, bodies).read_mark());
+  if (const auto impulse = line.object_if("impulse")) return finish(EventReader(*impulse, bodies).read_impulse());
+  if (const auto contact = line.object_if("contact")) return finish(EventReader(*contact, bodies).read_contact());
+  if (const auto motion = line.object_if("motion")) return finish(EventReader(*motion, bodies).read_motion());
+  if (const auto listener = line.object_if("listener")) return finish(EventReader(*listener, bodies).read_listener());
+  line.finish();
+  line.fail("", "this line holds no event; give it a mark, an impulse, a contact, a motion or a listener");
+}
+
+/// The bodies, and how many events there are, if the line says.
+std::optional<long long> parse_header(config::Object line, std::vector<RecordedBody>& bodies) {
+  line.integer("carillon_contacts", 1, 1);
+  const std::optional<long long> count = line.integer_if("events", 0, kInt64);
+  for (config::Object& body : line.objects("bodies")) {
+    bodies.push_back({body.string("name"), body.integer("triangles", 1, kInt32)});
+    body.finish();
+  }
+  if (bodies.empty()) line.fail("bodies", "there are no bodies; give each a name and the number of triangles of its bank");
+  if (static_cast<long long>(bodies.size()) > kMostBodies) line.fail("bodies", fmt::format("more than {} bodies", kMostBodies));
+  line.finish();
+  return count;
+}
+
+}  // namespace
+
+std::string format_recording(const Recording& recording) {
+  std::string text = fmt::format(R"({{"carillon_contacts": 1, "events": {}, "bodies": [)", recording.events.size());
+  for (std::size_t i = 0; i < recording.bodies.size(); ++i) {
+    fmt::format_to(std::back_inserter(text), R"({}{{"name": {}, "triangles": {}}})", i == 0 ? "" : ", ",
+                   config::quote(recording.bodies[i].name), recording.bodies[i].triangles);
+  }
+  text += "]}\n";
+  for (const Event& event : recording.events) {
+    std::visit([&](const auto& e) { write(std::back_inserter(text), e); }, event);
+    text += '\n';
+  }
+  return text;
+}
+
+Recording parse_recording(std::string_view text, const std::filesystem::path& file) {
+  Recording recording;
+  std::optional<long long> count;
+  bool has_header = false;
+  int number = 0;
+  double latest = -std::numeric_limits<double>::infinity();
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    ++number;
+    if (line.find_first_not_of(" \t\r") == std::string_view::npos) continue;
+    const config::Object object = config::parse_document(line, file, number).root();
+    if (!has_header) {
+      count = parse_header(object, recording.bodies);
+      has_header = true;
+      continue;
+    }
+    const Event event = parse_event(object, recording.bodies);
+    const double time = get_time_s(event);
+    if (time < latest - kMostBack) {
+      throw InputError(
+          fmt::format("{}:{}: time goes back from {:g} s to {:g} s; put the lines in order", file.string(), number, latest, time));
+    }
+    latest = std::max(latest, time);
+    recording.events.push_back(event);
+  }
+  if (!has_header) throw InputError(fmt::format("{}:1: the file is empty; it has to begin with the line of its bodies", file.string()));
+  if (count && *count != static_cast<long long>(recording.events.size())) {
+    throw InputError(
+        fmt::format("{}:{}: the first line says {} events and there are {}; a part of the file is missing, or its \"events\" has "
+                    "to be changed or left out",
+                    file.string(), number, *count, recording.events.size()));
+  }
+  return recording;
+}
+
+Recording read_recording(const std::filesystem::path& file) {
+  return parse_recording(config::read_file(file, "contacts file", kMostBytes), file);
+}
+
+}  // namespace carillon::stream

@@ -1,0 +1,35 @@
+// Contacts files: the events of a scene, to be played without physics. Reference: docs/howto/contacts-file.md.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/stream/events.hpp"
+
+namespace carillon::stream {
+
+struct RecordedBody {
+  std::string name;
+  std::int64_t triangles = 0;  // of its bank
+};
+
+struct Recording {
+  std::vector<RecordedBody> bodies;  // events name them by their number
+  std::vector<Event> events;
+};
+
+/// The text of a contacts file. Every number is read back as the same bits. The events have no fault (find_fault).
+std::string format_recording(const Recording& recording);
+
+/// Reads the text of a contacts file; `file` names it in messages. Throws InputError "file:line: ..." for everything that could not be
+/// played: no JSON, an unknown or missing key, a number that is none, a body or triangle that there is not, an event that find_fault
+/// refuses, time that goes back by more than a second, fewer or more events than the first line says.
+Recording parse_recording(std::string_view text, const std::filesystem::path& file);
+
+/// The same from a file of at most 1 GiB.
+Recording read_recording(const std::filesystem::path& file);
+
+}  // namespace carillon::stream
