@@ -3,20 +3,30 @@
 
 #include <array>
 
+#include "runtime/stream/events.hpp"
+
 namespace carillon::synth {
 
 /// Number of Chebyshev moments by which a pulse reaches the modes: enough for -190 dB at the Nyquist frequency.
 inline constexpr int kMoments = 12;
 using Moments = std::array<double, kMoments>;
 
-/// The pulse at `x` = time since its start / its duration: sin(pi x)^1.5 for 0 <= x <= 1, zero outside, scaled so that its integral over x
-/// is 1. Hertz's contact force is close to this shape (Hunt & Crossley 1975). Pure; any thread.
-double calc_pulse(double x) noexcept;
+using stream::PulseShape;
+
+/// How long the force of a contact of this duration differs from zero, in the same unit. kHertz: the duration itself. kGaussian: 1.57
+/// durations, with the same middle: eight standard deviations of the Gaussian that has the variance of the Hertz pulse. Pure; any thread.
+double calc_pulse_length(PulseShape shape, double duration) noexcept;
+
+/// The force at `x` = time since it began / its length, zero outside 0 <= x <= 1, scaled so that its integral over x is 1.
+/// kHertz: sin(pi x)^1.5; Hertz's contact force is close to this shape (Hunt & Crossley 1975). kGaussian: exp(-(8 (x - 1/2))^2 / 2)
+/// (O'Brien, Shen and Gatchalian 2002). Pure; any thread.
+double calc_pulse(PulseShape shape, double x) noexcept;
 
 /// Moments of the pulse over one interval of time: moment j = integral of T_j(2 u - 1) f(u) du over 0 <= u <= 1, where u runs over the
-/// interval and T_j is the Chebyshev polynomial. `start` and `duration` place the pulse in the same unit (one interval = 1); f integrates
-/// to 1 over the pulse. A duration below 1e-9 is an impulse at `start`, counted in the interval 0 < u <= 1. No heap, no throw; any thread.
-Moments calc_pulse_moments(double start, double duration) noexcept;
+/// interval and T_j is the Chebyshev polynomial. `start` and `length` (calc_pulse_length()) place the pulse in the same unit (one interval
+/// = 1); f integrates to 1 over the pulse. A length below 1e-9 is an impulse at `start`, counted in the interval 0 < u <= 1. No heap, no
+/// throw; any thread.
+Moments calc_pulse_moments(PulseShape shape, double start, double length) noexcept;
 
 /// T_j(2 u - 1) for all j.
 Moments calc_chebyshev(double u) noexcept;

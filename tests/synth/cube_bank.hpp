@@ -65,4 +65,14 @@ inline bank::Bank make_cube_bank(const std::vector<InventedMode>& modes, double 
   return bank;
 }
 
+/// 100 Hz to 23 kHz, in even steps of pitch.
+inline std::vector<InventedMode> make_many_modes(int count) {
+  std::vector<InventedMode> modes;
+  for (int m = 0; m < count; ++m) {
+    const double freq = 100.0 * std::pow(230.0, (m + 0.5) / count);
+    modes.push_back({freq, 2.0 + 1e-6 * freq * freq, 1e-2, {0.3, -0.2, 1.0}, 0.1});
+  }
+  return modes;
+}
+
 }  // namespace carillon::testing

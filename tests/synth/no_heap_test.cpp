@@ -1,14 +1,25 @@
-// process() and strike() take no memory: operator new is replaced by one that counts. A program of its own, so that no other test is
-// disturbed.
+// process() and strike() take no memory and make no system call: operator new is replaced by one that counts. A program of its own, so that
+// no other test is disturbed.
 #include <gtest/gtest.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <new>
 #include <vector>
 
-#include "runtime/synth/modal_body.hpp"
-#include "runtime/synth/propagation.hpp"
+#include "runtime/synth/click.hpp"
+#include "runtime/synth/driven_bank.hpp"
+#include "runtime/synth/ears.hpp"
+#include "runtime/synth/synthesiser.hpp"
+#include "runtime/synth/voice.hpp"
 #include "tests/synth/cube_bank.hpp"
 
 namespace {
@@ -50,21 +61,87 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 50; ++m) modes.push_back({100.0 + 300.0 * m, 5.0 + (m % 7 == 0 ? 1e5 : 0.0)});
   const bank::Bank bank = testing::make_cube_bank(modes);
-  ModalBody body(bank, 48000.0, {.max_strikes = 8});
-  const Path path({{0.0, {1.0, 0.0, 0.0}}, {0.5, {2.0, 0.0, 0.0}}});
-  Propagation propagation(path, {0.0, 0.0, 0.0}, 48000.0, 10.0);
-  std::vector<double> block(128), out(128);
+  Voice body(Model::make(bank), {.max_strikes = 8});
+  DrivenBank driven(body.get_model(), 0, {1.0, 0.0, 0.0}, {0.0, 0.0, 1.0});
+  const std::vector<float> force(128, 1.0F);
+  Track path(4), listener(4);
+  listener.push({0.0, {0.0, 0.0, 0.0}, {}});
+  History history(10.0, 48000.0, 128);
+  Ear ear({0.1, 0.0, 0.0}, 48000.0);
+  std::vector<double> out(128);
+  std::vector<float> sent(128), x(128), y(128), z(128);
+  Click click(0.06, 1.0, 48000.0, 8);
   const long before = g_allocations;
   for (int i = 0; i < 300; ++i) {
     for (int k = 0; k < (i % 10 == 0 ? 20 : 0); ++k) {  // more than there is room for
-      body.strike({.sample = body.get_position() + 30.3, .duration_s = 2e-4, .impulse_n_s = {0.0, 0.0, 1.0}});
+      body.strike({.time_s = (static_cast<double>(body.get_position()) + 30.3) / 48000.0,
+                   .shape = k % 2 == 0 ? PulseShape::kHertz : PulseShape::kGaussian,
+                   .impulse_n_s = {0.0, 0.0, 1.0},
+                   .duration_s = k % 3 == 0 ? 2e-3 : 2e-4});
     }
-    body.process(block);
-    propagation.process(block, out);
+    body.set_limit(i % 50 == 0 ? 16 : 1000);
+    body.process(sent);
+    driven.process(force, sent);
+    path.push({i * 128 / 48000.0, {1.0 + 0.001 * i, 0.0, 0.0}, {0.375, 0.0, 0.0}});
+    history.push(sent);
+    click.strike({.time_s = 1e-3 * i, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-3}, {1.0, 0.0, 0.0, 0.0});
+    click.process({x, y, z});
+    ear.process({.track = &path, .monopole = &history}, listener, 128 * i, out);
   }
   EXPECT_EQ(g_allocations - before, 0);
   EXPECT_GT(body.get_counters().accepted, 0);
   EXPECT_GT(body.get_counters().refused, 0);
+}
+
+TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 30; ++m) modes.push_back({150.0 + 250.0 * m, 30.0});
+  const auto model = Model::make(testing::make_cube_bank(modes));
+  Synthesiser synthesiser({.max_bodies = 4, .max_strikes = 8, .ring_events = 64});
+  for (int b = 0; b < 4; ++b) synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}});
+  synthesiser.remove_body(3);
+  std::vector<float> left(300), right(300);
+  const std::array<float*, 2> out{left.data(), right.data()};
+  const long before = g_allocations;
+  for (int i = 0; i < 300; ++i) {
+    for (int k = 0; k < 10; ++k) {
+      synthesiser.push(stream::Impulse{.time_s = synthesiser.get_horizon_s() + 1e-4 * k, .body = k % 5, .impulse_n_s = {0.0, 0.0, 1.0}});
+      synthesiser.push(stream::Motion{synthesiser.get_horizon_s(), k % 4, {1.0, 2.0, 0.001 * i}, {}});
+    }
+    synthesiser.process(out.data(), 2, 1 + i);
+    (void)synthesiser.get_counters();
+  }
+  EXPECT_EQ(g_allocations - before, 0);
+  EXPECT_GT(synthesiser.get_counters().strikes, 0);
+}
+
+// In a child that the kernel kills at the first system call but read, write and exit.
+TEST(NoHeap, AWholeSceneMakesNoSystemCallWhileItPlays) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 30; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 9 == 0 ? 1e5 : 0.0)});
+  Synthesiser synthesiser({.max_bodies = 4});
+  for (int b = 0; b < 4; ++b) synthesiser.add_body(Model::make(testing::make_cube_bank(modes)), {.position_m = {1.0, 2.0, 0.0}});
+  std::array<float, 256> left{}, right{};
+  const std::array<float*, 2> out{left.data(), right.data()};
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(2);
+    float peak = 0.0F;
+    for (int i = 0; i < 400; ++i) {
+      const double time_s = synthesiser.get_horizon_s();
+      synthesiser.push(stream::Impulse{.time_s = time_s, .body = i % 4, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = 1e-4});
+      synthesiser.push(stream::Motion{time_s, i % 4, {1.0, 2.0, 0.001 * i}, {}});
+      synthesiser.push(stream::Listener{.time_s = time_s, .position_m = {0.001 * i, 0.0, 0.0}});
+      synthesiser.process(out.data(), 2, 1 + i % 256);
+      for (const float p : left) peak = std::max(peak, std::abs(p));
+    }
+    syscall(SYS_exit, peak > 0.0F ? 0 : 3);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fstream>
+#include <numbers>
 #include <ostream>
 #include <sstream>
 #include <string>
@@ -32,6 +33,13 @@ inline std::vector<ImpulseRow> read_impulse_reference() {
                     std::stod(cell.at(5)), std::stod(cell.at(6))});
   }
   return rows;
+}
+
+/// q' of a mode t seconds after a unit impulse.
+inline double calc_velocity(double freq_hz, double d, double t) {
+  if (t < 0.0) return 0.0;
+  const double wd = std::sqrt(4.0 * std::numbers::pi * std::numbers::pi * freq_hz * freq_hz - d * d);
+  return std::exp(-d * t) * (std::cos(wd * t) - d / wd * std::sin(wd * t));
 }
 
 }  // namespace carillon::testing

@@ -1,6 +1,6 @@
-// One body that rings: its modes, struck by contact pulses, summed to the pressure at 1 m.
+// One body that rings, in double precision and sample by sample: slow, plain, and the oracle of synth::Voice.
 //
-//   synth::ModalBody body(bank, 48000.0);
+//   testing::ReferenceBody body(bank, 48000.0);
 //   body.strike({.sample = 100.37, .duration_s = 80e-6, .triangle = 12, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0, 0, 0.01}});
 //   body.process(block);  // adds pascals
 #pragma once
@@ -13,9 +13,11 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/synth/pulse.hpp"
 
-namespace carillon::synth {
+namespace carillon::testing {
 
-using Vec3 = std::array<double, 3>;
+using bank::Vec3;
+using synth::kMoments;
+using synth::Moments;
 
 /// A contact pulse (sin^1.5, see pulse.hpp) on the surface of a body.
 struct Strike {
@@ -26,12 +28,12 @@ struct Strike {
   Vec3 impulse_n_s{};  // in the frame of the mesh
 };
 
-struct ModalBodyOptions {
+struct ReferenceBodyOptions {
   int max_strikes = 256;      // pulses that may be waiting or acting at once
   double silence_pa = 1e-10;  // below this bound on its pressure at 1 m (-106 dB re 20 uPa) a body sleeps
 };
 
-struct ModalBodyCounters {
+struct ReferenceBodyCounters {
   std::int64_t accepted = 0;  // strikes taken
   std::int64_t refused = 0;   // not finite, outside the surface, or no room
   std::int64_t late = 0;      // began before the block to come and were moved to its start
@@ -40,10 +42,10 @@ struct ModalBodyCounters {
 
 /// All modes of one bank below the Nyquist frequency, in double precision. Every mode is advanced by its exact map.
 /// Memory is taken in the constructor only. Not thread-safe: one thread calls strike() and process().
-class ModalBody {
+class ReferenceBody {
  public:
   /// The bank is not owned and must outlive the body. Throws InputError when arrays of the bank disagree or the rate is not positive.
-  ModalBody(const bank::Bank& bank, double sample_rate_hz, ModalBodyOptions options = {});
+  ReferenceBody(const bank::Bank& bank, double sample_rate_hz, ReferenceBodyOptions options = {});
 
   /// Registers a pulse; it acts once process() reaches its beginning, or at once when that is past. False when it was refused.
   /// [audio-thread]: no heap, no lock, no throw.
@@ -60,7 +62,7 @@ class ModalBody {
   /// Modes that are advanced at this moment (in whole tiles).
   int get_live_mode_count() const;
   bool is_awake() const { return awake_; }
-  const ModalBodyCounters& get_counters() const { return counters_; }
+  const ReferenceBodyCounters& get_counters() const { return counters_; }
   /// Sum over the sounded modes of (q'^2 + lambda q^2) / 2 [J].
   double calc_energy_j() const noexcept;
 
@@ -120,7 +122,7 @@ class ModalBody {
   int tile_modes_ = 0;
   bool awake_ = false;
   bool damped_live_ = false;
-  ModalBodyCounters counters_;
+  ReferenceBodyCounters counters_;
 
   std::vector<Tile> tiles_;
   std::vector<DampedMode> damped_;                    // ascending in substeps
@@ -130,4 +132,4 @@ class ModalBody {
   std::array<Lanes, kChunk> forcing_re_{}, forcing_im_{}, sum_{};
 };
 
-}  // namespace carillon::synth
+}  // namespace carillon::testing

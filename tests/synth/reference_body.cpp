@@ -5,7 +5,7 @@
 // Source:     OSG02 section 4 (one complex multiply per mode and sample), corrected by its missing factor 1/2 in eq. 16-18;
 // docs/equations.md. Deviations: the filter to audible modes uses sqrt(lambda), not the damped frequency, which would let over-damped modes
 // vanish.
-#include "runtime/synth/modal_body.hpp"
+#include "tests/synth/reference_body.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,9 +13,16 @@
 #include <numbers>
 #include <numeric>
 
+#include "runtime/config/error.hpp"
 #include "runtime/synth/oscillator.hpp"
 
-namespace carillon::synth {
+namespace carillon::testing {
+
+using synth::calc_chebyshev_coefficients;
+using synth::calc_oscillator_map;
+using synth::get_chebyshev_points;
+using synth::OscillatorMap;
+
 namespace {
 
 // Relative distance from critical damping below which q' = re - (d / omega_d) im would lose digits.
@@ -46,7 +53,7 @@ void check_bank(const bank::Bank& bank) {
 
 }  // namespace
 
-ModalBody::ModalBody(const bank::Bank& bank, double sample_rate_hz, ModalBodyOptions options)
+ReferenceBody::ReferenceBody(const bank::Bank& bank, double sample_rate_hz, ReferenceBodyOptions options)
     : bank_(&bank), rate_hz_(sample_rate_hz), silence_pa_(options.silence_pa) {
   if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz)) throw InputError("the sample rate must be a positive number of Hz");
   check_bank(bank);
@@ -72,7 +79,7 @@ ModalBody::ModalBody(const bank::Bank& bank, double sample_rate_hz, ModalBodyOpt
   moments_.resize(room);
 }
 
-void ModalBody::add_tile_mode(std::size_t mode) {
+void ReferenceBody::add_tile_mode(std::size_t mode) {
   const int lane = tile_modes_ % kLanes;
   if (lane == 0) {
     tiles_.emplace_back();
@@ -106,7 +113,7 @@ void ModalBody::add_tile_mode(std::size_t mode) {
   ++tile_modes_;
 }
 
-void ModalBody::add_damped_mode(std::size_t mode) {
+void ReferenceBody::add_damped_mode(std::size_t mode) {
   const double d = bank_->decay_per_s[mode];
   const double lambda = bank_->eigenvalue_rad2_s2[mode];
   const double h = 1.0 / rate_hz_;
@@ -135,7 +142,7 @@ void ModalBody::add_damped_mode(std::size_t mode) {
   damped_.push_back(m);
 }
 
-bool ModalBody::strike(const Strike& strike) noexcept {
+bool ReferenceBody::strike(const Strike& strike) noexcept {
   const bool sane = std::isfinite(strike.sample) && std::isfinite(strike.duration_s) && strike.duration_s >= 0.0 &&
                     is_finite(strike.barycentric) && is_finite(strike.impulse_n_s) && strike.triangle >= 0 &&
                     static_cast<std::size_t>(strike.triangle) < bank_->triangles.size();
@@ -160,7 +167,7 @@ bool ModalBody::strike(const Strike& strike) noexcept {
   return true;
 }
 
-void ModalBody::process(std::span<double> pressure_pa) noexcept {
+void ReferenceBody::process(std::span<double> pressure_pa) noexcept {
   while (!pressure_pa.empty()) {
     // Chunks end at multiples of kChunk since the beginning, whatever the sizes of the blocks.
     const auto room = static_cast<std::size_t>(kChunk - position_ % kChunk);
@@ -170,7 +177,7 @@ void ModalBody::process(std::span<double> pressure_pa) noexcept {
   }
 }
 
-void ModalBody::process_chunk(std::span<double> pressure_pa) noexcept {
+void ReferenceBody::process_chunk(std::span<double> pressure_pa) noexcept {
   const int samples = static_cast<int>(pressure_pa.size());
   const int acting = pulses_.empty() ? 0 : find_acting_pulses(samples);
   if (awake_ || acting > 0) {
@@ -199,21 +206,22 @@ void ModalBody::process_chunk(std::span<double> pressure_pa) noexcept {
 }
 
 /// Lists the pulses that touch this chunk, with their moments for each of its samples.
-int ModalBody::find_acting_pulses(int samples) noexcept {
+int ReferenceBody::find_acting_pulses(int samples) noexcept {
   acting_.clear();
   for (std::size_t i = 0; i < pulses_.size(); ++i) {
     const Pulse& pulse = pulses_[i];
     // The interval of sample n is (n - 1, n].
     const double begin = pulse.begin - static_cast<double>(position_ - 1);
     if (begin > samples) continue;
-    for (int n = 0; n < samples; ++n) moments_[acting_.size()][n] = calc_pulse_moments(begin - n, pulse.duration);
+    for (int n = 0; n < samples; ++n)
+      moments_[acting_.size()][n] = synth::calc_pulse_moments(synth::PulseShape::kHertz, begin - n, pulse.duration);
     acting_.push_back(static_cast<int>(i));
   }
   return static_cast<int>(acting_.size());
 }
 
 /// phi(x) . J of one mode, phi interpolated between the corners of the triangle.
-double ModalBody::calc_projection(const Pulse& pulse, std::int32_t mode) const noexcept {
+double ReferenceBody::calc_projection(const Pulse& pulse, std::int32_t mode) const noexcept {
   double sum = 0.0;
   for (int corner = 0; corner < 3; ++corner) {
     const std::size_t row = static_cast<std::size_t>(pulse.vertex[corner]) * bank_->mode_count() + static_cast<std::size_t>(mode);
@@ -223,7 +231,7 @@ double ModalBody::calc_projection(const Pulse& pulse, std::int32_t mode) const n
   return sum * bank_->shape_scale[static_cast<std::size_t>(mode)];
 }
 
-void ModalBody::calc_forcing(const Tile& tile, int acting, int samples) noexcept {
+void ReferenceBody::calc_forcing(const Tile& tile, int acting, int samples) noexcept {
   for (int n = 0; n < samples; ++n) {
     forcing_re_[n].fill(0.0);
     forcing_im_[n].fill(0.0);
@@ -251,7 +259,7 @@ void ModalBody::calc_forcing(const Tile& tile, int acting, int samples) noexcept
   }
 }
 
-void ModalBody::advance_tile(Tile& tile, int samples, bool driven) noexcept {
+void ReferenceBody::advance_tile(Tile& tile, int samples, bool driven) noexcept {
   Lanes re = tile.re, im = tile.im;
   const Lanes turn_re = tile.turn_re, turn_im = tile.turn_im, out_re = tile.out_re, out_im = tile.out_im;
   for (int n = 0; n < samples; ++n) {
@@ -275,7 +283,7 @@ void ModalBody::advance_tile(Tile& tile, int samples, bool driven) noexcept {
   tile.live = true;
 }
 
-void ModalBody::advance_damped_modes(std::span<double> pressure, bool driven) noexcept {
+void ReferenceBody::advance_damped_modes(std::span<double> pressure, bool driven) noexcept {
   damped_live_ = !damped_.empty();
   for (std::size_t first = 0; first < damped_.size();) {
     const int substeps = driven ? damped_[first].substeps : 1;
@@ -292,7 +300,7 @@ void ModalBody::advance_damped_modes(std::span<double> pressure, bool driven) no
         for (const int index : acting_) {
           const Pulse& pulse = pulses_[static_cast<std::size_t>(index)];
           const double begin = pulse.begin - static_cast<double>(position_ - 1) - static_cast<double>(n);
-          const Moments moments = calc_pulse_moments(begin * substeps - step, pulse.duration * substeps);
+          const Moments moments = synth::calc_pulse_moments(synth::PulseShape::kHertz, begin * substeps - step, pulse.duration * substeps);
           if (moments[0] == 0.0) continue;
           for (DampedMode& m : group) {
             const double amplitude = calc_projection(pulse, m.mode);
@@ -317,12 +325,12 @@ void ModalBody::advance_damped_modes(std::span<double> pressure, bool driven) no
 }
 
 /// Forgets the pulses that ended before the samples to come.
-void ModalBody::retire_pulses() noexcept {
+void ReferenceBody::retire_pulses() noexcept {
   const double heard = static_cast<double>(position_ - 1);
   std::erase_if(pulses_, [heard](const Pulse& pulse) { return pulse.begin + pulse.duration <= heard; });
 }
 
-void ModalBody::fall_asleep_if_silent() noexcept {
+void ReferenceBody::fall_asleep_if_silent() noexcept {
   const double share = silence_pa_ / static_cast<double>(tiles_.size() + 1);
   bool awake = false;
   for (Tile& tile : tiles_) {
@@ -351,7 +359,7 @@ void ModalBody::fall_asleep_if_silent() noexcept {
   awake_ = awake || damped_live_;
 }
 
-void ModalBody::reset() noexcept {
+void ReferenceBody::reset() noexcept {
   for (Tile& tile : tiles_) {
     tile.re = tile.im = Lanes{};
     tile.live = false;
@@ -364,7 +372,7 @@ void ModalBody::reset() noexcept {
   ++counters_.resets;
 }
 
-int ModalBody::get_live_mode_count() const {
+int ReferenceBody::get_live_mode_count() const {
   int live = damped_live_ ? static_cast<int>(damped_.size()) : 0;
   for (const Tile& tile : tiles_) {
     if (!tile.live) continue;
@@ -373,7 +381,7 @@ int ModalBody::get_live_mode_count() const {
   return live;
 }
 
-double ModalBody::calc_energy_j() const noexcept {
+double ReferenceBody::calc_energy_j() const noexcept {
   double energy = 0.0;
   const auto add = [&](std::size_t mode, double q, double v) { energy += 0.5 * (v * v + bank_->eigenvalue_rad2_s2[mode] * q * q); };
   for (const Tile& tile : tiles_) {
@@ -390,4 +398,4 @@ double ModalBody::calc_energy_j() const noexcept {
   return energy;
 }
 
-}  // namespace carillon::synth
+}  // namespace carillon::testing

@@ -1,4 +1,4 @@
-#include "runtime/synth/modal_body.hpp"
+#include "tests/synth/reference_body.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,40 +15,28 @@
 namespace carillon::synth {
 namespace {
 
+using bank::Vec3;
 using std::numbers::pi;
+using testing::calc_velocity;
 using testing::InventedMode;
 using testing::make_cube_bank;
+using testing::make_many_modes;
+using testing::ReferenceBody;
 constexpr double kRate = 48000.0;
 const Vec3 kUnitImpulse{0.0, 0.0, 1.0};
 
-std::vector<double> play(ModalBody& body, std::size_t samples, std::size_t block = 256) {
+std::vector<double> play(ReferenceBody& body, std::size_t samples, std::size_t block = 256) {
   std::vector<double> pressure(samples, 0.0);
   for (std::size_t n = 0; n < samples; n += block) body.process(std::span(pressure).subspan(n, std::min(block, samples - n)));
   return pressure;
 }
 
-/// q' of a mode t seconds after a unit impulse, written out once more for the tests.
-double calc_velocity(double freq_hz, double d, double t) {
-  if (t < 0.0) return 0.0;
-  const double wd = std::sqrt(4.0 * pi * pi * freq_hz * freq_hz - d * d);
-  return std::exp(-d * t) * (std::cos(wd * t) - d / wd * std::sin(wd * t));
-}
-
-std::vector<InventedMode> make_many_modes(int count) {
-  std::vector<InventedMode> modes;
-  for (int m = 0; m < count; ++m) {
-    const double freq = 100.0 * std::pow(230.0, (m + 0.5) / count);
-    modes.push_back({freq, 2.0 + 1e-6 * freq * freq, 1e-2, {0.3, -0.2, 1.0}, 0.1});
-  }
-  return modes;
-}
-
-TEST(ModalBody, AnImpulseRingsLikeTheClosedFormInAllRegimes) {
+TEST(ReferenceBody, AnImpulseRingsLikeTheClosedFormInAllRegimes) {
   for (const auto& row : testing::read_impulse_reference()) {
     bank::Bank bank = make_cube_bank({{1000.0, 0.0}});
     bank.eigenvalue_rad2_s2[0] = row.lambda;
     bank.decay_per_s[0] = row.decay_per_s();
-    ModalBody body(bank, kRate);
+    ReferenceBody body(bank, kRate);
     ASSERT_EQ(body.get_mode_count(), 1) << row;
     const auto n = static_cast<std::size_t>(std::ceil(row.time_s * kRate)) + 5;
     ASSERT_TRUE(body.strike({.sample = n - row.time_s * kRate, .impulse_n_s = kUnitImpulse}));
@@ -56,10 +44,10 @@ TEST(ModalBody, AnImpulseRingsLikeTheClosedFormInAllRegimes) {
   }
 }
 
-TEST(ModalBody, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
+TEST(ReferenceBody, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
   const bank::Bank bank = make_cube_bank({{440.0, 3.0}, {9876.5, 40.0}, {23900.0, 0.0}});
   for (const double at : {0.0, 100.37, 100.0, 100.999, 127.5, 128.0001}) {
-    ModalBody body(bank, kRate);
+    ReferenceBody body(bank, kRate);
     body.strike({.sample = at, .impulse_n_s = kUnitImpulse});
     const std::vector<double> pressure = play(body, 400);
     for (int n = 0; n < 400; ++n) {
@@ -70,14 +58,14 @@ TEST(ModalBody, AnImpulseBetweenSamplesHasItsAnalyticPhase) {
   }
 }
 
-TEST(ModalBody, APulseMatchesQuadratureBeforeDuringAndAfter) {
+TEST(ReferenceBody, APulseMatchesQuadratureBeforeDuringAndAfter) {
   struct Case {
     double freq_hz, decay_per_s;
   };
   for (const Case c : {Case{440.0, 3.0}, {5000.0, 30.0}, {19900.0, 100.0}, {3000.0, 18000.0}}) {
     const bank::Bank bank = make_cube_bank({{c.freq_hz, c.decay_per_s}});
     for (const double tau : {4e-6, 30e-6, 100e-6, 1.1e-3}) {
-      ModalBody body(bank, kRate);
+      ReferenceBody body(bank, kRate);
       const double at = 40.37;
       body.strike({.sample = at, .duration_s = tau, .impulse_n_s = kUnitImpulse});
       const std::vector<double> pressure = play(body, 120, 17);
@@ -101,13 +89,13 @@ TEST(ModalBody, APulseMatchesQuadratureBeforeDuringAndAfter) {
   }
 }
 
-TEST(ModalBody, AnOverDampedModeFollowsAPulse) {
+TEST(ReferenceBody, AnOverDampedModeFollowsAPulse) {
   // Roots d +- s by hand; the fast one spans from below to far above the sample rate.
   for (const double decay : {7000.0, 40000.0, 900000.0}) {
     const double freq = 1000.0, lambda = 4 * pi * pi * freq * freq;
     const double s = std::sqrt(decay * decay - lambda), fast = decay + s, slow = lambda / fast;
     const bank::Bank bank = make_cube_bank({{freq, decay}});
-    ModalBody body(bank, kRate);
+    ReferenceBody body(bank, kRate);
     ASSERT_EQ(body.get_mode_count(), 1);
     const double tau = 400e-6, at = 30.2;
     body.strike({.sample = at, .duration_s = tau, .impulse_n_s = kUnitImpulse});
@@ -130,11 +118,11 @@ TEST(ModalBody, AnOverDampedModeFollowsAPulse) {
   }
 }
 
-TEST(ModalBody, AfterAPulseTheLevelIsThePulsesSpectrum) {
+TEST(ReferenceBody, AfterAPulseTheLevelIsThePulsesSpectrum) {
   for (const double tau : {10e-6, 70e-6, 300e-6, 1e-3}) {
     for (const double freq : {200.0, 1000.0, 4900.0, 19000.0}) {
       const bank::Bank bank = make_cube_bank({{freq, 0.0}});
-      ModalBody body(bank, kRate);
+      ReferenceBody body(bank, kRate);
       body.strike({.sample = 50.123, .duration_s = tau, .impulse_n_s = kUnitImpulse});
       play(body, 128);
       const double level = std::sqrt(2.0 * body.calc_energy_j());
@@ -146,11 +134,11 @@ TEST(ModalBody, AfterAPulseTheLevelIsThePulsesSpectrum) {
   EXPECT_NEAR(20 * std::log10(testing::calc_reference_spectrum(2 * pi * 1.48)), -20.0, 0.3);
 }
 
-TEST(ModalBody, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
+TEST(ReferenceBody, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
   std::vector<InventedMode> modes = make_many_modes(21);
   for (auto& mode : modes) mode.decay_per_s = 0.0;
   const bank::Bank bank = make_cube_bank(modes);
-  ModalBody body(bank, kRate);
+  ReferenceBody body(bank, kRate);
   const Vec3 impulse{0.01, 0.02, -0.03};
   body.strike({.sample = 3.3, .triangle = 4, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = impulse});
   play(body, 32);
@@ -168,9 +156,9 @@ TEST(ModalBody, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
   EXPECT_NEAR(body.calc_energy_j(), expected, 1e-9 * expected);
 }
 
-TEST(ModalBody, DampingOnlyTakesEnergyAway) {
+TEST(ReferenceBody, DampingOnlyTakesEnergyAway) {
   const bank::Bank bank = make_cube_bank({{50.0, 20.0}, {1000.0, 100.0}, {2000.0, 12566.4}, {3000.0, 40000.0}});
-  ModalBody body(bank, kRate);
+  ReferenceBody body(bank, kRate);
   body.strike({.sample = 1.5, .impulse_n_s = kUnitImpulse});
   play(body, 4, 1);
   double before = body.calc_energy_j();
@@ -181,11 +169,11 @@ TEST(ModalBody, DampingOnlyTakesEnergyAway) {
   }
 }
 
-TEST(ModalBody, BlockSizeDoesNotChangeTheSound) {
+TEST(ReferenceBody, BlockSizeDoesNotChangeTheSound) {
   const bank::Bank bank = make_cube_bank(make_many_modes(37));
   std::vector<std::vector<double>> sounds;
   for (const std::size_t block : {1u, 64u, 511u}) {
-    ModalBody body(bank, kRate);
+    ReferenceBody body(bank, kRate);
     for (int i = 0; i < 20; ++i) {
       body.strike({.sample = 10.0 + 431.7 * i,
                    .duration_s = 20e-6 * (i + 1),
@@ -203,19 +191,19 @@ TEST(ModalBody, BlockSizeDoesNotChangeTheSound) {
   }
 }
 
-TEST(ModalBody, ModesAtOrAboveNyquistAreNeverSounded) {
+TEST(ReferenceBody, ModesAtOrAboveNyquistAreNeverSounded) {
   const bank::Bank bank = make_cube_bank({{1000.0, 1.0}, {23999.0, 1.0}, {24000.0, 1.0}, {24001.0, 1.0}, {60000.0, 1.0}});
-  EXPECT_EQ(ModalBody(bank, 48000.0).get_mode_count(), 2);
-  EXPECT_EQ(ModalBody(bank, 44100.0).get_mode_count(), 1);
-  EXPECT_EQ(ModalBody(bank, 192000.0).get_mode_count(), 5);
+  EXPECT_EQ(ReferenceBody(bank, 48000.0).get_mode_count(), 2);
+  EXPECT_EQ(ReferenceBody(bank, 44100.0).get_mode_count(), 1);
+  EXPECT_EQ(ReferenceBody(bank, 192000.0).get_mode_count(), 5);
   // A damped frequency in range does not help: undamped 30 kHz, damped 10 kHz.
   const bank::Bank damped = make_cube_bank({{30000.0, 2 * pi * std::sqrt(8e8)}});
-  EXPECT_EQ(ModalBody(damped, 48000.0).get_mode_count(), 0);
+  EXPECT_EQ(ReferenceBody(damped, 48000.0).get_mode_count(), 0);
 }
 
-TEST(ModalBody, OppositeImpulsesCancelAndAZeroImpulseIsSilent) {
+TEST(ReferenceBody, OppositeImpulsesCancelAndAZeroImpulseIsSilent) {
   const bank::Bank bank = make_cube_bank(make_many_modes(9));
-  ModalBody plus(bank, kRate), minus(bank, kRate), zero(bank, kRate);
+  ReferenceBody plus(bank, kRate), minus(bank, kRate), zero(bank, kRate);
   plus.strike({.sample = 5.5, .duration_s = 1e-4, .impulse_n_s = {0.1, 0.2, 0.3}});
   minus.strike({.sample = 5.5, .duration_s = 1e-4, .impulse_n_s = {-0.1, -0.2, -0.3}});
   zero.strike({.sample = 5.5, .duration_s = 1e-4, .impulse_n_s = {0.0, 0.0, 0.0}});
@@ -228,9 +216,9 @@ TEST(ModalBody, OppositeImpulsesCancelAndAZeroImpulseIsSilent) {
   EXPECT_FALSE(zero.is_awake());
 }
 
-TEST(ModalBody, TheDirectionOfTheImpulseIsKept) {
+TEST(ReferenceBody, TheDirectionOfTheImpulseIsKept) {
   const bank::Bank bank = make_cube_bank({{1000.0, 1.0, 1.0, {1.0, 0.0, 0.0}}});
-  ModalBody along(bank, kRate), across(bank, kRate), slanted(bank, kRate);
+  ReferenceBody along(bank, kRate), across(bank, kRate), slanted(bank, kRate);
   along.strike({.sample = 0.0, .impulse_n_s = {1.0, 0.0, 0.0}});
   across.strike({.sample = 0.0, .impulse_n_s = {0.0, 1.0, 1.0}});
   slanted.strike({.sample = 0.0, .impulse_n_s = {0.6, 0.8, 0.0}});
@@ -239,9 +227,9 @@ TEST(ModalBody, TheDirectionOfTheImpulseIsKept) {
   EXPECT_NEAR(play(slanted, 1)[0], 0.6, 1e-12);
 }
 
-TEST(ModalBody, FallsAsleepAndWakesAgain) {
+TEST(ReferenceBody, FallsAsleepAndWakesAgain) {
   const bank::Bank bank = make_cube_bank(make_many_modes(40));
-  ModalBody body(bank, kRate);
+  ReferenceBody body(bank, kRate);
   EXPECT_FALSE(body.is_awake());
   body.strike({.sample = 100.0, .impulse_n_s = kUnitImpulse});
   play(body, 1024);
@@ -258,9 +246,9 @@ TEST(ModalBody, FallsAsleepAndWakesAgain) {
   EXPECT_TRUE(body.is_awake());
 }
 
-TEST(ModalBody, BadStrikesAreRefusedAndOverflowIsCleared) {
+TEST(ReferenceBody, BadStrikesAreRefusedAndOverflowIsCleared) {
   const bank::Bank bank = make_cube_bank({{1000.0, 1.0}, {2000.0, 1.0, 1e300}});
-  ModalBody body(bank, kRate, {.max_strikes = 4});
+  ReferenceBody body(bank, kRate, {.max_strikes = 4});
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(body.strike({.sample = nan}));
   EXPECT_FALSE(body.strike({.duration_s = -1.0}));
@@ -277,9 +265,9 @@ TEST(ModalBody, BadStrikesAreRefusedAndOverflowIsCleared) {
   EXPECT_NE(play(body, 200)[150], 0.0);
 }
 
-TEST(ModalBody, ALateStrikeSoundsAtOnceWithItsWholeImpulse) {
+TEST(ReferenceBody, ALateStrikeSoundsAtOnceWithItsWholeImpulse) {
   const bank::Bank bank = make_cube_bank({{1000.0, 0.0}});
-  ModalBody body(bank, kRate);
+  ReferenceBody body(bank, kRate);
   play(body, 1000);
   body.strike({.sample = 200.0, .impulse_n_s = kUnitImpulse});
   EXPECT_EQ(body.get_counters().late, 1);
@@ -287,15 +275,15 @@ TEST(ModalBody, ALateStrikeSoundsAtOnceWithItsWholeImpulse) {
   EXPECT_NEAR(body.calc_energy_j(), 0.5, 1e-9);
 }
 
-TEST(ModalBody, ABankWithArraysThatDisagreeIsRefused) {
+TEST(ReferenceBody, ABankWithArraysThatDisagreeIsRefused) {
   bank::Bank bank = make_cube_bank({{1000.0, 1.0}});
   bank.shape.pop_back();
-  EXPECT_THROW(ModalBody(bank, kRate), InputError);
+  EXPECT_THROW(ReferenceBody(bank, kRate), InputError);
   bank = make_cube_bank({{1000.0, 1.0}});
   bank.triangles[3][1] = 8;
-  EXPECT_THROW(ModalBody(bank, kRate), InputError);
+  EXPECT_THROW(ReferenceBody(bank, kRate), InputError);
   bank = make_cube_bank({{1000.0, 1.0}});
-  EXPECT_THROW(ModalBody(bank, 0.0), InputError);
+  EXPECT_THROW(ReferenceBody(bank, 0.0), InputError);
 }
 
 }  // namespace

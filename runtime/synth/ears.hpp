@@ -1,0 +1,64 @@
+// From a sounding body to a microphone: spherical spreading, travel time, and the Doppler shift that follows from it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/synth/effects.hpp"
+#include "runtime/synth/history.hpp"
+#include "runtime/synth/track.hpp"
+
+namespace carillon::synth {
+
+using bank::kSoundSpeedMs;
+inline constexpr double kNearestM = 0.05;  // a source never counts as nearer than this (1/r has no bound)
+
+/// What a body sends out, and from where. None of it is owned.
+struct Source {
+  const Track* track = nullptr;
+  const History* monopole = nullptr;       // Pa at 1 m, all round
+  std::array<const History*, 3> dipole{};  // Pa at 1 m along x, y, z of the world, cosine elsewhere; or nullptr
+};
+
+/// Way of a sound that arrives at some time.
+struct Way {
+  double delay_s = 0.0;
+  double delay_slope = 0.0;    // change of the delay per time of arrival
+  double spreading_1_m = 0.0;  // 1 / r
+  double spreading_slope = 0.0;
+  Vec3 direction{};  // from the source to the microphone, unit
+  Vec3 direction_slope{};
+};
+
+/// The way of what arrives at `time_s` at the place `offset_m` from the listener: the source is where it was when it sent it, the
+/// microphone where it is now, t' + |x_source(t') - x_microphone(t)| / c = t. Speeds below that of sound. Pure; any thread.
+Way calc_way(const Track& source, const Track& listener, const Vec3& offset_m, double time_s) noexcept;
+
+/// One source heard by one microphone. Sample n of the output is what arrives at time (n - kLatency) / rate.
+class Ear {
+ public:
+  static constexpr int kLatency = kTaps / 2;  // samples by which the output lags behind
+  static constexpr int kQuantum = 32;         // samples between two ways; cubic in time between
+
+  /// `offset_m`: of the microphone from the listener, in the axes of the world. Of the effects kAirDelay and kDoppler are looked at:
+  /// without the first sound takes no time, without the second it takes as long as at the beginning, wherever its source goes.
+  Ear(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler});
+
+  /// Adds the pressure [Pa] of samples `sample` to `sample + received_pa.size()`. The source's histories hold these samples already. Blocks
+  /// of any size give the same bits. [audio-thread]: no heap, no lock, no throw.
+  void process(const Source& source, const Track& listener, std::int64_t sample, std::span<double> received_pa) noexcept;
+
+ private:
+  void find_ways(const Source& source, const Track& listener, std::int64_t quantum) noexcept;
+
+  Vec3 offset_m_{};
+  double rate_hz_ = 0.0;
+  EffectSet effects_;
+  std::int64_t quantum_ = -1;  // of which `from_` is the beginning and `to_` the end
+  Way from_, to_;
+  double first_delay_s_ = 0.0;  // for ears without kDoppler
+};
+
+}  // namespace carillon::synth

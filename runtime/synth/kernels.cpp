@@ -1,0 +1,53 @@
+// Method:     the processor is asked once which instructions it has; every source file kernels_*.cpp brings one table of functions.
+// Source:     none.
+// Deviations: processors other than x86-64 take the plain kernels.
+#include "runtime/synth/kernels.hpp"
+
+namespace carillon::synth {
+
+Isa find_best_isa() noexcept {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) return Isa::kAvx512;
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return Isa::kAvx2;
+  return Isa::kSse2;
+#else
+  return Isa::kPlain;
+#endif
+}
+
+const Kernels& get_kernels(Isa isa) noexcept {
+#if defined(__x86_64__)
+  const Isa best = find_best_isa();
+  switch (isa < best ? isa : best) {
+    case Isa::kAvx512:
+      return kAvx512Kernels;
+    case Isa::kAvx2:
+      return kAvx2Kernels;
+    case Isa::kSse2:
+      return kSse2Kernels;
+    default:
+      return kPlainKernels;
+  }
+#else
+  static_cast<void>(isa);
+  return kPlainKernels;
+#endif
+}
+
+const char* get_name(Isa isa) noexcept {
+  switch (isa) {
+    case Isa::kPlain:
+      return "plain";
+    case Isa::kSse2:
+      return "sse2";
+    case Isa::kAvx2:
+      return "avx2";
+    case Isa::kAvx512:
+      return "avx512";
+    case Isa::kBest:
+      return "best";
+  }
+  return "";
+}
+
+}  // namespace carillon::synth

@@ -1,0 +1,95 @@
+// The inner loops over modes, one implementation for every instruction set, chosen when a voice is made.
+//
+// Modes come in groups of kGroup; lanes that hold no mode have zero tables. Each source file of an instruction set is compiled with flags
+// of its own, so nothing here may be an inline function.
+#pragma once
+
+#include <cstdint>
+
+namespace carillon::synth {
+
+inline constexpr int kGroup = 16;      // modes that are stored and culled together
+inline constexpr int kQuantum = 32;    // samples of one table: the grid on which anything may change
+inline constexpr int kPeriod = 128;    // samples between two steps of the double-precision state
+inline constexpr int kQuanta = 4;      // in a period
+inline constexpr int kTerms = 10;      // Chebyshev terms of a strike: -169 dB at the Nyquist frequency
+inline constexpr int kStrikeRows = 9;  // three corners times three directions
+
+/// Instruction sets, least first. kBest stands for the last one that the processor has.
+enum class Isa : std::uint8_t { kPlain, kSse2, kAvx2, kAvx512, kBest };
+
+/// The sound of each mode over a quantum: sample k is re wave[m][0][k] + im wave[m][1][k] when the quantum begins in the state re + i im.
+struct alignas(64) SoundTable {
+  float wave[kGroup][2][kQuantum];
+};
+
+/// How each mode turns while nothing drives it.
+struct alignas(64) TurnTable {
+  double period_re[kGroup], period_im[kGroup];                           // over kPeriod samples
+  float quanta_re[kQuanta - 1][kGroup], quanta_im[kQuanta - 1][kGroup];  // over 1, 2 and 3 quanta
+};
+
+/// How each mode answers a strike.
+struct alignas(64) StrikeTable {
+  float turn_re[kGroup], turn_im[kGroup];                    // over one sample
+  float out_re[kGroup], out_im[kGroup];                      // pressure = out_re re + out_im im
+  float scale[kGroup];                                       // of the rows of a Touch
+  float force_re[kTerms][kGroup], force_im[kTerms][kGroup];  // Chebyshev coefficients of the answer within a sample
+};
+
+/// The state of each mode at the start of the next period.
+struct alignas(64) ModeState {
+  double re[kGroup], im[kGroup];
+};
+
+/// The state of each mode at the start of each quantum of this period.
+struct alignas(64) Starts {
+  float re[kQuanta][kGroup], im[kQuanta][kGroup];
+};
+
+/// A pulse within one quantum.
+struct Touch {
+  const std::int16_t* row[kStrikeRows];  // [mode]
+  float weight[kStrikeRows];
+  int first, last;  // samples first <= n < last feel the pulse
+  float moment[kQuantum][kTerms];
+};
+
+/// A group of modes as filters of one input: y[n] = a1 y[n-1] + a2 y[n-2] + x[n], pressure = sum of gain y[n].
+template <typename Number>
+struct alignas(64) FilterGroup {
+  Number a1[kGroup], a2[kGroup], gain[kGroup];
+  Number y1[kGroup], y2[kGroup];  // y[n-1], y[n-2]
+};
+
+struct Kernels {
+  Isa isa;
+  /// Fills the starts of a period, and turns the state to the start of the next.
+  void (*advance)(const TurnTable* turn, ModeState* state, Starts* starts, int groups) noexcept;
+  /// Adds the sound of `quanta` (1 to kQuanta) quanta from `first` on to out, quanta x kQuantum samples. How a period is cut into calls
+  /// does not change a bit.
+  void (*emit)(const SoundTable* sound, const Starts* starts, int groups, int first, int quanta, float* out) noexcept;
+  /// advance, and emit of the whole period, to the same bits; the starts are kept nowhere.
+  void (*ring)(const SoundTable* sound, const TurnTable* turn, ModeState* state, int groups, float* out) noexcept;
+  /// Adds what a pulse makes in one quantum to out, kQuantum samples, and what it leaves to the starts and the state after it.
+  void (*strike)(const StrikeTable* strike, const TurnTable* turn, const Touch& touch, int quantum, ModeState* state, Starts* starts,
+                 int groups, float* out) noexcept;
+  /// Adds the pressure that an input makes, 1 to kPeriod samples of both.
+  void (*filter)(FilterGroup<float>* modes, int groups, const float* input, int samples, float* out) noexcept;
+  void (*filter_double)(FilterGroup<double>* modes, int groups, const double* input, int samples, double* out) noexcept;
+};
+
+/// Best that this processor has. Any thread.
+Isa find_best_isa() noexcept;
+/// Kernels of one instruction set; of the best one below it when the processor does not have it. Any thread.
+const Kernels& get_kernels(Isa isa) noexcept;
+/// "plain", "sse2", "avx2", "avx512".
+const char* get_name(Isa isa) noexcept;
+
+// One a source file; call get_kernels().
+extern const Kernels kPlainKernels;
+#if defined(__x86_64__)
+extern const Kernels kSse2Kernels, kAvx2Kernels, kAvx512Kernels;
+#endif
+
+}  // namespace carillon::synth

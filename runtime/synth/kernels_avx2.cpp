@@ -1,0 +1,53 @@
+// Method:     kernels_body.inl on AVX2 and FMA: 8 lanes, 16 registers.
+// Source:     Intel's intrinsics guide.
+// Deviations: none.
+#include <immintrin.h>
+
+#include "runtime/synth/kernels.hpp"
+
+namespace carillon::synth {
+namespace {
+
+struct F {
+  static constexpr int kWidth = 8;
+  __m256 v;
+  static F load(const float* at) { return {_mm256_loadu_ps(at)}; }
+  static F all(float x) { return {_mm256_set1_ps(x)}; }
+  static F zero() { return {_mm256_setzero_ps()}; }
+  static F convert(const std::int16_t* at) {
+    return {_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at))))};
+  }
+  void store(float* at) const { _mm256_storeu_ps(at, v); }
+  friend F operator+(F a, F b) { return {_mm256_add_ps(a.v, b.v)}; }
+  friend F operator*(F a, F b) { return {_mm256_mul_ps(a.v, b.v)}; }
+};
+inline F fma(F a, F b, F c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
+inline F less(F c, F a, F b) { return {_mm256_fnmadd_ps(a.v, b.v, c.v)}; }  // c - a b
+
+struct D {
+  static constexpr int kWidth = 8;
+  __m256d lo, hi;
+  static D load(const double* at) { return {_mm256_loadu_pd(at), _mm256_loadu_pd(at + 4)}; }
+  static D all(double x) { return {_mm256_set1_pd(x), _mm256_set1_pd(x)}; }
+  static D zero() { return {_mm256_setzero_pd(), _mm256_setzero_pd()}; }
+  static D widen(F x) { return {_mm256_cvtps_pd(_mm256_castps256_ps128(x.v)), _mm256_cvtps_pd(_mm256_extractf128_ps(x.v, 1))}; }
+  void store(double* at) const {
+    _mm256_storeu_pd(at, lo);
+    _mm256_storeu_pd(at + 4, hi);
+  }
+  F narrow() const { return {_mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(lo)), _mm256_cvtpd_ps(hi), 1)}; }
+  friend D operator+(D a, D b) { return {_mm256_add_pd(a.lo, b.lo), _mm256_add_pd(a.hi, b.hi)}; }
+  friend D operator*(D a, D b) { return {_mm256_mul_pd(a.lo, b.lo), _mm256_mul_pd(a.hi, b.hi)}; }
+};
+inline D more(D c, D a, D b) { return {_mm256_fmadd_pd(a.lo, b.lo, c.lo), _mm256_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
+inline D less(D c, D a, D b) { return {_mm256_fnmadd_pd(a.lo, b.lo, c.lo), _mm256_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
+inline D fma(D a, D b, D c) { return more(c, a, b); }
+
+constexpr int kVectors = 2, kColumns = 2, kFloatChains = 2, kDoubleChains = 1, kAhead = 0;
+#include "runtime/synth/kernels_body.inl"
+
+}  // namespace
+
+const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, filter, filter_double};
+
+}  // namespace carillon::synth

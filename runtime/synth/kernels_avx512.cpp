@@ -1,0 +1,53 @@
+// Method:     kernels_body.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
+// Source:     Intel's intrinsics guide.
+// Deviations: none.
+#include <immintrin.h>
+
+#include "runtime/synth/kernels.hpp"
+
+namespace carillon::synth {
+namespace {
+
+struct F {
+  static constexpr int kWidth = 16;
+  __m512 v;
+  static F load(const float* at) { return {_mm512_loadu_ps(at)}; }
+  static F all(float x) { return {_mm512_set1_ps(x)}; }
+  static F zero() { return {_mm512_setzero_ps()}; }
+  static F convert(const std::int16_t* at) {
+    return {_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(at))))};
+  }
+  void store(float* at) const { _mm512_storeu_ps(at, v); }
+  friend F operator+(F a, F b) { return {_mm512_add_ps(a.v, b.v)}; }
+  friend F operator*(F a, F b) { return {_mm512_mul_ps(a.v, b.v)}; }
+};
+inline F fma(F a, F b, F c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
+inline F less(F c, F a, F b) { return {_mm512_fnmadd_ps(a.v, b.v, c.v)}; }  // c - a b
+
+struct D {
+  static constexpr int kWidth = 16;
+  __m512d lo, hi;
+  static D load(const double* at) { return {_mm512_loadu_pd(at), _mm512_loadu_pd(at + 8)}; }
+  static D all(double x) { return {_mm512_set1_pd(x), _mm512_set1_pd(x)}; }
+  static D zero() { return {_mm512_setzero_pd(), _mm512_setzero_pd()}; }
+  static D widen(F x) { return {_mm512_cvtps_pd(_mm512_castps512_ps256(x.v)), _mm512_cvtps_pd(_mm512_extractf32x8_ps(x.v, 1))}; }
+  void store(double* at) const {
+    _mm512_storeu_pd(at, lo);
+    _mm512_storeu_pd(at + 8, hi);
+  }
+  F narrow() const { return {_mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(lo)), _mm512_cvtpd_ps(hi), 1)}; }
+  friend D operator+(D a, D b) { return {_mm512_add_pd(a.lo, b.lo), _mm512_add_pd(a.hi, b.hi)}; }
+  friend D operator*(D a, D b) { return {_mm512_mul_pd(a.lo, b.lo), _mm512_mul_pd(a.hi, b.hi)}; }
+};
+inline D more(D c, D a, D b) { return {_mm512_fmadd_pd(a.lo, b.lo, c.lo), _mm512_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
+inline D less(D c, D a, D b) { return {_mm512_fnmadd_pd(a.lo, b.lo, c.lo), _mm512_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
+inline D fma(D a, D b, D c) { return more(c, a, b); }
+
+constexpr int kVectors = 2, kColumns = 4, kFloatChains = 6, kDoubleChains = 3, kAhead = 512;
+#include "runtime/synth/kernels_body.inl"
+
+}  // namespace
+
+const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, filter, filter_double};
+
+}  // namespace carillon::synth

@@ -1,0 +1,267 @@
+// Method:     emit is a small matrix product: a mode's sound over a quantum is its table (32 x 2, single precision) times its state at the
+//             start of the quantum (2 x 1), so 1 to 4 starts are columns that share the table. Two sets of sums, of even and odd modes,
+//             hide the latency of the FMA. advance restarts the columns every period from a state in double precision. strike is the exact
+//             answer of a mode at rest to the pulse, sample by sample, with modes in the lanes; the answer's end is added to what rings.
+// Source:     docs/decisions/resonator-kernel.md.
+// Deviations: none.
+//
+// Included by kernels_*.cpp, which give the types F (lanes of float), D (as many lanes of double) and kVectors, kColumns: how many vectors
+// of samples and how many starts emit holds in registers at once. Everything is in an unnamed namespace and nothing of std is used, so that
+// no function compiled for one processor can be linked in place of another's.
+// The pragmas make g++ 12 keep arrays of sums in registers.
+
+template <int kNumber>
+struct Count {
+  static constexpr int count = kNumber;
+};
+
+/// Sum of kLanes numbers, half onto half; changes them.
+template <int kLanes, typename Number>
+inline Number add_lanes(Number* lane) noexcept {
+  if constexpr (kLanes > 1) {
+#pragma GCC unroll 8
+    for (int l = 0; l < kLanes / 2; ++l) lane[l] += lane[l + kLanes / 2];
+    return add_lanes<kLanes / 2>(lane);
+  } else {
+    return lane[0];
+  }
+}
+
+constexpr int kTile = 8;  // groups whose tables stay in the first cache while other columns pass over them
+
+template <int kHeld>
+inline void emit_columns(const SoundTable* sound, const Starts* starts, int groups, int quantum, int sample, float* out) noexcept {
+  F sum[2][kHeld][kVectors];
+#pragma GCC unroll 8
+  for (int q = 0; q < kHeld; ++q) {
+#pragma GCC unroll 8
+    for (int v = 0; v < kVectors; ++v) sum[0][q][v] = sum[1][q][v] = F::zero();
+  }
+  for (int g = 0; g < groups; ++g) {
+    const float* table = sound[g].wave[0][0] + sample;
+    const float* re = starts[g].re[quantum];
+    const float* im = starts[g].im[quantum];
+    for (int lane = 0; lane < kGroup; lane += 2) {
+#pragma GCC unroll 2
+      for (int odd = 0; odd < 2; ++odd) {
+        F a[kVectors], b[kVectors];
+#pragma GCC unroll 8
+        for (int v = 0; v < kVectors; ++v) {
+          a[v] = F::load(table + v * F::kWidth);
+          b[v] = F::load(table + kQuantum + v * F::kWidth);
+        }
+        if constexpr (kAhead > 0) {
+#pragma GCC unroll 4
+          for (int line = 0; line < 4; ++line) __builtin_prefetch(table + kAhead + line * 16);
+        }
+        table += 2 * kQuantum;
+#pragma GCC unroll 8
+        for (int q = 0; q < kHeld; ++q) {
+          const F x = F::all(re[q * kGroup + lane + odd]);
+#pragma GCC unroll 8
+          for (int v = 0; v < kVectors; ++v) sum[odd][q][v] = fma(a[v], x, sum[odd][q][v]);
+        }
+#pragma GCC unroll 8
+        for (int q = 0; q < kHeld; ++q) {
+          const F x = F::all(im[q * kGroup + lane + odd]);
+#pragma GCC unroll 8
+          for (int v = 0; v < kVectors; ++v) sum[odd][q][v] = fma(b[v], x, sum[odd][q][v]);
+        }
+      }
+    }
+  }
+#pragma GCC unroll 8
+  for (int q = 0; q < kHeld; ++q) {
+#pragma GCC unroll 8
+    for (int v = 0; v < kVectors; ++v) {
+      float* at = out + q * kQuantum + v * F::kWidth;
+      (F::load(at) + (sum[0][q][v] + sum[1][q][v])).store(at);
+    }
+  }
+}
+
+inline void emit_tile(const SoundTable* sound, const Starts* starts, int groups, int first, int quanta, float* out) noexcept {
+  for (int k = 0; k < kQuantum; k += kVectors * F::kWidth) {
+    int q = 0;
+    const auto columns = [&](auto held) {
+      for (; quanta - q >= held.count; q += held.count) {
+        emit_columns<held.count>(sound, starts, groups, first + q, k, out + q * kQuantum + k);
+      }
+    };
+    columns(Count<kColumns>{});
+    if constexpr (kColumns > 2) columns(Count<2>{});
+    if constexpr (kColumns > 1) columns(Count<1>{});
+  }
+}
+
+inline void advance_group(const TurnTable& turn, ModeState& state, Starts& starts) noexcept {
+#pragma GCC unroll 2
+  for (int m = 0; m < kGroup; m += F::kWidth) {
+    const D re = D::load(state.re + m), im = D::load(state.im + m);
+    const D turn_re = D::load(turn.period_re + m), turn_im = D::load(turn.period_im + m);
+    less(re * turn_re, im, turn_im).store(state.re + m);
+    more(re * turn_im, im, turn_re).store(state.im + m);
+    const F x = re.narrow(), y = im.narrow();
+    x.store(starts.re[0] + m);
+    y.store(starts.im[0] + m);
+#pragma GCC unroll 4
+    for (int q = 1; q < kQuanta; ++q) {
+      const F c = F::load(turn.quanta_re[q - 1] + m), s = F::load(turn.quanta_im[q - 1] + m);
+      less(x * c, y, s).store(starts.re[q] + m);
+      fma(x, s, y * c).store(starts.im[q] + m);
+    }
+  }
+}
+
+void advance(const TurnTable* turn, ModeState* state, Starts* starts, int groups) noexcept {
+  for (int g = 0; g < groups; ++g) advance_group(turn[g], state[g], starts[g]);
+}
+
+void emit(const SoundTable* sound, const Starts* starts, int groups, int first, int quanta, float* out) noexcept {
+  for (int g = 0; g < groups; g += kTile) emit_tile(sound + g, starts + g, groups - g < kTile ? groups - g : kTile, first, quanta, out);
+}
+
+void ring(const SoundTable* sound, const TurnTable* turn, ModeState* state, int groups, float* out) noexcept {
+  Starts starts[kTile];
+  for (int g = 0; g < groups; g += kTile) {
+    const int count = groups - g < kTile ? groups - g : kTile;
+    advance(turn + g, state + g, starts, count);
+    emit_tile(sound + g, starts, count, 0, kQuanta, out);
+  }
+}
+
+void strike(const StrikeTable* strike, const TurnTable* turn, const Touch& touch, int quantum, ModeState* state, Starts* starts, int groups,
+            float* out) noexcept {
+  alignas(64) float sum[kQuantum * F::kWidth] = {};
+  for (int m = 0; m < groups * kGroup; m += F::kWidth) {
+    const int lane = m % kGroup;
+    const StrikeTable& table = strike[m / kGroup];
+    const TurnTable& later = turn[m / kGroup];
+    ModeState& ringing = state[m / kGroup];
+    Starts& start = starts[m / kGroup];
+    F amplitude = F::zero();
+    for (int i = 0; i < kStrikeRows; ++i) amplitude = fma(F::all(touch.weight[i]), F::convert(touch.row[i] + m), amplitude);
+    amplitude = amplitude * F::load(table.scale + lane);
+    const F turn_re = F::load(table.turn_re + lane), turn_im = F::load(table.turn_im + lane);
+    const F out_re = F::load(table.out_re + lane), out_im = F::load(table.out_im + lane);
+    F force_re[kTerms], force_im[kTerms];
+#pragma GCC unroll 10
+    for (int j = 0; j < kTerms; ++j) {
+      force_re[j] = F::load(table.force_re[j] + lane) * amplitude;
+      force_im[j] = F::load(table.force_im[j] + lane) * amplitude;
+    }
+    F x = F::zero(), y = F::zero();
+    for (int n = touch.first; n < touch.last; ++n) {
+      F fx = F::zero(), fy = F::zero();
+#pragma GCC unroll 10
+      for (int j = 0; j < kTerms; ++j) {
+        const F moment = F::all(touch.moment[n][j]);
+        fx = fma(moment, force_re[j], fx);
+        fy = fma(moment, force_im[j], fy);
+      }
+      const F turned = less(fma(x, turn_re, fx), y, turn_im);
+      y = fma(x, turn_im, fma(y, turn_re, fy));
+      x = turned;
+      float* at = sum + n * F::kWidth;
+      fma(out_re, x, fma(out_im, y, F::load(at))).store(at);
+    }
+    for (int n = touch.last; n < kQuantum; ++n) {
+      const F turned = less(x * turn_re, y, turn_im);
+      y = fma(x, turn_im, y * turn_re);
+      x = turned;
+      float* at = sum + n * F::kWidth;
+      fma(out_re, x, fma(out_im, y, F::load(at))).store(at);
+    }
+    // At the start of the next quantum, and from there on.
+    const F re = less(x * turn_re, y, turn_im), im = fma(x, turn_im, y * turn_re);
+    for (int q = quantum + 1; q <= kQuanta; ++q) {
+      F later_re = re, later_im = im;
+      if (const int ahead = q - quantum - 1; ahead > 0) {
+        const F c = F::load(later.quanta_re[ahead - 1] + lane), s = F::load(later.quanta_im[ahead - 1] + lane);
+        later_re = less(re * c, im, s);
+        later_im = fma(re, s, im * c);
+      }
+      if (q < kQuanta) {
+        (F::load(start.re[q] + lane) + later_re).store(start.re[q] + lane);
+        (F::load(start.im[q] + lane) + later_im).store(start.im[q] + lane);
+      } else {
+        (D::load(ringing.re + lane) + D::widen(later_re)).store(ringing.re + lane);
+        (D::load(ringing.im + lane) + D::widen(later_im)).store(ringing.im + lane);
+      }
+    }
+  }
+  for (int n = 0; n < kQuantum; ++n) out[n] += add_lanes<F::kWidth>(sum + n * F::kWidth);
+}
+
+/// kHeld vectors of modes, from lane `lane` of the first group on; kHeld divides the vectors of a group or is a multiple of them.
+template <int kHeld, typename V, typename Number>
+inline void filter_chains(FilterGroup<Number>* modes, int lane, const Number* input, int samples, Number* sum) noexcept {
+  constexpr int kParts = kGroup / V::kWidth;  // vectors of a group
+  V a1[kHeld], a2[kHeld], y1[kHeld], y2[kHeld];
+#pragma GCC unroll 8
+  for (int c = 0; c < kHeld; ++c) {
+    const FilterGroup<Number>& group = modes[c / kParts];
+    const int at = lane + c % kParts * V::kWidth;
+    a1[c] = V::load(group.a1 + at);
+    a2[c] = V::load(group.a2 + at);
+    y1[c] = V::load(group.y1 + at);
+    y2[c] = V::load(group.y2 + at);
+  }
+  // Two samples a turn, so that the past values change places by name. The newest sample goes through the last multiply-add only: the chain
+  // of each mode is one of them long.
+  int n = 0;
+  for (; n + 1 < samples; n += 2) {
+    const V x = V::all(input[n]), next_x = V::all(input[n + 1]);
+    V out = V::load(sum + n * V::kWidth), next_out = V::load(sum + (n + 1) * V::kWidth);
+#pragma GCC unroll 8
+    for (int c = 0; c < kHeld; ++c) {
+      const FilterGroup<Number>& group = modes[c / kParts];
+      const int at = lane + c % kParts * V::kWidth;
+      const V gain = V::load(group.gain + at);
+      y2[c] = fma(a1[c], y1[c], fma(a2[c], y2[c], x));
+      out = fma(gain, y2[c], out);
+      y1[c] = fma(a1[c], y2[c], fma(a2[c], y1[c], next_x));
+      next_out = fma(gain, y1[c], next_out);
+    }
+    out.store(sum + n * V::kWidth);
+    next_out.store(sum + (n + 1) * V::kWidth);
+  }
+  if (n < samples) {
+    const V x = V::all(input[n]);
+    V out = V::load(sum + n * V::kWidth);
+#pragma GCC unroll 8
+    for (int c = 0; c < kHeld; ++c) {
+      const FilterGroup<Number>& group = modes[c / kParts];
+      const int at = lane + c % kParts * V::kWidth;
+      const V y = fma(a1[c], y1[c], fma(a2[c], y2[c], x));
+      out = fma(V::load(group.gain + at), y, out);
+      y2[c] = y1[c];
+      y1[c] = y;
+    }
+    out.store(sum + n * V::kWidth);
+  }
+#pragma GCC unroll 8
+  for (int c = 0; c < kHeld; ++c) {
+    y1[c].store(modes[c / kParts].y1 + lane + c % kParts * V::kWidth);
+    y2[c].store(modes[c / kParts].y2 + lane + c % kParts * V::kWidth);
+  }
+}
+
+template <int kHeld, typename V, typename Number>
+inline void filter_groups(FilterGroup<Number>* modes, int groups, const Number* input, int samples, Number* out) noexcept {
+  constexpr int kParts = kGroup / V::kWidth;
+  alignas(64) Number sum[kPeriod * V::kWidth];
+  for (int i = 0; i < samples * V::kWidth; ++i) sum[i] = 0;
+  int v = 0;
+  for (; groups * kParts - v >= kHeld; v += kHeld) filter_chains<kHeld, V>(modes + v / kParts, v % kParts * V::kWidth, input, samples, sum);
+  for (; v < groups * kParts; ++v) filter_chains<1, V>(modes + v / kParts, v % kParts * V::kWidth, input, samples, sum);
+  for (int n = 0; n < samples; ++n) out[n] += add_lanes<V::kWidth>(sum + n * V::kWidth);
+}
+
+void filter(FilterGroup<float>* modes, int groups, const float* input, int samples, float* out) noexcept {
+  filter_groups<kFloatChains, F>(modes, groups, input, samples, out);
+}
+
+void filter_double(FilterGroup<double>* modes, int groups, const double* input, int samples, double* out) noexcept {
+  filter_groups<kDoubleChains, D>(modes, groups, input, samples, out);
+}

@@ -1,0 +1,46 @@
+// Method:     one mode or sample at a time, for any processor; the compiler may take what it has.
+// Source:     none.
+// Deviations: no fused multiply-add, so that no library function is called for it.
+#include "runtime/synth/kernels.hpp"
+
+namespace carillon::synth {
+namespace {
+
+struct F {
+  static constexpr int kWidth = 1;
+  float v;
+  static F load(const float* at) { return {*at}; }
+  static F all(float x) { return {x}; }
+  static F zero() { return {0.0F}; }
+  static F convert(const std::int16_t* at) { return {static_cast<float>(*at)}; }
+  void store(float* at) const { *at = v; }
+  friend F operator+(F a, F b) { return {a.v + b.v}; }
+  friend F operator*(F a, F b) { return {a.v * b.v}; }
+};
+inline F fma(F a, F b, F c) { return {a.v * b.v + c.v}; }
+inline F less(F c, F a, F b) { return {c.v - a.v * b.v}; }  // c - a b
+
+struct D {
+  static constexpr int kWidth = 1;
+  double v;
+  static D load(const double* at) { return {*at}; }
+  static D all(double x) { return {x}; }
+  static D zero() { return {0.0}; }
+  static D widen(F x) { return {static_cast<double>(x.v)}; }
+  void store(double* at) const { *at = v; }
+  F narrow() const { return {static_cast<float>(v)}; }
+  friend D operator+(D a, D b) { return {a.v + b.v}; }
+  friend D operator*(D a, D b) { return {a.v * b.v}; }
+};
+inline D more(D c, D a, D b) { return {c.v + a.v * b.v}; }  // c + a b
+inline D less(D c, D a, D b) { return {c.v - a.v * b.v}; }  // c - a b
+inline D fma(D a, D b, D c) { return more(c, a, b); }
+
+constexpr int kVectors = 8, kColumns = 1, kFloatChains = 1, kDoubleChains = 1, kAhead = 0;
+#include "runtime/synth/kernels_body.inl"
+
+}  // namespace
+
+const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, filter, filter_double};
+
+}  // namespace carillon::synth

@@ -1,0 +1,209 @@
+// Method:     an under-damped mode is z = (q' + d q) + i omega_d q, so that z(t + h) = e^{(-d + i omega_d) h} z(t), and its pressure
+//             g q' = Re(w z) with w = g (1 + i d / omega_d). Every table is made of exponentials in double precision, never of repeated
+//             products. Modes are sorted by the time after which the reference strike has left them silent, so that those still heard
+//             are always the first ones.
+// Source:     docs/equations.md E4; docs/decisions/resonator-kernel.md.
+// Deviations: the filter to audible modes uses sqrt(lambda), not the damped frequency, which would let over-damped modes vanish.
+#include "runtime/synth/model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+
+#include "runtime/config/error.hpp"
+#include "runtime/synth/oscillator.hpp"
+
+namespace carillon::synth {
+namespace {
+
+// Relative distance from critical damping below which q' = re - (d / omega_d) im would lose digits.
+constexpr double kNearCritical = 0.05;
+// Largest |root| x step for which kMoments Chebyshev terms hold the answer of a mode.
+constexpr double kStiffest = 4.0;
+// A mode that dies within 1/1024 of a sample has no sound of its own.
+constexpr int kMaxSubsteps = 256;
+
+bool is_positive(double x) { return std::isfinite(x) && x > 0.0; }
+
+void check(const bank::Bank& bank, const ModelOptions& options) {
+  const std::size_t m = bank.mode_count();
+  if (bank.decay_per_s.size() != m || bank.radiation_gain.size() != m || bank.shape_scale.size() != m ||
+      bank.shape.size() != bank.vertex_count() * m * 3) {
+    throw InputError("mode bank: its arrays disagree in length; make the bank again with carillon-precompute");
+  }
+  for (const auto& triangle : bank.triangles) {
+    for (const std::int32_t vertex : triangle) {
+      if (vertex < 0 || static_cast<std::size_t>(vertex) >= bank.vertex_count()) {
+        throw InputError("mode bank: a triangle names a vertex that does not exist; make the bank again with carillon-precompute");
+      }
+    }
+  }
+  if (!is_positive(options.rate_hz)) throw InputError("the sample rate must be a positive number of Hz");
+  if (!is_positive(options.reference_impulse_n_s)) throw InputError("the reference impulse must be a positive number of N s");
+  if (!is_positive(options.silence_pa)) throw InputError("the pressure of silence must be a positive number of Pa");
+  if (!options.gains.empty() && options.gains.size() != m) throw InputError("there must be one gain a mode of the bank");
+}
+
+/// Sets an array of tables to zero, so that lanes without a mode are silent.
+template <typename T>
+void add_zero(std::vector<T>& tables) {
+  tables.push_back(T{});
+}
+
+}  // namespace
+
+std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOptions& options) {
+  check(bank, options);
+  struct Sorted {
+    Mode mode;
+    double level;    // of the reference strike over silence, in nepers
+    double heard_s;  // how long it is heard
+  };
+  std::vector<Sorted> ringing;
+  std::vector<Mode> damped;
+  const double nyquist_rad_s = std::numbers::pi * options.rate_hz;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+    const double omega = std::sqrt(bank.eigenvalue_rad2_s2[m]);
+    if (!(omega < nyquist_rad_s)) continue;
+    const Mode mode{.lambda = bank.eigenvalue_rad2_s2[m],
+                    .decay = bank.decay_per_s[m],
+                    .gain = options.gains.empty() ? bank.radiation_gain[m] : options.gains[m],
+                    .scale = bank.shape_scale[m],
+                    .bank_mode = static_cast<int>(m)};
+    if (mode.decay < omega * std::sqrt(1.0 - kNearCritical * kNearCritical)) {
+      const double pressure = std::abs(mode.gain) * mode.scale * 32767.0 * options.reference_impulse_n_s;
+      const double level = std::log(std::max(pressure / options.silence_pa, std::numeric_limits<double>::min()));
+      ringing.push_back({mode, level, level > 0.0 ? level / std::max(mode.decay, 1e-9) : 0.0});
+    } else {
+      damped.push_back(mode);
+    }
+  }
+  std::stable_sort(ringing.begin(), ringing.end(),
+                   [](const Sorted& a, const Sorted& b) { return a.heard_s != b.heard_s ? a.heard_s > b.heard_s : a.level > b.level; });
+  const auto model = std::make_shared<Model>(Model());
+  model->rate_hz_ = options.rate_hz;
+  model->triangles_ = bank.triangles;
+  for (const Sorted& sorted : ringing) model->add_ringing_mode(sorted.mode);
+  model->add_damped_modes(std::move(damped));
+  model->copy_shapes(bank);
+  return model;
+}
+
+void Model::add_ringing_mode(const Mode& mode) {
+  const int lane = ringing_ % kGroup;
+  if (lane == 0) {
+    add_zero(sound_);
+    add_zero(turn_);
+    add_zero(strike_);
+  }
+  ++ringing_;
+  modes_.push_back(mode);
+  const double h = 1.0 / rate_hz_;
+  const double d = mode.decay;
+  const double omega = std::sqrt(mode.lambda);
+  const double omega_d = std::sqrt((omega - d) * (omega + d));
+  const auto answer = [&](double samples) { return std::exp(-d * samples * h) * std::polar(1.0, omega_d * samples * h); };
+  const std::complex<double> out(mode.gain, mode.gain * d / omega_d);
+  for (int k = 0; k < kQuantum; ++k) {
+    const std::complex<double> wave = out * answer(k);
+    sound_.back().wave[lane][0][k] = static_cast<float>(wave.real());
+    sound_.back().wave[lane][1][k] = static_cast<float>(-wave.imag());
+  }
+  TurnTable& turn = turn_.back();
+  turn.period_re[lane] = answer(kPeriod).real();
+  turn.period_im[lane] = answer(kPeriod).imag();
+  for (int q = 1; q < kQuanta; ++q) {
+    turn.quanta_re[q - 1][lane] = static_cast<float>(answer(q * kQuantum).real());
+    turn.quanta_im[q - 1][lane] = static_cast<float>(answer(q * kQuantum).imag());
+  }
+  StrikeTable& strike = strike_.back();
+  strike.turn_re[lane] = static_cast<float>(answer(1.0).real());
+  strike.turn_im[lane] = static_cast<float>(answer(1.0).imag());
+  strike.out_re[lane] = static_cast<float>(out.real());
+  strike.out_im[lane] = static_cast<float>(-out.imag());
+  strike.scale[lane] = static_cast<float>(mode.scale);
+  const auto points = get_chebyshev_points();
+  std::array<double, kMoments> re{}, im{};
+  for (int k = 0; k < kMoments; ++k) {
+    re[k] = answer(1.0 - points[k]).real();
+    im[k] = answer(1.0 - points[k]).imag();
+  }
+  const Moments cre = calc_chebyshev_coefficients(re);
+  const Moments cim = calc_chebyshev_coefficients(im);
+  for (int j = 0; j < kTerms; ++j) {
+    strike.force_re[j][lane] = static_cast<float>(cre[j]);
+    strike.force_im[j][lane] = static_cast<float>(cim[j]);
+  }
+}
+
+void Model::add_damped_modes(std::vector<Mode> modes) {
+  std::vector<std::pair<Mode, DampedMode>> made;
+  const double h = 1.0 / rate_hz_;
+  for (const Mode& mode : modes) {
+    const double d = mode.decay;
+    const double omega = std::sqrt(mode.lambda);
+    const double fastest = d > omega ? d + std::sqrt((d - omega) * (d + omega)) : omega;
+    int substeps = 1;
+    while (fastest * h / substeps > kStiffest && substeps < kMaxSubsteps) substeps *= 2;
+    if (fastest * h / substeps > kStiffest) continue;
+    DampedMode m{};
+    const OscillatorMap full = calc_oscillator_map(mode.lambda, d, h);
+    const OscillatorMap sub = calc_oscillator_map(mode.lambda, d, h / substeps);
+    m.qq = full.qq, m.qv = full.qv, m.vq = full.vq, m.vv = full.vv;
+    m.sub_qq = sub.qq, m.sub_qv = sub.qv, m.sub_vq = sub.vq, m.sub_vv = sub.vv;
+    const auto points = get_chebyshev_points();
+    std::array<double, kMoments> q{}, v{};
+    for (int k = 0; k < kMoments; ++k) {
+      const OscillatorMap part = calc_oscillator_map(mode.lambda, d, (1.0 - points[k]) * h / substeps);
+      q[k] = part.qv;
+      v[k] = part.vv;
+    }
+    m.force_q = calc_chebyshev_coefficients(q);
+    m.force_v = calc_chebyshev_coefficients(v);
+    m.gain = mode.gain;
+    m.bound = 2.0 * omega;
+    m.scale = mode.scale;
+    m.substeps = substeps;
+    made.emplace_back(mode, m);
+  }
+  std::stable_sort(made.begin(), made.end(), [](const auto& a, const auto& b) { return a.second.substeps < b.second.substeps; });
+  for (const auto& [mode, m] : made) {
+    modes_.push_back(mode);
+    damped_.push_back(m);
+  }
+}
+
+void Model::copy_shapes(const bank::Bank& bank) {
+  columns_ = sound_.size() * kGroup + damped_.size();
+  shape_.assign(bank.vertex_count() * 3 * columns_, 0);
+  for (std::size_t i = 0; i < modes_.size(); ++i) {
+    const auto mode = static_cast<std::size_t>(modes_[i].bank_mode);
+    const std::size_t column = i < static_cast<std::size_t>(ringing_) ? i : sound_.size() * kGroup + i - static_cast<std::size_t>(ringing_);
+    for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) {
+      const std::int16_t* from = &bank.shape[(vertex * bank.mode_count() + mode) * 3];
+      for (std::size_t axis = 0; axis < 3; ++axis) shape_[(vertex * 3 + axis) * columns_ + column] = from[axis];
+    }
+  }
+}
+
+double Model::calc_projection(int mode, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction) const {
+  if (triangle < 0 || static_cast<std::size_t>(triangle) >= triangles_.size()) throw InputError("the bank has no such triangle");
+  const int column = mode < ringing_ ? mode : static_cast<int>(sound_.size()) * kGroup + mode - ringing_;
+  double sum = 0.0;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sum += barycentric[corner] * direction[axis] *
+             get_row(triangles_[static_cast<std::size_t>(triangle)][corner], static_cast<int>(axis))[column];
+    }
+  }
+  return sum * modes_[static_cast<std::size_t>(mode)].scale;
+}
+
+std::size_t Model::calc_bytes() const {
+  return sound_.size() * (sizeof(SoundTable) + sizeof(TurnTable) + sizeof(StrikeTable)) + damped_.size() * sizeof(DampedMode) +
+         modes_.size() * sizeof(Mode) + triangles_.size() * sizeof(triangles_[0]) + shape_.size() * sizeof(shape_[0]);
+}
+
+}  // namespace carillon::synth

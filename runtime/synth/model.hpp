@@ -1,0 +1,85 @@
+// The modes of one bank made ready to be played: tables, in the order of audibility.
+//
+//   const auto model = synth::Model::make(bank, {.rate_hz = 48000.0});
+//   synth::Voice voice(model);
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/synth/kernels.hpp"
+#include "runtime/synth/pulse.hpp"
+
+namespace carillon::synth {
+
+struct ModelOptions {
+  double rate_hz = 48000.0;
+  std::span<const double> gains{};      // (m) Pa at 1 m for unit modal velocity; empty: those of the bank
+  double reference_impulse_n_s = 1e-3;  // the strike by which audibility is judged
+  double silence_pa = 1e-10;            // -106 dB re 20 uPa: what is not heard
+};
+
+/// Immutable; any number of voices on any threads may share one.
+class Model {
+ public:
+  /// Modes with sqrt(lambda) at or above the Nyquist frequency are left out. Copies what it needs: the bank need not outlive it.
+  /// Throws InputError when arrays of the bank or the gains disagree in length, when a triangle names a vertex that does not exist, or when
+  /// rate, impulse or silence are not positive numbers. Not for an audio thread.
+  static std::shared_ptr<const Model> make(const bank::Bank& bank, const ModelOptions& options = {});
+
+  /// Modes below the Nyquist frequency: first the under-damped ones by audibility (the time until the last is silent after the reference
+  /// strike, longest first), then those near and above critical damping. 0 <= mode < get_mode_count() below.
+  int get_mode_count() const { return static_cast<int>(modes_.size()); }
+  double get_eigenvalue_rad2_s2(int mode) const { return modes_[static_cast<std::size_t>(mode)].lambda; }
+  double get_decay_per_s(int mode) const { return modes_[static_cast<std::size_t>(mode)].decay; }
+  double get_gain(int mode) const { return modes_[static_cast<std::size_t>(mode)].gain; }
+  int get_bank_mode(int mode) const { return modes_[static_cast<std::size_t>(mode)].bank_mode; }
+  /// How many of them ring: the first ones.
+  int get_ringing_mode_count() const { return ringing_; }
+  /// phi(x) . direction [kg^-1/2] at a point of a triangle. Throws InputError when the bank has no such triangle.
+  double calc_projection(int mode, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction) const;
+  double get_rate_hz() const { return rate_hz_; }
+  /// Memory of the tables, which all voices share.
+  std::size_t calc_bytes() const;
+
+ private:
+  friend class Voice;
+
+  struct Mode {
+    double lambda = 0.0, decay = 0.0, gain = 0.0, scale = 0.0;  // scale: kg^-1/2 per integer step of the shape
+    int bank_mode = 0;
+  };
+  /// A mode at, near or above critical damping, as (q, q'). Stiff ones take several substeps a sample while a pulse acts.
+  struct DampedMode {
+    double qq, qv, vq, vv;                  // map over one sample
+    double sub_qq, sub_qv, sub_vq, sub_vv;  // map over one substep
+    Moments force_q, force_v;
+    double gain = 0.0, bound = 0.0, scale = 0.0;
+    int substeps = 1;
+  };
+
+  void add_ringing_mode(const Mode& mode);
+  void add_damped_modes(std::vector<Mode> modes);
+  void copy_shapes(const bank::Bank& bank);
+  const std::int16_t* get_row(std::int32_t vertex, int axis) const {
+    return shape_.data() + (static_cast<std::size_t>(vertex) * 3 + static_cast<std::size_t>(axis)) * columns_;
+  }
+
+  double rate_hz_ = 0.0;
+  std::vector<Mode> modes_;
+  int ringing_ = 0;  // modes in groups, the first of modes_; the rest is damped_
+  std::vector<SoundTable> sound_;
+  std::vector<TurnTable> turn_;
+  std::vector<StrikeTable> strike_;
+  std::vector<DampedMode> damped_;  // ascending in substeps
+  std::vector<std::array<std::int32_t, 3>> triangles_;
+  std::size_t columns_ = 0;          // groups x kGroup, then the damped modes
+  std::vector<std::int16_t> shape_;  // (V, 3, columns_)
+};
+
+}  // namespace carillon::synth

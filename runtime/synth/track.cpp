@@ -1,0 +1,85 @@
+// Method:     cubic Hermite segments; velocities that are not given are the slopes between the neighbours.
+// Source:     textbook.
+// Deviations: none.
+#include "runtime/synth/track.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::synth {
+
+Track::Track(std::size_t capacity) : waypoints_(std::max<std::size_t>(capacity, 1)) {}
+
+bool Track::push(const Waypoint& waypoint) noexcept {
+  bool finite = std::isfinite(waypoint.time_s);
+  for (std::size_t k = 0; k < 3; ++k) finite = finite && std::isfinite(waypoint.position_m[k]) && std::isfinite(waypoint.velocity_m_s[k]);
+  if (!finite) return false;
+  if (count_ > 0) {
+    const double last = get(count_ - 1).time_s;
+    if (waypoint.time_s < last) return false;
+    if (waypoint.time_s == last) {
+      const Waypoint& same = get(count_ - 1);
+      if (waypoint.position_m == same.position_m && waypoint.velocity_m_s == same.velocity_m_s) return true;
+      if (count_ > 1 && get(count_ - 2).time_s == last) --count_;
+    }
+  }
+  if (count_ == waypoints_.size()) {
+    first_ = (first_ + 1) % waypoints_.size();
+    --count_;
+  }
+  waypoints_[(first_ + count_) % waypoints_.size()] = waypoint;
+  ++count_;
+  return true;
+}
+
+Waypoint Track::find(double time_s) const noexcept {
+  if (count_ == 0) return {.time_s = time_s};
+  if (!(time_s > get(0).time_s)) return {time_s, get(0).position_m, {}};
+  if (time_s >= get(count_ - 1).time_s) return {time_s, get(count_ - 1).position_m, {}};
+  std::size_t low = 0, high = count_ - 1;  // get(low).time_s < time_s < get(high).time_s or equal
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    (get(middle).time_s <= time_s ? low : high) = middle;
+  }
+  const Waypoint &a = get(low), &b = get(high);
+  const double width = b.time_s - a.time_s;
+  const double u = (time_s - a.time_s) / width;
+  const double h01 = u * u * (3.0 - 2.0 * u), slope01 = 6.0 * u * (1.0 - u) / width;
+  const double h10 = u * (1.0 - u) * (1.0 - u) * width, slope10 = (1.0 - u) * (1.0 - 3.0 * u);
+  const double h11 = -u * u * (1.0 - u) * width, slope11 = u * (3.0 * u - 2.0);
+  Waypoint here{.time_s = time_s};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double step = b.position_m[k] - a.position_m[k];
+    here.position_m[k] = a.position_m[k] + h01 * step + h10 * a.velocity_m_s[k] + h11 * b.velocity_m_s[k];
+    here.velocity_m_s[k] = slope01 * step + slope10 * a.velocity_m_s[k] + slope11 * b.velocity_m_s[k];
+  }
+  return here;
+}
+
+Track make_track(std::span<const Place> places) {
+  std::vector<Waypoint> waypoints;
+  for (const Place& place : places) {
+    const bool finite = std::isfinite(place.time_s) && std::isfinite(place.position_m[0]) && std::isfinite(place.position_m[1]) &&
+                        std::isfinite(place.position_m[2]);
+    if (!finite || (!waypoints.empty() && place.time_s < waypoints.back().time_s)) {
+      throw InputError("a path must be finite and in order of time");
+    }
+    if (!waypoints.empty() && place.time_s == waypoints.back().time_s) waypoints.pop_back();
+    waypoints.push_back({place.time_s, place.position_m, {}});
+  }
+  if (waypoints.empty()) throw InputError("a path needs at least one point");
+  for (std::size_t i = 0; waypoints.size() > 1 && i < waypoints.size(); ++i) {
+    const Waypoint& before = waypoints[i == 0 ? 0 : i - 1];
+    const Waypoint& after = waypoints[std::min(i + 1, waypoints.size() - 1)];
+    for (std::size_t k = 0; k < 3; ++k) {
+      waypoints[i].velocity_m_s[k] = (after.position_m[k] - before.position_m[k]) / (after.time_s - before.time_s);
+    }
+  }
+  Track track(waypoints.size());
+  for (const Waypoint& waypoint : waypoints) track.push(waypoint);
+  return track;
+}
+
+}  // namespace carillon::synth

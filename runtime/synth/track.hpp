@@ -1,0 +1,51 @@
+// Where a body or the listener is over time.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace carillon::synth {
+
+using Vec3 = std::array<double, 3>;
+
+struct Waypoint {
+  double time_s = 0.0;
+  Vec3 position_m{};
+  Vec3 velocity_m_s{};
+};
+
+/// The last waypoints of something that moves: cubic between them, with their velocities, so that its speed is continuous. Before the first
+/// and after the last it rests there. One thread at a time.
+class Track {
+ public:
+  /// Takes memory for `capacity` >= 1 waypoints, of which the oldest are forgotten first.
+  explicit Track(std::size_t capacity);
+
+  /// [audio-thread] Adds a waypoint. Two may have one time, before and after an impact; a third replaces the second. False, and nothing has
+  /// changed, when it is earlier than the last or not finite.
+  bool push(const Waypoint& waypoint) noexcept;
+
+  /// [audio-thread] At the origin, at rest, when there is no waypoint.
+  Waypoint find(double time_s) const noexcept;
+
+  bool is_still() const { return count_ < 2; }
+
+ private:
+  const Waypoint& get(std::size_t i) const { return waypoints_[(first_ + i) % waypoints_.size()]; }
+
+  std::vector<Waypoint> waypoints_;  // a ring
+  std::size_t first_ = 0, count_ = 0;
+};
+
+/// A track through places whose velocities are not known: each takes its own from its neighbours.
+struct Place {
+  double time_s = 0.0;
+  Vec3 position_m{};
+};
+
+/// `places` in order of time, at least one; of several at the same time the last counts. Throws InputError otherwise.
+Track make_track(std::span<const Place> places);
+
+}  // namespace carillon::synth

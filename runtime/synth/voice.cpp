@@ -1,0 +1,282 @@
+// Method:     the modes ring by kernels.hpp, period by period. A strike is worked out as the answer of modes at rest, over the quanta that
+//             its pulse touches, and added to what rings: the modes are linear. Modes near and above critical damping are few and die at
+//             once; they go sample by sample in double precision. Groups of modes that cannot be heard any more are dropped from the
+//             end of the list, every eighth period.
+// Source:     OSG02 section 4 (impulses to modes), corrected by its missing factor 1/2 in eq. 16-18; docs/equations.md E4 and E5.
+// Deviations: none.
+#include "runtime/synth/voice.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/config/error.hpp"
+#include "runtime/synth/fp_guard.hpp"
+
+namespace carillon::synth {
+namespace {
+
+constexpr std::int64_t kCullEvery = 8;  // periods
+
+bool is_finite(const stream::Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
+
+}  // namespace
+
+Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
+    : model_(std::move(model)), kernels_(&get_kernels(options.isa)), silence_pa_(options.silence_pa) {
+  if (!(silence_pa_ > 0.0) || !std::isfinite(silence_pa_)) throw InputError("the pressure of silence must be a positive number of Pa");
+  groups_ = static_cast<int>(model_->sound_.size());
+  limit_ = groups_;
+  state_.resize(model_->sound_.size());
+  starts_.resize(model_->sound_.size());
+  damped_.resize(model_->damped_.size());
+  damped_amplitude_.resize(model_->damped_.size());
+  pulses_.reserve(static_cast<std::size_t>(std::max(1, options.max_strikes)));
+}
+
+bool Voice::strike(const stream::Impulse& impulse) noexcept {
+  const bool sane = std::isfinite(impulse.time_s) && std::isfinite(impulse.duration_s) && impulse.duration_s >= 0.0 &&
+                    is_finite(impulse.barycentric) && is_finite(impulse.impulse_n_s) && impulse.triangle >= 0 &&
+                    static_cast<std::size_t>(impulse.triangle) < model_->triangles_.size();
+  if (!sane || pulses_.size() == pulses_.capacity()) {
+    ++counters_.refused;
+    return false;
+  }
+  Pulse pulse;
+  pulse.shape = impulse.shape;
+  pulse.length = calc_pulse_length(impulse.shape, impulse.duration_s * model_->rate_hz_);
+  pulse.begin = impulse.time_s * model_->rate_hz_ - 0.5 * pulse.length;
+  // The sample at the horizon is still to come: what happens after the one before it can still be heard.
+  const double earliest = static_cast<double>(horizon_ - 1);
+  if (!(pulse.begin > earliest)) {
+    pulse.begin = std::nextafter(earliest, earliest + 1.0);
+    ++counters_.late;
+  }
+  const auto& triangle = model_->triangles_[static_cast<std::size_t>(impulse.triangle)];
+  for (int corner = 0; corner < 3; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) {
+      pulse.row[corner * 3 + axis] = model_->get_row(triangle[corner], axis);
+      pulse.weight[corner * 3 + axis] = static_cast<float>(impulse.barycentric[corner] * impulse.impulse_n_s[axis]);
+    }
+  }
+  pulses_.push_back(pulse);
+  ++counters_.accepted;
+  return true;
+}
+
+void Voice::process(std::span<float> pressure_pa) noexcept {
+  const FpGuard guard;
+  while (!pressure_pa.empty()) {
+    if (held_ == 0) {
+      const auto left = static_cast<int>((kPeriod - horizon_ % kPeriod) / kQuantum);
+      const std::size_t wanted = std::max<std::size_t>(1, pressure_pa.size() / kQuantum);
+      render(static_cast<int>(std::min(static_cast<std::size_t>(left), wanted)));
+    }
+    const std::size_t count = std::min(static_cast<std::size_t>(held_), pressure_pa.size());
+    if (!silent_) {
+      const float* from = block_.data() + (rendered_ - held_);
+      for (std::size_t n = 0; n < count; ++n) pressure_pa[n] += from[n];
+    }
+    held_ -= static_cast<int>(count);
+    pressure_pa = pressure_pa.subspan(count);
+  }
+}
+
+/// Fills block_ with the next `quanta` quanta, all of one period.
+void Voice::render(int quanta) noexcept {
+  const auto first = static_cast<int>(horizon_ % kPeriod / kQuantum);
+  const std::int64_t start = horizon_;
+  horizon_ += quanta * kQuantum;
+  rendered_ = held_ = quanta * kQuantum;
+  if (first == 0) {
+    if (limit_ < live_)
+      fade_to_limit();
+    else
+      fading_ = false;
+    if (start / kPeriod % kCullEvery == 0 && is_awake()) cull();
+  }
+  silent_ = !is_awake() && !fading_ && pulses_.empty();
+  if (silent_) return;
+  std::fill(block_.begin(), block_.begin() + rendered_, 0.0F);
+  bool struck_at_all = false;
+  for (int q = 0; q < quanta; ++q) struck_at_all = struck_at_all || is_struck(start + q * kQuantum);
+  const bool whole = quanta == kQuanta && !struck_at_all;
+  if (live_ > 0 && whole) {
+    kernels_->ring(model_->sound_.data(), model_->turn_.data(), state_.data(), live_, block_.data());
+  } else if (live_ > 0 && first == 0) {
+    kernels_->advance(model_->turn_.data(), state_.data(), starts_.data(), live_);
+  }
+  counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * rendered_;
+  for (int q = 0, made = whole ? quanta : 0; q < quanta; ++q) {
+    float* out = block_.data() + q * kQuantum;
+    const std::int64_t sample = start + q * kQuantum;
+    const bool struck = struck_at_all && is_struck(sample);
+    if (q == made) {  // what rings, up to the next quantum that is struck: a strike changes the starts after it
+      do ++made;
+      while (made < quanta && !struck && !is_struck(start + made * kQuantum));
+      if (live_ > 0) kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
+    }
+    if (struck) strike_quantum(sample, first + q, out);
+    if (struck || damped_live_) add_damped(sample, struck, out);
+    if (fading_) {
+      for (int n = 0; n < kQuantum; ++n) out[n] += fade_[(first + q) * kQuantum + n];
+    }
+    int bad = 0;
+    for (int n = 0; n < kQuantum; ++n) bad |= static_cast<int>(!(std::abs(out[n]) <= std::numeric_limits<float>::max()));
+    if (bad != 0) {
+      reset();
+      std::fill(block_.begin() + q * kQuantum, block_.begin() + rendered_, 0.0F);
+      break;
+    }
+  }
+  const auto heard = static_cast<double>(horizon_ - 1);
+  std::erase_if(pulses_, [heard](const Pulse& pulse) { return pulse.begin + pulse.length <= heard; });
+}
+
+/// Whether a pulse acts in the quantum that begins at `sample`. The interval of sample n is (n - 1, n].
+bool Voice::is_struck(std::int64_t sample) const noexcept {
+  for (const Pulse& pulse : pulses_) {
+    if (pulse.begin <= static_cast<double>(sample + kQuantum - 1) && pulse.begin + pulse.length > static_cast<double>(sample - 1)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Makes all modes live that the limit allows; the starts of those that were not are out of date.
+void Voice::wake() noexcept {
+  for (; live_ < limit_; ++live_) starts_[static_cast<std::size_t>(live_)] = Starts{};
+}
+
+void Voice::strike_quantum(std::int64_t sample, int quantum, float* out) noexcept {
+  wake();
+  for (const Pulse& pulse : pulses_) {
+    const double begin = pulse.begin - static_cast<double>(sample - 1);
+    if (begin > kQuantum || begin + pulse.length <= 0.0) continue;
+    touch_.first = std::clamp(static_cast<int>(std::ceil(begin)) - 1, 0, kQuantum);
+    touch_.last = std::clamp(static_cast<int>(std::ceil(begin + pulse.length)), touch_.first, kQuantum);
+    for (int n = touch_.first; n < touch_.last; ++n) {
+      const Moments moments = calc_pulse_moments(pulse.shape, begin - n, pulse.length);
+      for (int j = 0; j < kTerms; ++j) touch_.moment[n][j] = static_cast<float>(moments[j]);
+    }
+    std::copy(std::begin(pulse.row), std::end(pulse.row), touch_.row);
+    std::copy(std::begin(pulse.weight), std::end(pulse.weight), touch_.weight);
+    kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, quantum, state_.data(), starts_.data(), live_, out);
+    counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
+  }
+}
+
+void Voice::add_damped(std::int64_t sample, bool struck, float* out) noexcept {
+  const auto& modes = model_->damped_;
+  damped_live_ = !modes.empty();
+  for (std::size_t first = 0; first < modes.size();) {
+    const int substeps = struck ? modes[first].substeps : 1;
+    std::size_t last = first + 1;
+    while (last < modes.size() && (!struck || modes[last].substeps == substeps)) ++last;
+    for (int n = 0; n < kQuantum; ++n) {
+      for (int step = 0; struck && step < substeps; ++step) {
+        for (std::size_t i = first; i < last; ++i) {
+          const auto& m = modes[i];
+          DampedState& s = damped_[i];
+          s = {m.sub_qq * s.q + m.sub_qv * s.v, m.sub_vq * s.q + m.sub_vv * s.v};
+        }
+        for (const Pulse& pulse : pulses_) {
+          const double begin = pulse.begin - static_cast<double>(sample - 1 + n);
+          if (begin > 1.0 || begin + pulse.length <= 0.0) continue;
+          const Moments moments = calc_pulse_moments(pulse.shape, begin * substeps - step, pulse.length * substeps);
+          if (moments[0] == 0.0) continue;
+          for (std::size_t i = first; i < last; ++i) {
+            const auto& m = modes[i];
+            const std::size_t column = static_cast<std::size_t>(groups_) * kGroup + i;
+            double amplitude = 0.0;
+            for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(pulse.weight[r]) * pulse.row[r][column];
+            amplitude *= m.scale;
+            for (int j = 0; j < kMoments; ++j) {
+              damped_[i].q += amplitude * moments[j] * m.force_q[j];
+              damped_[i].v += amplitude * moments[j] * m.force_v[j];
+            }
+          }
+        }
+      }
+      double pressure = 0.0;
+      for (std::size_t i = first; i < last; ++i) {
+        const auto& m = modes[i];
+        DampedState& s = damped_[i];
+        if (!struck) s = {m.qq * s.q + m.qv * s.v, m.vq * s.q + m.vv * s.v};
+        pressure += m.gain * s.v;
+      }
+      out[n] += static_cast<float>(pressure);
+    }
+    first = last;
+  }
+}
+
+/// Drops groups from the end that cannot be heard any more.
+void Voice::cull() noexcept {
+  const double share = silence_pa_ / static_cast<double>(groups_ + 1);
+  for (; live_ > 0; --live_) {
+    ModeState& state = state_[static_cast<std::size_t>(live_ - 1)];
+    const StrikeTable& table = model_->strike_[static_cast<std::size_t>(live_ - 1)];
+    double bound = 0.0;
+    for (int lane = 0; lane < kGroup; ++lane) {
+      const double weight = std::hypot(table.out_re[lane], table.out_im[lane]);
+      bound += weight * std::sqrt(state.re[lane] * state.re[lane] + state.im[lane] * state.im[lane]);
+    }
+    if (bound >= share) break;
+    state = ModeState{};
+  }
+  double bound = 0.0;
+  for (std::size_t i = 0; i < damped_.size(); ++i) {
+    // q' of an unforced mode never exceeds |q'| + 2 omega |q| from here on.
+    bound += (std::abs(damped_[i].v) + model_->damped_[i].bound * std::abs(damped_[i].q)) * std::abs(model_->damped_[i].gain);
+  }
+  damped_live_ = damped_live_ && bound >= share;
+  if (!damped_live_) std::fill(damped_.begin(), damped_.end(), DampedState{});
+}
+
+/// Renders the groups beyond the limit once more, on their way out, for the period that begins.
+void Voice::fade_to_limit() noexcept {
+  const int gone = live_ - limit_;
+  fade_.fill(0.0F);
+  kernels_->ring(model_->sound_.data() + limit_, model_->turn_.data() + limit_, state_.data() + limit_, gone, fade_.data());
+  counters_.mode_samples += static_cast<std::int64_t>(gone) * kGroup * kPeriod;
+  for (int n = 0; n < kPeriod; ++n) fade_[n] *= 1.0F - static_cast<float>(n) / kPeriod;
+  std::fill(state_.begin() + limit_, state_.begin() + live_, ModeState{});
+  live_ = limit_;
+  fading_ = true;
+}
+
+void Voice::set_limit(int modes) noexcept { limit_ = std::clamp((modes + kGroup - 1) / kGroup, std::min(1, groups_), groups_); }
+
+void Voice::reset() noexcept {
+  std::fill(state_.begin(), state_.end(), ModeState{});
+  std::fill(damped_.begin(), damped_.end(), DampedState{});
+  live_ = 0;
+  damped_live_ = false;
+  fading_ = false;
+  pulses_.clear();
+  ++counters_.resets;
+}
+
+int Voice::get_live_mode_count() const {
+  return std::min(live_ * kGroup, model_->ringing_) + (damped_live_ ? static_cast<int>(damped_.size()) : 0);
+}
+
+double Voice::calc_energy_j() const noexcept {
+  double energy = 0.0;
+  for (int m = 0; m < std::min(live_ * kGroup, model_->ringing_); ++m) {
+    const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
+    const ModeState& state = state_[static_cast<std::size_t>(m / kGroup)];
+    const double omega = std::sqrt(mode.lambda);
+    const double q = state.im[m % kGroup] / std::sqrt((omega - mode.decay) * (omega + mode.decay));
+    const double v = state.re[m % kGroup] - mode.decay * q;
+    energy += 0.5 * (v * v + mode.lambda * q * q);
+  }
+  for (std::size_t i = 0; i < damped_.size(); ++i) {
+    const double lambda = model_->modes_[static_cast<std::size_t>(model_->ringing_) + i].lambda;
+    energy += 0.5 * (damped_[i].v * damped_[i].v + lambda * damped_[i].q * damped_[i].q);
+  }
+  return energy;
+}
+
+}  // namespace carillon::synth

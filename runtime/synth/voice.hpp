@@ -1,0 +1,113 @@
+// One body that rings: its modes, struck by contact pulses, summed to the pressure at 1 m.
+//
+//   synth::Voice voice(synth::Model::make(bank, {.rate_hz = 48000.0}));
+//   voice.strike({.time_s = 0.0021, .triangle = 12, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0, 0, 0.01}, .duration_s = 80e-6});
+//   voice.process(block);  // adds pascals
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/stream/events.hpp"
+#include "runtime/synth/kernels.hpp"
+#include "runtime/synth/model.hpp"
+#include "runtime/synth/pulse.hpp"
+
+namespace carillon::synth {
+
+struct VoiceOptions {
+  int max_strikes = 256;      // pulses that may be waiting or acting at once
+  double silence_pa = 1e-10;  // below this bound on its pressure at 1 m (-106 dB re 20 uPa) a body sleeps
+  Isa isa = Isa::kBest;
+};
+
+struct VoiceCounters {
+  std::int64_t accepted = 0;      // strikes taken
+  std::int64_t refused = 0;       // not finite, outside the surface, or no room
+  std::int64_t late = 0;          // began before the horizon and were moved there
+  std::int64_t resets = 0;        // times that the state was not finite and was cleared
+  std::int64_t mode_samples = 0;  // work done: modes x samples, whole groups
+};
+
+/// All modes of a model below the Nyquist frequency. Time runs on a grid of kQuantum samples from the first one: what is decided is decided
+/// on the grid, so that the same strikes give the same bits whatever the sizes of the blocks. Memory is taken in the constructor only.
+/// One thread at a time.
+class Voice {
+ public:
+  /// Throws InputError when the silence is not a positive number.
+  explicit Voice(std::shared_ptr<const Model> model, VoiceOptions options = {});
+
+  /// Registers a pulse. Times are since the first sample of this voice; `body` and `other` of the impulse are not looked at. False when it
+  /// was refused. [audio-thread]: no heap, no lock, no throw.
+  bool strike(const stream::Impulse& impulse) noexcept;
+
+  /// Adds the pressure at 1 m [Pa] of the next pressure_pa.size() samples. A body without energy costs nothing.
+  /// Denormal numbers are flushed to zero inside; the caller's setting is put back.
+  /// [audio-thread]: no heap, no lock, no throw.
+  void process(std::span<float> pressure_pa) noexcept;
+
+  /// Plays at most this many modes, rounded up to whole groups of kGroup and at least one, the most audible; from the next multiple of
+  /// kPeriod samples on. Those that it takes away fade out over kPeriod samples. [audio-thread]
+  void set_limit(int modes) noexcept;
+
+  /// Samples processed so far: the number of the next sample.
+  std::int64_t get_position() const { return horizon_ - held_; }
+  /// The first sample that a new strike can still reach: less than kQuantum samples ahead of the position unless blocks are whole quanta.
+  std::int64_t get_horizon() const { return horizon_; }
+  const Model& get_model() const { return *model_; }
+  /// Modes that are advanced at this moment, in whole groups.
+  int get_live_mode_count() const;
+  bool is_awake() const { return live_ > 0 || damped_live_; }
+  const VoiceCounters& get_counters() const { return counters_; }
+  /// Sum over the sounded modes of (q'^2 + lambda q^2) / 2 [J] at the horizon, which must be a multiple of kPeriod.
+  double calc_energy_j() const noexcept;
+
+ private:
+  /// A strike on its way.
+  struct Pulse {
+    double begin = 0.0, length = 0.0;  // of the time when its force is not zero, in samples
+    stream::PulseShape shape = stream::PulseShape::kHertz;
+    const std::int16_t* row[kStrikeRows];
+    float weight[kStrikeRows];
+  };
+  struct DampedState {
+    double q = 0.0, v = 0.0;
+  };
+
+  void render(int quanta) noexcept;
+  bool is_struck(std::int64_t sample) const noexcept;
+  void wake() noexcept;
+  void strike_quantum(std::int64_t sample, int quantum, float* out) noexcept;
+  void add_damped(std::int64_t sample, bool struck, float* out) noexcept;
+  void begin_period() noexcept;
+  void cull() noexcept;
+  void fade_to_limit() noexcept;
+  void reset() noexcept;
+
+  std::shared_ptr<const Model> model_;
+  const Kernels* kernels_ = nullptr;
+  double silence_pa_ = 0.0;
+  int groups_ = 0;  // of the model
+  int limit_ = 0;   // groups that may be played
+  int live_ = 0;    // groups that are; those behind have no energy
+  bool damped_live_ = false;
+  bool fading_ = false;       // fade_ holds what the limit took away in this period
+  std::int64_t horizon_ = 0;  // samples rendered
+  int held_ = 0;              // of them not yet handed out: the last of block_
+  int rendered_ = 0;          // samples in block_
+  bool silent_ = true;        // block_ is all zero
+  VoiceCounters counters_;
+
+  std::vector<ModeState> state_;  // zero beyond live_
+  std::vector<Starts> starts_;    // out of date beyond live_, and once a whole period was rendered
+  std::vector<DampedState> damped_;
+  std::vector<double> damped_amplitude_;
+  std::vector<Pulse> pulses_;  // capacity max_strikes, never grown
+  Touch touch_;
+  alignas(64) std::array<float, kPeriod> block_{}, fade_{};
+};
+
+}  // namespace carillon::synth

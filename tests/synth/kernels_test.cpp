@@ -1,0 +1,203 @@
+// Every instruction set against plain loops in double precision, for every count of modes around the widths of the vectors.
+#include "runtime/synth/kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstring>
+#include <random>
+#include <vector>
+
+namespace carillon::synth {
+namespace {
+
+using Complex = std::complex<double>;
+
+std::vector<Isa> list_isas() {
+  std::vector<Isa> isas;
+  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+    if (get_kernels(isa).isa == isa) isas.push_back(isa);
+  }
+  return isas;
+}
+
+/// `modes` modes with random numbers in every table; lanes beyond are zero, as the kernels' contract wants it.
+struct Invented {
+  std::vector<SoundTable> sound;
+  std::vector<TurnTable> turn;
+  std::vector<StrikeTable> strike;
+  std::vector<ModeState> state;
+  std::vector<Starts> starts;
+  std::vector<std::int16_t> rows;
+  Touch touch{};
+  int groups, modes;
+
+  explicit Invented(int count) : groups(std::max(1, (count + kGroup - 1) / kGroup)), modes(count) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+    const auto size = static_cast<std::size_t>(groups);
+    sound.resize(size), turn.resize(size), strike.resize(size), state.resize(size), starts.resize(size);
+    for (auto& table : sound) std::memset(&table, 0, sizeof(table));
+    for (auto& table : turn) std::memset(&table, 0, sizeof(table));
+    for (auto& table : strike) std::memset(&table, 0, sizeof(table));
+    for (auto& table : state) std::memset(&table, 0, sizeof(table));
+    rows.assign(static_cast<std::size_t>(kStrikeRows * groups * kGroup), 0);
+    for (int m = 0; m < modes; ++m) {
+      const std::size_t g = static_cast<std::size_t>(m / kGroup);
+      const int l = m % kGroup;
+      for (auto& part : sound[g].wave[l]) {
+        for (float& x : part) x = number(random);
+      }
+      turn[g].period_re[l] = number(random), turn[g].period_im[l] = number(random);
+      for (int q = 0; q < kQuanta - 1; ++q) turn[g].quanta_re[q][l] = number(random), turn[g].quanta_im[q][l] = number(random);
+      const float angle = number(random);
+      strike[g].turn_re[l] = std::cos(angle), strike[g].turn_im[l] = std::sin(angle);
+      strike[g].out_re[l] = number(random), strike[g].out_im[l] = number(random);
+      strike[g].scale[l] = 1e-4F * number(random);
+      for (int j = 0; j < kTerms; ++j) strike[g].force_re[j][l] = number(random), strike[g].force_im[j][l] = number(random);
+      state[g].re[l] = number(random), state[g].im[l] = number(random);
+      for (int r = 0; r < kStrikeRows; ++r) rows[row(r) + static_cast<std::size_t>(m)] = static_cast<std::int16_t>(32767 * number(random));
+    }
+    for (int r = 0; r < kStrikeRows; ++r) touch.row[r] = rows.data() + row(r), touch.weight[r] = number(random);
+    touch.first = 5, touch.last = 23;
+    for (auto& sample : touch.moment) {
+      for (float& x : sample) x = number(random);
+    }
+  }
+  std::size_t row(int r) const { return static_cast<std::size_t>(r * groups * kGroup); }
+};
+
+const std::array<int, 12> kCounts{0, 1, 2, 3, 4, 7, 8, 15, 16, 17, 33, 160};
+
+TEST(Kernels, TheBestIsOneThatThereIs) {
+  EXPECT_EQ(get_kernels(Isa::kBest).isa, find_best_isa());
+  EXPECT_EQ(list_isas().front(), Isa::kPlain);
+  EXPECT_EQ(list_isas().back(), find_best_isa());
+  EXPECT_STREQ(get_name(Isa::kAvx2), "avx2");
+}
+
+TEST(Kernels, AdvanceTurnsTheStateAndFillsTheStarts) {
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      Invented now(count);
+      const Invented before(count);
+      get_kernels(isa).advance(now.turn.data(), now.state.data(), now.starts.data(), now.groups);
+      for (int m = 0; m < now.groups * kGroup; ++m) {
+        const std::size_t g = static_cast<std::size_t>(m / kGroup);
+        const int l = m % kGroup;
+        const Complex z(before.state[g].re[l], before.state[g].im[l]);
+        const Complex turned = z * Complex(before.turn[g].period_re[l], before.turn[g].period_im[l]);
+        ASSERT_NEAR(now.state[g].re[l], turned.real(), 1e-15) << get_name(isa) << ", " << count << " modes";
+        ASSERT_NEAR(now.state[g].im[l], turned.imag(), 1e-15);
+        for (int q = 0; q < kQuanta; ++q) {
+          const Complex start = q == 0 ? z : z * Complex(before.turn[g].quanta_re[q - 1][l], before.turn[g].quanta_im[q - 1][l]);
+          ASSERT_NEAR(now.starts[g].re[q][l], start.real(), 3e-7);
+          ASSERT_NEAR(now.starts[g].im[q][l], start.imag(), 3e-7);
+        }
+      }
+    }
+  }
+}
+
+TEST(Kernels, EmitSumsTheSoundOfAllModes) {
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      Invented invented(count);
+      get_kernels(isa).advance(invented.turn.data(), invented.state.data(), invented.starts.data(), invented.groups);
+      for (int first = 0; first < kQuanta; ++first) {
+        for (int quanta = 1; first + quanta <= kQuanta; ++quanta) {
+          std::vector<float> out(static_cast<std::size_t>(kPeriod), 0.5F);
+          get_kernels(isa).emit(invented.sound.data(), invented.starts.data(), invented.groups, first, quanta, out.data());
+          for (int n = 0; n < kPeriod; ++n) {
+            double expected = 0.5, size = 1.0;
+            for (int m = 0; m < count && n < quanta * kQuantum; ++m) {
+              const std::size_t g = static_cast<std::size_t>(m / kGroup);
+              const int l = m % kGroup, q = first + n / kQuantum;
+              const double a = static_cast<double>(invented.starts[g].re[q][l]) * invented.sound[g].wave[l][0][n % kQuantum];
+              const double b = static_cast<double>(invented.starts[g].im[q][l]) * invented.sound[g].wave[l][1][n % kQuantum];
+              expected += a + b;
+              size += std::abs(a) + std::abs(b);
+            }
+            ASSERT_NEAR(out[static_cast<std::size_t>(n)], expected, 2e-6 * size) << get_name(isa) << ", " << count << " modes, " << quanta;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Kernels, HowAPeriodIsCutDoesNotChangeABit) {
+  for (const Isa isa : list_isas()) {
+    const Kernels& kernels = get_kernels(isa);
+    for (const int count : {16, 33, 160, 400}) {
+      Invented whole(count), cut(count);
+      std::vector<float> rung(kPeriod, 0.0F);
+      kernels.ring(whole.sound.data(), whole.turn.data(), whole.state.data(), whole.groups, rung.data());
+      kernels.advance(cut.turn.data(), cut.state.data(), cut.starts.data(), cut.groups);
+      for (const std::vector<int>& pieces : {std::vector<int>{4}, {1, 1, 1, 1}, {2, 2}, {3, 1}, {1, 3}, {1, 2, 1}}) {
+        std::vector<float> out(kPeriod, 0.0F);
+        int first = 0;
+        for (const int quanta : pieces) {
+          kernels.emit(cut.sound.data(), cut.starts.data(), cut.groups, first, quanta, out.data() + first * kQuantum);
+          first += quanta;
+        }
+        ASSERT_EQ(std::memcmp(out.data(), rung.data(), sizeof(float) * kPeriod), 0) << get_name(isa) << ", " << count << " modes";
+      }
+      ASSERT_EQ(std::memcmp(whole.state.data(), cut.state.data(), sizeof(ModeState) * whole.state.size()), 0);
+    }
+  }
+}
+
+TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      for (int quantum = 0; quantum < kQuanta; ++quantum) {
+        Invented now(count);
+        const Invented before(count);
+        std::vector<float> out(kQuantum, 0.25F);
+        get_kernels(isa).strike(now.strike.data(), now.turn.data(), now.touch, quantum, now.state.data(), now.starts.data(), now.groups,
+                                out.data());
+        std::vector<double> expected(kQuantum, 0.25);
+        double size = 1.0;
+        for (int m = 0; m < count; ++m) {
+          const std::size_t g = static_cast<std::size_t>(m / kGroup);
+          const int l = m % kGroup;
+          const StrikeTable& table = before.strike[g];
+          double amplitude = 0.0;
+          for (int r = 0; r < kStrikeRows; ++r) {
+            amplitude += static_cast<double>(before.touch.weight[r]) * before.rows[before.row(r) + static_cast<std::size_t>(m)];
+          }
+          amplitude *= table.scale[l];
+          const Complex turn(table.turn_re[l], table.turn_im[l]);
+          Complex x = 0.0;
+          for (int n = 0; n < kQuantum; ++n) {
+            x *= turn;
+            for (int j = 0; j < kTerms && n >= before.touch.first && n < before.touch.last; ++j) {
+              x += amplitude * before.touch.moment[n][j] * Complex(table.force_re[j][l], table.force_im[j][l]);
+            }
+            expected[static_cast<std::size_t>(n)] += table.out_re[l] * x.real() + table.out_im[l] * x.imag();
+            size += std::abs(x);
+          }
+          x *= turn;
+          for (int q = quantum + 1; q <= kQuanta; ++q) {
+            const int ahead = q - quantum - 1;
+            const Complex later =
+                ahead == 0 ? x : x * Complex(before.turn[g].quanta_re[ahead - 1][l], before.turn[g].quanta_im[ahead - 1][l]);
+            const double re = q < kQuanta ? now.starts[g].re[q][l] - before.starts[g].re[q][l] : now.state[g].re[l] - before.state[g].re[l];
+            const double im = q < kQuanta ? now.starts[g].im[q][l] - before.starts[g].im[q][l] : now.state[g].im[l] - before.state[g].im[l];
+            ASSERT_NEAR(re, later.real(), 2e-5 * (1.0 + std::abs(x))) << get_name(isa) << ", " << count << " modes, quantum " << quantum;
+            ASSERT_NEAR(im, later.imag(), 2e-5 * (1.0 + std::abs(x)));
+          }
+          for (int q = 0; q <= quantum; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
+        }
+        for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::synth

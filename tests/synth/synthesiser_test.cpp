@@ -1,0 +1,270 @@
+#include "runtime/synth/synthesiser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "runtime/config/error.hpp"
+#include "tests/synth/cube_bank.hpp"
+
+namespace carillon::synth {
+namespace {
+
+constexpr double kRate = 48000.0;
+
+std::shared_ptr<const Model> make_model(int modes, double decay_per_s = 20.0) {
+  std::vector<testing::InventedMode> invented;
+  for (int m = 0; m < modes; ++m) invented.push_back({200.0 + 173.0 * m, decay_per_s * (1.0 + 0.1 * m), 1.0, {0.3, 0.2, 1.0}, 0.1});
+  return Model::make(testing::make_cube_bank(invented), {.rate_hz = kRate});
+}
+
+using Channels = std::vector<std::vector<float>>;
+
+/// Plays `frames` frames in blocks that `next_block` gives; before each block everything of `events` that begins before the block's end and
+/// half a second more is pushed.
+template <typename NextBlock>
+Channels play(Synthesiser& synthesiser, const std::vector<stream::Event>& events, int frames, NextBlock&& next_block) {
+  const int channels = synthesiser.get_microphone_count();
+  Channels out(static_cast<std::size_t>(channels), std::vector<float>(static_cast<std::size_t>(frames), 99.0F));
+  std::size_t next = 0;
+  for (int done = 0; done < frames;) {
+    const int block = std::min(next_block(), frames - done);
+    while (next < events.size() && stream::get_time_s(events[next]) < (done + block) / kRate + 0.5) {
+      EXPECT_TRUE(synthesiser.push(events[next]));
+      ++next;
+    }
+    std::vector<float*> at;
+    for (auto& channel : out) at.push_back(channel.data() + done);
+    synthesiser.process(at.data(), channels, block);
+    done += block;
+  }
+  return out;
+}
+
+stream::Impulse make_impulse(int body, double time_s, double impulse_n_s = 1e-3) {
+  return {.time_s = time_s,
+          .body = body,
+          .triangle = 4,
+          .barycentric = {0.2, 0.3, 0.5},
+          .impulse_n_s = {0.0, 0.0, impulse_n_s},
+          .duration_s = 2e-4};
+}
+
+/// A hail of strikes on bodies that fly past.
+std::vector<stream::Event> make_hail(int bodies, double seconds) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::vector<stream::Event> events;
+  for (int b = 0; b < bodies; ++b) {
+    for (double t = 0.0; t < seconds; t += 0.01)
+      events.emplace_back(stream::Motion{t, b, {3.0 * std::cos(t + b), 2.0 + 0.1 * b, 1.0}, {-3.0 * std::sin(t + b), 0.0, 0.0}});
+    for (double t = 0.02 * unit(random); t < seconds; t += 0.05 * unit(random)) {
+      stream::Impulse impulse = make_impulse(b, t, 1e-3 * unit(random));
+      impulse.shape = unit(random) < 0.3 ? stream::PulseShape::kGaussian : stream::PulseShape::kHertz;
+      impulse.duration_s = unit(random) < 0.2 ? 0.0 : 5e-4 * unit(random);
+      events.emplace_back(impulse);
+    }
+  }
+  for (double t = 0.0; t < seconds; t += 0.02)
+    events.emplace_back(stream::Listener{.time_s = t, .position_m = {0.0, -t, 0.0}, .velocity_m_s = {0.0, -1.0, 0.0}});
+  std::stable_sort(events.begin(), events.end(),
+                   [](const auto& a, const auto& b) { return stream::get_time_s(a) < stream::get_time_s(b); });
+  return events;
+}
+
+Channels play_hail(int bodies, double seconds, const std::function<int()>& next_block) {
+  Synthesiser synthesiser({.rate_hz = kRate, .max_waypoints = 256});
+  for (int b = 0; b < bodies; ++b) synthesiser.add_body(make_model(20 + b), {.position_m = {3.0, 2.0, 1.0}});
+  return play(synthesiser, make_hail(bodies, seconds), static_cast<int>(seconds * kRate), next_block);
+}
+
+TEST(Synthesiser, GivesTheSameBitsInBlocksOfAnySize) {
+  constexpr double kSeconds = 1.0;
+  const Channels whole = play_hail(5, kSeconds, [] { return 4096; });
+  EXPECT_GT(*std::max_element(whole[0].begin(), whole[0].end()), 1e-4F);
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> any(1, 700);
+  for (const std::function<int()>& next : {std::function<int()>([] { return 1; }),
+                                           {[] { return 7; }},
+                                           {[] { return 31; }},
+                                           {[] { return 32; }},
+                                           {[] { return 33; }},
+                                           {[] { return 64; }},
+                                           {[] { return 127; }},
+                                           {[&] { return any(random); }}}) {
+    const Channels parts = play_hail(5, kSeconds, next);
+    for (std::size_t c = 0; c < whole.size(); ++c)
+      EXPECT_EQ(std::memcmp(whole[c].data(), parts[c].data(), whole[c].size() * sizeof(float)), 0);
+  }
+}
+
+// A body 343 m * k / 48000 away is heard k samples later, 1 / r as loud: what its voice alone plays, to the rounding of single precision
+// and the ripple of the sinc.
+TEST(Synthesiser, IsItsVoicesByWayOfTheAir) {
+  const auto model = make_model(30);
+  constexpr int kDelay = 280;
+  const double distance = kDelay * kSoundSpeedMs / kRate;
+  Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0.0, 0.0, 0.0}}});
+  const int body = synthesiser.add_body(model, {.position_m = {0.0, distance, 0.0}});
+  const stream::Impulse impulse = make_impulse(body, 0.003);
+  const Channels out = play(synthesiser, {impulse}, 20000, [] { return 480; });
+  Voice voice(model);
+  EXPECT_TRUE(voice.strike(impulse));
+  std::vector<float> alone(20000, 0.0F);
+  voice.process(alone);
+  const float peak = *std::max_element(alone.begin(), alone.end());
+  constexpr int kAll = kDelay + Synthesiser::kLatency;
+  for (int n = 0; n < kAll; ++n) EXPECT_NEAR(out[0][n], 0.0, 1e-6 * peak);
+  for (int n = kAll; n < 20000; ++n) ASSERT_NEAR(distance * out[0][n], alone[n - kAll], 2e-6 * peak) << n;
+}
+
+TEST(Synthesiser, AddsBodiesUpAndKeepsTimeForThoseThatComeLater) {
+  const auto model = make_model(12);
+  const auto play_one = [&](double time_s, int before) {
+    Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0.0, 0.0, 0.0}}});
+    std::vector<float> lead(static_cast<std::size_t>(before) + 1);
+    float* at = lead.data();
+    if (before > 0) synthesiser.process(&at, 1, before);
+    const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
+    EXPECT_TRUE(synthesiser.push(make_impulse(body, time_s)));
+    std::vector<float> out(9600);
+    at = out.data();
+    synthesiser.process(&at, 1, 9600);
+    return out;
+  };
+  const std::vector<float> now = play_one(0.02, 0);
+  const std::vector<float> later = play_one(0.02 + 1280 * 7 / kRate, 1280 * 7);
+  const float peak = *std::max_element(now.begin(), now.end());
+  EXPECT_GT(peak, 1e-6F);
+  for (std::size_t n = 0; n < now.size(); ++n) ASSERT_NEAR(now[n], later[n], 1e-6 * peak) << n;
+}
+
+TEST(Synthesiser, RemovedBodiesFallSilentAndTheirNumbersComeBack) {
+  Synthesiser synthesiser({.rate_hz = kRate, .max_bodies = 2});
+  const auto model = make_model(8, 0.5);
+  const int first = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
+  EXPECT_EQ(synthesiser.add_body(model), 1);
+  EXPECT_TRUE(synthesiser.is_full());
+  EXPECT_THROW(synthesiser.add_body(model), InputError);
+  Channels out = play(synthesiser, {make_impulse(first, 0.001)}, 4800, [] { return 100; });
+  EXPECT_GT(std::abs(out[0].back()) + std::abs(out[0][4700]), 0.0F);
+  synthesiser.remove_body(first);
+  EXPECT_THROW(synthesiser.remove_body(first), InputError);
+  out = play(synthesiser, {}, 4800, [] { return 100; });
+  for (std::size_t n = 128; n < out[0].size(); ++n) ASSERT_EQ(out[0][n], 0.0F);
+  EXPECT_FALSE(synthesiser.is_full());
+  EXPECT_EQ(synthesiser.add_body(model), first);
+  EXPECT_THROW(synthesiser.remove_body(7), InputError);
+}
+
+TEST(Synthesiser, CountsWhatItCannotPlay) {
+  Synthesiser synthesiser({.rate_hz = kRate, .ring_events = 4});
+  const int body = synthesiser.add_body(make_model(4));
+  EXPECT_TRUE(synthesiser.push(make_impulse(9, 0.0)));  // nobody's
+  stream::Impulse beside = make_impulse(body, 0.0);
+  beside.triangle = 1000;
+  EXPECT_TRUE(synthesiser.push(beside));
+  EXPECT_FALSE(synthesiser.push(stream::Mark{std::numeric_limits<double>::infinity()}));
+  EXPECT_TRUE(synthesiser.push(make_impulse(body, 0.01)));
+  EXPECT_TRUE(synthesiser.push(make_impulse(body, 0.01)));
+  EXPECT_FALSE(synthesiser.push(make_impulse(body, 0.01)));
+  play(synthesiser, {}, 4800, [] { return 64; });
+  EXPECT_TRUE(synthesiser.push(make_impulse(body, 0.02)));  // 0.08 s too late
+  play(synthesiser, {}, 256, [] { return 64; });
+  const SynthesiserCounters counters = synthesiser.get_counters();
+  EXPECT_EQ(counters.strikes, 3);
+  EXPECT_EQ(counters.refused, 2);
+  EXPECT_EQ(counters.late, 1);
+  EXPECT_EQ(counters.faults, 1);
+  EXPECT_EQ(counters.overflows, 1);
+  EXPECT_DOUBLE_EQ(synthesiser.get_time_s(), 5056 / kRate);
+  EXPECT_GE(synthesiser.get_horizon_s(), synthesiser.get_time_s());
+}
+
+TEST(Synthesiser, SleepingBodiesDoNoWork) {
+  Synthesiser synthesiser({.rate_hz = kRate});
+  const int body = synthesiser.add_body(make_model(16, 400.0), {.position_m = {0.0, 1.0, 0.0}});
+  play(synthesiser, {make_impulse(body, 0.001)}, 48000, [] { return 256; });
+  const std::int64_t before = synthesiser.get_counters().mode_samples;
+  EXPECT_GT(before, 0);
+  play(synthesiser, {}, 48000, [] { return 256; });
+  EXPECT_EQ(synthesiser.get_counters().mode_samples, before);
+}
+
+TEST(Synthesiser, FurtherChannelsAreSilentAndFewerAreEnough) {
+  Synthesiser synthesiser({.rate_hz = kRate});
+  const int body = synthesiser.add_body(make_model(4), {.position_m = {1.0, 1.0, 0.0}});
+  synthesiser.set_gain(2.0);
+  EXPECT_TRUE(synthesiser.push(make_impulse(body, 0.001)));
+  std::vector<std::vector<float>> out(3, std::vector<float>(2400, 5.0F));
+  std::vector<float*> at{out[0].data(), out[1].data(), out[2].data()};
+  synthesiser.process(at.data(), 3, 2400);
+  EXPECT_GT(*std::max_element(out[1].begin(), out[1].end()), 0.0F);
+  EXPECT_EQ(*std::max_element(out[2].begin(), out[2].end()), 0.0F);
+  synthesiser.process(at.data(), 1, 100);
+  synthesiser.process(at.data(), 0, 100);
+  EXPECT_DOUBLE_EQ(synthesiser.get_time_s(), 2600 / kRate);
+}
+
+TEST(Synthesiser, RefusesWhatMakesNoSense) {
+  EXPECT_THROW(Synthesiser({.rate_hz = 0.0}), InputError);
+  EXPECT_THROW(Synthesiser({.microphones_m = {}}), InputError);
+  EXPECT_THROW(Synthesiser({.microphones_m = {{0.0, std::nan(""), 0.0}}}), InputError);
+  EXPECT_THROW(Synthesiser({.max_bodies = 0}), InputError);
+  EXPECT_THROW(Synthesiser({.longest_m = -1.0}), InputError);
+  Synthesiser synthesiser({.rate_hz = 44100.0});
+  EXPECT_THROW(synthesiser.add_body(nullptr), InputError);
+  EXPECT_THROW(synthesiser.add_body(make_model(3)), InputError);  // for 48 kHz
+}
+
+// Other threads push and bodies come and go while it plays. (For a data race detector: what is heard is tested above.)
+TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
+  Synthesiser synthesiser({.rate_hz = kRate, .max_bodies = 8});
+  const auto model = make_model(16);
+  std::atomic<bool> stops{false};
+  std::vector<std::thread> pushers;
+  for (int p = 0; p < 3; ++p) {
+    pushers.emplace_back([&, p] {
+      for (int i = 0; !stops; ++i) {
+        synthesiser.push(make_impulse((p + i) % 8, synthesiser.get_horizon_s() + 1e-3));
+        synthesiser.push(stream::Motion{synthesiser.get_horizon_s(), i % 8, {1.0, 2.0, 0.01 * (i % 100)}, {}});
+        (void)synthesiser.get_counters();
+        std::this_thread::yield();
+      }
+    });
+  }
+  std::thread audio([&] {
+    std::vector<float> left(64), right(64);
+    std::array<float*, 2> out{left.data(), right.data()};
+    // Until enough was heard of all the others.
+    for (int block = 0; block < 1000000 && (block < 2000 || synthesiser.get_counters().strikes < 300); ++block) {
+      synthesiser.process(out.data(), 2, 64);
+      for (const float x : left) ASSERT_TRUE(std::isfinite(x));
+      std::this_thread::yield();
+    }
+    stops = true;
+  });
+  std::vector<int> bodies;
+  while (!stops) {
+    if (!synthesiser.is_full()) bodies.push_back(synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}}));
+    if (bodies.size() > 4) {
+      synthesiser.remove_body(bodies.front());
+      bodies.erase(bodies.begin());
+    }
+    std::this_thread::yield();
+  }
+  audio.join();
+  for (std::thread& pusher : pushers) pusher.join();
+  EXPECT_GE(synthesiser.get_counters().strikes, 300);
+}
+
+}  // namespace
+}  // namespace carillon::synth
