@@ -1,5 +1,5 @@
-// Method: one Simbody free joint per moving body, uniform gravity, a custom force for resting contacts; Runge-Kutta-Merson between the
-// instants at
+// Method: what touches nothing flies by itself. Else one Simbody free joint per moving body, uniform gravity, a custom force for resting
+// contacts; Runge-Kutta-Merson between the instants at
 //   which the caller changes something.
 // Source: M. Sherman, A. Seth, S. Delp, "Simbody: multibody dynamics for biomedical research", Procedia IUTAM 2 (2011).
 // Deviations: Simbody's compliant contact subsystem is not used: it gives one force for a pair of meshes, its restitution depends on the
@@ -18,6 +18,7 @@
 namespace carillon::contact {
 namespace {
 
+using SimTK::dot;
 using SimTK::MobilizedBody;
 using SimTK::SpatialVec;
 using SimTK::State;
@@ -28,6 +29,7 @@ constexpr double kSink = 2e-5;         // m; how far a resting body sinks into i
 constexpr double kRolling = 2e-3;      // rolling resistance arm over the size of the smaller body; hard bodies on hard floors: 1e-3 to 5e-3
 constexpr double kLongestStep = 2e-3;  // s
 constexpr double kContactStep = 5e-4;  // s; while something in touch moves by more than kContactDepth
+constexpr double kTurn = 0.02;         // rad; of one Runge-Kutta step of a flight, which is then right to 1e-10 of it
 constexpr double kContactDepth = 5e-6;  // m
 
 Point to_vec(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
@@ -45,39 +47,37 @@ std::string list_names(const WorldModel& world) {
   return names;
 }
 
-Engine::Engine(const WorldModel& world) : world_(world), matter_(system_), forces_(system_) {
+Engine::Engine(const WorldModel& world, SurfaceSet& surfaces, double time_s) : world_(world), matter_(system_), forces_(system_) {
   SimTK::Force::UniformGravity(forces_, matter_, to_vec(world.gravity_m_s2));
   resting_ = new RestingForce(matter_);
   SimTK::Force::Custom(forces_, resting_);
-  for (const BodyModel& body : world.bodies) add_body(body);
+  for (const BodyModel& body : world.bodies) add_body(body, surfaces);
   system_.realizeTopology();
-  initial_ = system_.getDefaultState();
+  state_ = system_.getDefaultState();
+  initial_.time_s = time_s;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    if (is_fixed(static_cast<int>(i))) continue;
     const BodyModel& body = world.bodies[i];
-    const MobilizedBody& m = matter_.getMobilizedBody(bodies_[i].mobilized);
-    const Transform pose = make_pose(body.initial);
-    const Point spin = to_vec(body.angular_velocity_rad_s);
-    m.setQToFitTransform(initial_, pose);
-    system_.realize(initial_, SimTK::Stage::Position);
-    m.setUToFitVelocity(initial_, SpatialVec(spin, to_vec(body.velocity_m_s) - spin % (pose.R() * to_vec(body.centre_m))));
+    initial_.poses.push_back(make_pose(body.initial));
+    initial_.mobiles.push_back(
+        make_mobile(static_cast<int>(i), initial_.poses[i], to_vec(body.velocity_m_s), to_vec(body.angular_velocity_rad_s)));
   }
-  check_overlaps();
   integrator_ = std::make_unique<SimTK::RungeKuttaMersonIntegrator>(system_);
   integrator_->setAccuracy(1e-5);
 }
 
-void Engine::add_body(const BodyModel& body) {
+void Engine::add_body(const BodyModel& body, SurfaceSet& surfaces) {
   Body made;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    if (world_.bodies[i].vertices_m == body.vertices_m) made.surface = bodies_[i].surface;
-  }
-  if (!made.surface) made.surface = std::make_shared<Surface>(*body.vertices_m, *body.triangles, body.name);
+  std::shared_ptr<const Surface>& surface = surfaces[body.vertices_m];
+  if (!surface) surface = std::make_shared<Surface>(*body.vertices_m, *body.triangles, body.name);
+  made.surface = surface;
   if (body.fixed) {
-    made.frame = make_pose(body.initial);
+    made.frame = make_pose(body.initial);  // the mobilized body is Ground
   } else {
     const auto& i = body.inertia_kg_m2;
     try {
+      made.centre = to_vec(body.centre_m);
+      made.inertia = SimTK::Mat33(i[0], i[1], i[2], i[3], i[4], i[5], i[6], i[7], i[8]);
+      made.inverse_inertia = made.inertia.invert();
       const SimTK::Inertia about_centre(SimTK::SymMat33(i[0], i[3], i[4], i[6], i[7], i[8]));
       const Point centre = to_vec(body.centre_m);
       const SimTK::MassProperties mass(body.mass_kg, centre, about_centre.shiftFromMassCenter(centre, body.mass_kg));
@@ -90,7 +90,7 @@ void Engine::add_body(const BodyModel& body) {
 }
 
 void Engine::check_overlaps() const {
-  const Snapshot now = calc_snapshot(initial_);
+  const Snapshot& now = initial_;
   const int count = static_cast<int>(bodies_.size());
   const auto allowed_m = [&](int body) { return std::min(2e-4, 5e-3 * surface(body).size_m()); };
   for (int a = 0; a < count; ++a) {
@@ -117,40 +117,15 @@ void Engine::check_overlaps() const {
   }
 }
 
-Snapshot Engine::calc_snapshot(const State& state) const {
-  system_.realize(state, SimTK::Stage::Velocity);  // a copied State has lost its caches
-  Snapshot now;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const MobilizedBody& m = matter_.getMobilizedBody(bodies_[i].mobilized);
-    Mobile mobile;
-    if (world_.bodies[i].fixed) {
-      now.poses.push_back(bodies_[i].frame);
-    } else {
-      const BodyModel& r = world_.bodies[i];
-      const auto& j = r.inertia_kg_m2;
-      const Transform X = m.getBodyTransform(state);
-      const SimTK::Mat33 inertia(j[0], j[1], j[2], j[3], j[4], j[5], j[6], j[7], j[8]);
-      mobile.inverse_mass = 1.0 / r.mass_kg;
-      mobile.inverse_inertia = X.R().asMat33() * inertia.invert() * ~X.R().asMat33();
-      mobile.centre = X * to_vec(r.centre_m);
-      mobile.velocity = m.findStationVelocityInGround(state, to_vec(r.centre_m));
-      mobile.spin = m.getBodyAngularVelocity(state);
-      now.poses.push_back(X);
-    }
-    now.mobiles.push_back(mobile);
-  }
-  return now;
-}
-
-void Engine::set_velocities(State& state, const std::vector<Mobile>& mobiles) const {
-  const Snapshot now = calc_snapshot(state);  // before the first change, which takes the caches away
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    if (world_.bodies[i].fixed) continue;
-    const Point to_origin = now.poses[i].p() - mobiles[i].centre;
-    system_.realize(state, SimTK::Stage::Position);
-    matter_.getMobilizedBody(bodies_[i].mobilized)
-        .setUToFitVelocity(state, SpatialVec(mobiles[i].spin, mobiles[i].velocity + mobiles[i].spin % to_origin));
-  }
+Mobile Engine::make_mobile(int body, const Transform& pose, const Point& velocity, const Point& spin) const {
+  Mobile mobile;
+  if (is_fixed(body)) return mobile;
+  mobile.inverse_mass = 1.0 / world_.bodies[body].mass_kg;
+  mobile.inverse_inertia = pose.R().asMat33() * bodies_[body].inverse_inertia * ~pose.R().asMat33();
+  mobile.centre = pose * bodies_[body].centre;
+  mobile.velocity = velocity;
+  mobile.spin = spin;
+  return mobile;
 }
 
 std::vector<TouchPoint> Engine::find_touches(const std::vector<Transform>& poses) const {
@@ -194,24 +169,89 @@ void Engine::set_resting(const std::vector<TouchPoint>& touches) {
   resting_->set_points(std::move(points));
 }
 
-State Engine::calc_advanced(const State& state, double step_s) {
+std::vector<PushedPoint> Engine::calc_pushes(const Snapshot& now) const {
+  std::vector<PushedPoint> pushed;
+  for (const RestingPoint& p : resting_->points()) {
+    TouchPoint t = p.touch;
+    place_touch(t, now.poses[t.a], t.b >= 0 ? now.poses[t.b] : Transform());
+    const double push = calc_push(p, t.depth_m, dot(calc_relative_velocity(now.mobiles, make_impact_point(t)), t.normal));
+    if (push > 0.0) pushed.push_back({t, push});
+  }
+  return pushed;
+}
+
+/// Free flight: a parabola, and a rotation of constant angular momentum L, q' = 1/2 (I(q)^-1 L) q, by the classical Runge-Kutta method.
+Snapshot Engine::calc_flown(const Snapshot& from, double step_s) const {
+  Snapshot to = from;
+  to.time_s += step_s;
+  const Point g = to_vec(world_.gravity_m_s2);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (world_.bodies[i].fixed) continue;
+    const Body& body = bodies_[i];
+    const Mobile& m = from.mobiles[i];
+    const Transform& X = from.poses[i];
+    const Point momentum = X.R() * (body.inertia * (~X.R() * m.spin));
+    const auto calc_spin = [&](const SimTK::Rotation& R) -> Point { return R * (body.inverse_inertia * (~R * momentum)); };
+    const auto calc_rate = [&](const SimTK::Vec4& q) -> SimTK::Vec4 {
+      const Point w = calc_spin(SimTK::Rotation(SimTK::Quaternion(q)));
+      const Point u(q[1], q[2], q[3]);
+      const Point v = q[0] * w + w % u;
+      return 0.5 * SimTK::Vec4(-dot(w, u), v[0], v[1], v[2]);
+    };
+    SimTK::Vec4 q = X.R().convertRotationToQuaternion().asVec4();
+    const int parts = std::max(1, static_cast<int>(std::ceil(std::min(m.spin.norm() * step_s / kTurn, 1e6))));
+    const double h = step_s / parts;
+    for (int part = 0; part < parts; ++part) {
+      const SimTK::Vec4 k1 = calc_rate(q), k2 = calc_rate(q + 0.5 * h * k1), k3 = calc_rate(q + 0.5 * h * k2), k4 = calc_rate(q + h * k3);
+      q += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    }
+    const SimTK::Rotation R{SimTK::Quaternion(q)};  // normalises
+    const Point centre = m.centre + step_s * m.velocity + 0.5 * step_s * step_s * g;
+    to.poses[i] = Transform(R, centre - R * body.centre);
+    to.mobiles[i] = make_mobile(static_cast<int>(i), to.poses[i], m.velocity + step_s * g, calc_spin(R));
+  }
+  return to;
+}
+
+Snapshot Engine::calc_advanced(const Snapshot& from, double step_s) {
+  if (resting_->is_idle()) return calc_flown(from, step_s);
   try {
     // A fresh start: the forces may have been changed since the last step, and Simbody keeps the derivative of the state it ended with.
-    State from = state;
-    from.invalidateAllCacheAtOrAbove(SimTK::Stage::Dynamics);
-    const double end = from.getTime() + step_s;
+    state_.invalidateAllCacheAtOrAbove(SimTK::Stage::Dynamics);
+    state_.setTime(from.time_s);
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      if (!world_.bodies[i].fixed) matter_.getMobilizedBody(bodies_[i].mobilized).setQToFitTransform(state_, from.poses[i]);
+    }
+    system_.realize(state_, SimTK::Stage::Position);
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      if (world_.bodies[i].fixed) continue;
+      const Mobile& m = from.mobiles[i];
+      matter_.getMobilizedBody(bodies_[i].mobilized)
+          .setUToFitVelocity(state_, SpatialVec(m.spin, m.velocity + m.spin % (from.poses[i].p() - m.centre)));
+    }
+    const double end = from.time_s + step_s;
     integrator_->setFinalTime(-1);  // none
-    integrator_->initialize(from);
+    integrator_->initialize(state_);
     integrator_->setInitialStepSize(step_s);
     while (integrator_->getTime() < end) {
       if (integrator_->stepTo(end, end) == SimTK::Integrator::EndOfSimulation) break;
     }
-    State to = integrator_->getState();
-    if (!std::isfinite(to.getY().normSqr())) throw SolveError(fmt::format("the motion is not finite after {:.6f} s", to.getTime()));
+    const State& reached = integrator_->getState();
+    if (!std::isfinite(reached.getY().normSqr()))
+      throw SolveError(fmt::format("the motion is not finite after {:.6f} s", reached.getTime()));
+    system_.realize(reached, SimTK::Stage::Velocity);
+    Snapshot to = from;
+    to.time_s = reached.getTime();
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      if (world_.bodies[i].fixed) continue;
+      const MobilizedBody& m = matter_.getMobilizedBody(bodies_[i].mobilized);
+      to.poses[i] = m.getBodyTransform(reached);
+      to.mobiles[i] = make_mobile(static_cast<int>(i), to.poses[i], m.findStationVelocityInGround(reached, bodies_[i].centre),
+                                  m.getBodyAngularVelocity(reached));
+    }
     return to;
   } catch (const SimTK::Exception::Base& e) {
-    throw SolveError(
-        fmt::format("Simbody cannot integrate the motion of {} at {:.6f} s: {}", list_names(world_), state.getTime(), e.what()));
+    throw SolveError(fmt::format("Simbody cannot integrate the motion of {} at {:.6f} s: {}", list_names(world_), from.time_s, e.what()));
   }
 }
 
@@ -242,6 +282,12 @@ ImpactPoint Engine::make_impact_point(const TouchPoint& t) const {
 double Engine::spot_radius_m(int a, int b) const {
   const double size = b >= 0 ? std::min(surface(a).size_m(), surface(b).size_m()) : surface(a).size_m();
   return 0.1 * size;
+}
+
+Solid Engine::find_solid(int body) const {
+  if (body < 0) return {world_.ground->young_modulus_pa, world_.ground->poisson_ratio, world_.ground->density_kg_m3};
+  const BodyModel& m = world_.bodies[body];
+  return {m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3};
 }
 
 Elastic Engine::make_elastic(int body, const Transform& pose, const Point& where, const Point& outward) const {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@ struct BodyModel {
   std::array<double, 9> inertia_kg_m2{};
   double young_modulus_pa = 0.0;
   double poisson_ratio = 0.0;
+  double density_kg_m3 = 0.0;
   double restitution = 0.0;
   double friction = 0.0;
 };
@@ -34,6 +36,7 @@ struct GroundModel {
   double height_m = 0.0;
   double young_modulus_pa = 0.0;
   double poisson_ratio = 0.0;
+  double density_kg_m3 = 0.0;
   double restitution = 0.0;
   double friction = 0.0;
 };
@@ -44,7 +47,20 @@ struct WorldModel {
   std::array<double, 3> gravity_m_s2{};
 };
 
-/// Runs a checked world. Throws as simulate() does.
-Simulation run_simulation(const WorldModel& world, double duration_s, const std::function<void(double fraction)>& progress);
+/// The bodies of a checked world on their way, island by island. All of it [main-thread].
+class Runner {
+ public:
+  /// Throws InputError as World does.
+  Runner(WorldModel world, const WorldOptions& options);
+  ~Runner();
+
+  /// As World::advance.
+  double advance(double until_s, double cpu_s, const std::function<void(const stream::Event&)>& sink);
+  Statistics get_statistics() const;
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
 
 }  // namespace carillon::contact

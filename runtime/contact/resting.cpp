@@ -17,6 +17,11 @@ constexpr double kSlowSpin = 0.05;   // rad/s; below this the rolling resistance
 
 }  // namespace
 
+double calc_push(const RestingPoint& p, double depth_m, double parting_m_s) {
+  if (depth_m <= 0.0) return 0.0;
+  return std::max(0.0, p.stiffness_n_m * depth_m - p.damping_n_s_m * parting_m_s * std::min(1.0, depth_m / kFullDepth));
+}
+
 void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::SpatialVec>& body_forces, SimTK::Vector_<SimTK::Vec3>&,
                              SimTK::Vector&) const {
   using SimTK::dot;
@@ -31,7 +36,7 @@ void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::Sp
     const Vec3 in_a = ~a.getBodyTransform(state) * t.where, in_b = ~b.getBodyTransform(state) * t.where;
     const Vec3 u = a.findStationVelocityInGround(state, in_a) - b.findStationVelocityInGround(state, in_b);
     const double un = dot(u, t.normal);
-    const double push = p.stiffness_n_m * t.depth_m - p.damping_n_s_m * un * std::min(1.0, t.depth_m / kFullDepth);
+    const double push = calc_push(p, t.depth_m, un);
     if (push <= 0.0) continue;
     const Vec3 slide = u - un * t.normal;
     const Vec3 force = push * t.normal - (p.friction * push / std::max(slide.norm(), kCreep)) * slide;

@@ -21,6 +21,9 @@ struct RestingPoint {
   double rolling_arm_m = 0.0;  // rolling resistance: moment per normal force
 };
 
+/// How hard the point pushes [N] at that depth [m] when the bodies part at that speed [m/s] along its normal.
+double calc_push(const RestingPoint& point, double depth_m, double parting_m_s);
+
 /// Simbody force element: spring, damper and regularised Coulomb friction and rolling resistance at a list of points that is changed only
 /// between steps.
 class RestingForce : public SimTK::Force::Custom::Implementation {
@@ -28,6 +31,8 @@ class RestingForce : public SimTK::Force::Custom::Implementation {
   explicit RestingForce(const SimTK::SimbodyMatterSubsystem& matter) : matter_(matter) {}
 
   void set_points(std::vector<RestingPoint> points) { points_ = std::move(points); }
+  const std::vector<RestingPoint>& points() const { return points_; }
+  bool is_idle() const { return points_.empty(); }
   bool dependsOnlyOnPositions() const override { return false; }
   void calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::SpatialVec>& body_forces, SimTK::Vector_<SimTK::Vec3>& particle_forces,
                  SimTK::Vector& mobility_forces) const override;

@@ -44,11 +44,16 @@ bool carries(const Surface& surface, int v, const Vec3& normal) {
   return true;
 }
 
-/// The faces of both meshes whose leaves cut each other or are within the margin.
-void find_near_faces(const Node& a, const Node& b, const Transform& X_ba, double margin_m, std::set<int>& faces_a, std::set<int>& faces_b) {
+/// Do the boxes of two nodes come within the margin of each other?
+bool are_boxes_near(const Node& a, const Node& b, const Transform& X_ba, double margin_m) {
   const Transform X_box = X_ba * a.getBounds().getTransform();  // of a corner of the box
   const SimTK::OrientedBoundingBox box(Transform(X_box.R(), X_box * Vec3(-margin_m)), a.getBounds().getSize() + Vec3(2 * margin_m));
-  if (!box.intersectsBox(b.getBounds())) return;
+  return box.intersectsBox(b.getBounds());
+}
+
+/// The faces of both meshes whose leaves cut each other or are within the margin.
+void find_near_faces(const Node& a, const Node& b, const Transform& X_ba, double margin_m, std::set<int>& faces_a, std::set<int>& faces_b) {
+  if (!are_boxes_near(a, b, X_ba, margin_m)) return;
   if (a.isLeafNode() && b.isLeafNode()) {
     for (const int f : a.getTriangles()) faces_a.insert(f);
     for (const int f : b.getTriangles()) faces_b.insert(f);
@@ -214,7 +219,7 @@ std::vector<TouchPoint> find_ground_touches(int a, const Surface& surface, const
   if ((X_a * surface.middle_m())[2] - surface.radius_m() > height_m) return out;
   // Simbody's half space fills x > 0 of its own frame, so its x axis points down.
   static const SimTK::ContactTracker::HalfSpaceTriangleMesh tracker;
-  const SimTK::ContactGeometry::HalfSpace half_space;
+  static const SimTK::ContactGeometry::HalfSpace half_space;
   const SimTK::UntrackedContact prior(SimTK::ContactSurfaceIndex(0), SimTK::ContactSurfaceIndex(1));
   const Transform X_half(SimTK::Rotation(SimTK::Pi / 2, SimTK::YAxis), Vec3(0, 0, height_m));
   SimTK::Contact found;
@@ -258,6 +263,12 @@ std::vector<TouchPoint> find_touches(int a, const Surface& sa, const Transform& 
   add_ridge_touches(base, sa, sb, X_ba, faces_a, faces_b, out);
   for (TouchPoint& t : out) place_touch(t, X_a, X_b);
   return out;
+}
+
+bool may_be_near(const Surface& sa, const Transform& X_a, const Surface& sb, const Transform& X_b, double margin_m) {
+  const double reach = sa.radius_m() + sb.radius_m() + margin_m;
+  if ((X_a * sa.middle_m() - X_b * sb.middle_m()).normSqr() > reach * reach) return false;
+  return are_boxes_near(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), ~X_b * X_a, margin_m);
 }
 
 double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, const Transform& X_b, Vec3& where) {

@@ -43,6 +43,10 @@ struct NearFaces {
 std::vector<TouchPoint> find_touches(int a, const Surface& surface_a, const SimTK::Transform& X_a, int b, const Surface& surface_b,
                                      const SimTK::Transform& X_b, NearFaces& near);
 
+/// May the two surfaces come as near as `margin_m` to each other? By balls and boxes about them: true is a guess, false is sure.
+bool may_be_near(const Surface& surface_a, const SimTK::Transform& X_a, const Surface& surface_b, const SimTK::Transform& X_b,
+                 double margin_m);
+
 /// How deep the two surfaces are in each other, whatever the features [m]; 0 when they are apart. `where` gets the deepest point (world).
 double calc_overlap(const Surface& surface_a, const SimTK::Transform& X_a, const Surface& surface_b, const SimTK::Transform& X_b,
                     SimTK::Vec3& where);

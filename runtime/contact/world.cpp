@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <variant>
 
 #include "runtime/config/error.hpp"
 #include "runtime/contact/model.hpp"
@@ -81,30 +84,97 @@ BodyModel make_body(const BodySpec& b) {
   m.inertia_kg_m2 = b.bank->rigid.inertia_kg_m2;
   m.young_modulus_pa = b.bank->material.young_modulus_pa;
   m.poisson_ratio = b.bank->material.poisson_ratio;
+  m.density_kg_m3 = b.bank->material.density_kg_m3;
   m.restitution = b.restitution;
   m.friction = b.friction;
   return m;
 }
 
-}  // namespace
-
-Simulation simulate(const WorldSpec& spec, double duration_s, const std::function<void(double)>& progress) {
-  if (!(duration_s >= 0.0 && std::isfinite(duration_s)))
-    throw InputError(fmt::format("the duration {} s must be a finite number, 0 or more", duration_s));
+WorldModel make_model(const WorldSpec& spec) {
   if (!is_finite(spec.gravity_m_s2)) throw InputError("gravity must be three finite numbers");
   WorldModel world;
   world.gravity_m_s2 = spec.gravity_m_s2;
   if (spec.ground) {
     const GroundSpec& g = *spec.ground;
     if (!std::isfinite(g.height_m)) throw InputError("ground: the height must be a finite number");
+    if (!(g.density_kg_m3 > 0.0 && std::isfinite(g.density_kg_m3))) throw InputError("ground: the density must be a finite number above 0");
     check_contact_numbers("ground", g.restitution, g.friction, g.young_modulus_pa, g.poisson_ratio);
-    world.ground = GroundModel{g.height_m, g.young_modulus_pa, g.poisson_ratio, g.restitution, g.friction};
+    world.ground = GroundModel{g.height_m, g.young_modulus_pa, g.poisson_ratio, g.density_kg_m3, g.restitution, g.friction};
   }
   for (const BodySpec& body : spec.bodies) {
     check_body(body);
     world.bodies.push_back(make_body(body));
   }
-  return run_simulation(world, duration_s, progress);
+  return world;
+}
+
+/// Position of the mesh frame from that of the centre of mass: x - R(q) c.
+Pose make_pose(const stream::Motion& motion, const Vec3& c) {
+  const auto& q = motion.rotation;
+  const Vec3 u{q[1], q[2], q[3]};
+  const auto cross = [](const Vec3& a, const Vec3& b) {
+    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  };
+  const Vec3 t = cross(u, c), s = cross(u, t);
+  Pose pose{motion.time_s, motion.position_m, q};
+  for (std::size_t k = 0; k < 3; ++k) pose.position_m[k] -= c[k] + 2.0 * (q[0] * t[k] + s[k]);
+  return pose;
+}
+
+}  // namespace
+
+World::World(const WorldSpec& spec, const WorldOptions& options) {
+  if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end of the world, {} s, must be a number, 0 or more", options.end_s));
+  runner_ = std::make_unique<Runner>(make_model(spec), options);
+}
+
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+double World::advance(double until_s, double cpu_s, const std::function<void(const stream::Event&)>& sink) {
+  return runner_->advance(until_s, cpu_s, sink);
+}
+
+Statistics World::get_statistics() const { return runner_->get_statistics(); }
+
+Simulation collect(const std::vector<stream::Event>& events, const std::vector<Vec3>& centres_m) {
+  Simulation all;
+  all.poses.resize(centres_m.size());
+  const auto is_known = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < centres_m.size(); };
+  for (const stream::Event& event : events) {
+    if (const auto* impulse = std::get_if<Impulse>(&event); impulse != nullptr && is_known(impulse->body)) {
+      all.impulses.push_back(*impulse);
+    } else if (const auto* motion = std::get_if<stream::Motion>(&event); motion != nullptr && is_known(motion->body)) {
+      const auto body = static_cast<std::size_t>(motion->body);
+      auto& path = all.poses[body];
+      if (!path.empty() && path.back().time_s >= motion->time_s) continue;  // after an impact it is where it was before
+      path.push_back(make_pose(*motion, centres_m[body]));
+    }
+  }
+  const auto earlier = [](const Impulse& x, const Impulse& y) { return x.time_s < y.time_s; };
+  std::stable_sort(all.impulses.begin(), all.impulses.end(), earlier);
+  return all;
+}
+
+Simulation simulate(const WorldSpec& spec, double duration_s, const std::function<void(double)>& progress) {
+  if (!(duration_s >= 0.0 && std::isfinite(duration_s)))
+    throw InputError(fmt::format("the duration {} s must be a finite number, 0 or more", duration_s));
+  World world(spec, {.end_s = duration_s, .lasting_contacts = false});
+  std::vector<stream::Event> events;
+  constexpr int kParts = 100;
+  for (int part = 1; part <= kParts; ++part) {
+    world.advance(duration_s * part / kParts, std::numeric_limits<double>::infinity(),
+                  [&](const stream::Event& event) { events.push_back(event); });
+    if (progress) progress(static_cast<double>(part) / kParts);
+  }
+  std::vector<Vec3> centres_m;
+  for (const BodySpec& body : spec.bodies) centres_m.push_back(body.bank->rigid.centre_m);
+  Simulation all = collect(events, centres_m);
+  const Statistics cost = world.get_statistics();
+  all.steps = cost.steps;
+  all.seconds_cpu = cost.seconds_cpu;
+  return all;
 }
 
 }  // namespace carillon::contact

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,10 +12,12 @@
 
 namespace carillon::contact {
 
+class Runner;
+
 /// One body. Its surface, rigid-body data and material come from its bank; `initial` places the frame of the bank's mesh in the world.
 struct BodySpec {
   std::string name;                  // for messages
-  const bank::Bank* bank = nullptr;  // not owned; must outlive simulate()
+  const bank::Bank* bank = nullptr;  // not owned; must outlive the world
   bool fixed = false;                // a shelf: does not move, yet is struck and sounds
   Pose initial;                      // time_s is not used; the quaternion is normalised here
   Vec3 velocity_m_s{};               // of the centre of mass, in the world
@@ -30,6 +33,7 @@ struct GroundSpec {
   double poisson_ratio = 0.2;
   double restitution = 0.5;
   double friction = 0.5;
+  double density_kg_m3 = 2400.0;
 };
 
 struct WorldSpec {
@@ -38,10 +42,39 @@ struct WorldSpec {
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
 };
 
+/// A world on its way. Bodies that cannot touch each other for the moment are integrated apart, each group with steps of its own
+/// (docs/decisions/islands.md). All of it [main-thread]: it allocates and throws.
+class World {
+ public:
+  /// Copies the spec; its banks must outlive the world. Throws InputError for a spec that cannot be simulated (the message names the body:
+  /// missing bank, bad number, a surface that is open or not a manifold, bodies that start inside each other).
+  explicit World(const WorldSpec& spec, const WorldOptions& options = {});
+  ~World();
+  World(World&&) noexcept;
+  World& operator=(World&&) noexcept;
+
+  /// Goes on until at least `until_s` [s], or until `cpu_s` seconds of CPU are spent, which is looked at after every step; at least one
+  /// step is made. Returns the time reached: it lies on a grid of 2 ms, or is the end of the world. Events come to `sink` grid interval by
+  /// grid interval, each in order of time and ended by a Mark: where all bodies are at 0; the impulses; the contacts that have lasted for
+  /// 5 ms, each at most every 1 ms and not while its bodies lie still; where the moving bodies are at every 2 ms, and right before and
+  /// right after every impact (two with one time); at the end, all again. A pulse may be centred up to half its duration beyond the Mark
+  /// that follows it. The same spec gives the same bits, in whatever slices of time and CPU it is asked for. Throws SolveError when the
+  /// integration breaks down.
+  double advance(double until_s, double cpu_s, const std::function<void(const stream::Event&)>& sink);
+
+  Statistics get_statistics() const;
+
+ private:
+  std::unique_ptr<Runner> runner_;
+};
+
+/// Puts the stream of a world together again. `centres_m[i]`: centre of mass of body i in the frame of its mesh; as many as there are
+/// bodies. Events of other bodies are left out.
+Simulation collect(const std::vector<stream::Event>& events, const std::vector<Vec3>& centres_m);
+
 /// Lets the world run from 0 to `duration_s` and returns every contact pulse and the path of every body.
 /// Two calls with the same spec give the same bits. `progress` (may be empty) is called now and then with the finished fraction, 0..1.
-/// Throws InputError for a spec that cannot be simulated (the message names the body: missing bank, bad number, a surface that is open or
-/// not a manifold, bodies that start inside each other), SolveError when the integration breaks down.
+/// Throws as World does.
 Simulation simulate(const WorldSpec& spec, double duration_s, const std::function<void(double fraction)>& progress = {});
 
 }  // namespace carillon::contact

@@ -7,24 +7,18 @@
 // sounds from
 //   rigid-body simulations" (2002), section 4, for what the sound needs of it.
 // Deviations: resting contact is a damped spring, not a train of micro-impacts, since those would be heard.
-#include <fmt/format.h>
+#include "runtime/contact/island.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <map>
-#include <optional>
 #include <tuple>
-
-#include "runtime/config/error.hpp"
-#include "runtime/contact/engine.hpp"
 
 namespace carillon::contact {
 namespace {
 
 using SimTK::dot;
-using SimTK::State;
 using SimTK::Transform;
 using Point = SimTK::Vec3;
 
@@ -35,61 +29,56 @@ constexpr double kTouchTime = 2e-7;   // s; the same in time
 constexpr double kRollingTime =
     10e-3;  // s; a body that rolls or slides over the corners of its own mesh hops from one to the next so fast ...
 constexpr double kRollingSpeed = 0.1;  // m/s; ... and lands on them slower than this: that is the mesh, not the body, and must not be heard
+constexpr double kStill = 2e-5;        // m/s; a hundredth of what friction lets creep: a group of bodies slower than this ...
+constexpr double kAsleepAfter = 0.05;  // s; ... for so long lies where it lies until another comes near
 constexpr double kSamePlace = 2e-4;    // m; a bouncing body comes back to the same place, a rolling one does not
-constexpr double kPoseInterval = 2e-3;  // s
-
-/// A point that was in contact a moment ago.
-struct OldPoint {
-  int a, b;
-  Point in_a;
-  double time_s;
-};
-
-struct Step {
-  State state;
-  bool impact = false;
-};
-
-class Simulator {
- public:
-  Simulator(const WorldModel& world, double duration_s) : engine_(world), duration_s_(duration_s), state_(engine_.initial_state()) {}
-
-  Simulation run(const std::function<void(double)>& progress);
-
- private:
-  void record_poses(bool fixed_as_well);
-  std::vector<OldPoint> find_old(const Snapshot& now, const std::vector<TouchPoint>& touches) const;
-  bool is_old(const TouchPoint& touch, const Snapshot& now, double approach) const;
-  void remember(const Snapshot& now, const std::vector<TouchPoint>& touches);
-  std::vector<TouchPoint> find_fresh(const Snapshot& now, double faster_than) const;
-  Step calc_step(double step_s);
-  void strike();
-  void emit(const std::vector<ImpactPoint>& points, const std::vector<TouchPoint>& touches, const Snapshot& before);
-  void emit_spot(const std::vector<const ImpactPoint*>& points, double touch_s, const Snapshot& before);
-
-  Engine engine_;
-  double duration_s_;
-  State state_;
-  std::vector<OldPoint> old_;     // in contact when the step began and not about to leave
-  std::vector<OldPoint> recent_;  // in contact within the last kRollingTime
-  Simulation result_;
-  int stuck_ = 0;  // impacts in a row with no time between them
-};
 
 double calc_approach(const Engine& engine, const Snapshot& now, const TouchPoint& touch) {
   return -dot(calc_relative_velocity(now.mobiles, engine.make_impact_point(touch)), touch.normal);
 }
 
-std::vector<OldPoint> Simulator::find_old(const Snapshot& now, const std::vector<TouchPoint>& touches) const {
+}  // namespace
+
+Island::Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces, double time_s, const std::vector<OldPoint>& recent,
+               const std::vector<Spot>& spots, const WorldOptions& options)
+    : world_(std::move(world)),
+      members_(std::move(members)),
+      engine_(world_, surfaces, time_s),
+      state_(engine_.initial()),
+      has_lasting_(options.lasting_contacts) {
+  still_since_s_ = time_s;
+  const auto find = [&](int body) {
+    const auto it = std::lower_bound(members_.begin(), members_.end(), body);
+    return it != members_.end() && *it == body ? static_cast<int>(it - members_.begin()) : -1;
+  };
+  const auto to_own = [&](std::int32_t body) { return body < 0 ? -1 : find(body); };
+  for (Spot spot : spots) {
+    const bool on_ground = spot.b < 0;
+    spot.a = find(spot.a);
+    spot.b = to_own(spot.b);
+    if (spot.a < 0 || (spot.b < 0 && !on_ground)) continue;
+    for (stream::Contact& c : spot.last) {
+      c.body = to_own(c.body);
+      c.other = to_own(c.other);
+    }
+    lasting_.spots().push_back(std::move(spot));
+  }
+  for (const OldPoint& o : recent) {
+    const int a = find(o.a), b = o.b < 0 ? -1 : find(o.b);
+    if (a >= 0 && (o.b < 0 || b >= 0)) recent_.push_back({a, b, o.in_a, o.time_s});
+  }
+}
+
+std::vector<OldPoint> Island::find_old(const Snapshot& now, const std::vector<TouchPoint>& touches) const {
   std::vector<OldPoint> old;
   for (const TouchPoint& t : touches) {
-    if (calc_approach(engine_, now, t) > -0.5 * kSlowest) old.push_back({t.a, t.b, ~now.poses[t.a] * t.where, state_.getTime()});
+    if (calc_approach(engine_, now, t) > -0.5 * kSlowest) old.push_back({t.a, t.b, ~now.poses[t.a] * t.where, state_.time_s});
   }
   return old;
 }
 
 /// Does the touch belong to a spot that is in contact anyway, or to a body that rolls?
-bool Simulator::is_old(const TouchPoint& t, const Snapshot& now, double approach) const {
+bool Island::is_old(const TouchPoint& t, const Snapshot& now, double approach) const {
   const Point in_a = ~now.poses[t.a] * t.where;
   const double near = engine_.spot_radius_m(t.a, t.b);
   const auto is_near = [&](const OldPoint& o) { return o.a == t.a && o.b == t.b && (o.in_a - in_a).norm() < near; };
@@ -105,15 +94,15 @@ bool Simulator::is_old(const TouchPoint& t, const Snapshot& now, double approach
   return rolls;
 }
 
-void Simulator::remember(const Snapshot& now, const std::vector<TouchPoint>& touches) {
-  const double time = state_.getTime();
+void Island::remember(const Snapshot& now, const std::vector<TouchPoint>& touches) {
+  const double time = state_.time_s;
   const auto stale = [&](const OldPoint& o) { return o.time_s < time - kRollingTime; };
   recent_.erase(std::remove_if(recent_.begin(), recent_.end(), stale), recent_.end());
   for (const TouchPoint& t : touches) recent_.push_back({t.a, t.b, ~now.poses[t.a] * t.where, time});
 }
 
 /// Touches that were not there when the step began and approach faster than that.
-std::vector<TouchPoint> Simulator::find_fresh(const Snapshot& now, double faster_than) const {
+std::vector<TouchPoint> Island::find_fresh(const Snapshot& now, double faster_than) const {
   std::vector<TouchPoint> fresh;
   for (const TouchPoint& t : engine_.find_touches(now.poses)) {
     const double approach = calc_approach(engine_, now, t);
@@ -124,14 +113,13 @@ std::vector<TouchPoint> Simulator::find_fresh(const Snapshot& now, double faster
 
 /// One step, or less when a fresh touch comes in between: then up to its first instant. It is an impact if it is fast even there (a body
 /// set down with no gap gains speed within the step).
-Step Simulator::calc_step(double step_s) {
+Island::Step Island::calc_step(double step_s) {
   double low = 0.0, high = SimTK::Infinity, step = step_s, creep = 2e-6;
   Step touch;
   for (int attempt = 0; attempt < 80 && high - low > kTouchTime; ++attempt) {
-    const State state = engine_.calc_advanced(state_, step);
-    ++result_.steps;
-    const Snapshot now = engine_.calc_snapshot(state);
-    const auto fresh = find_fresh(now, attempt == 0 ? kSlowest : 0.0);
+    const Snapshot state = engine_.calc_advanced(state_, step);
+    ++steps_;
+    const auto fresh = find_fresh(state, attempt == 0 ? kSlowest : 0.0);
     if (fresh.empty() && attempt == 0) return {state, false};
     if (fresh.empty()) {
       low = step;
@@ -141,7 +129,7 @@ Step Simulator::calc_step(double step_s) {
     }
     double deepest = 0.0, earlier = 0.0, fastest = 0.0;
     for (const TouchPoint& t : fresh) {
-      const double approach = calc_approach(engine_, now, t);
+      const double approach = calc_approach(engine_, state, t);
       deepest = std::max(deepest, t.depth_m);
       earlier = std::max(earlier, t.depth_m / approach);
       fastest = std::max(fastest, approach);
@@ -156,8 +144,8 @@ Step Simulator::calc_step(double step_s) {
 }
 
 /// Solves the impact at the present instant and notes its pulses.
-void Simulator::strike() {
-  const Snapshot now = engine_.calc_snapshot(state_);
+void Island::strike() {
+  const Snapshot now = state_;
   // Everything that touches or will within kTogether takes part.
   std::vector<Transform> soon = now.poses;
   for (std::size_t i = 0; i < soon.size(); ++i) {
@@ -181,14 +169,13 @@ void Simulator::strike() {
     if (is_old(touch, now, calc_approach(engine_, now, touch))) points.back().restitution = 0.0;
   }
   remember(now, touches);
-  Snapshot after = now;
-  solve_impact(after.mobiles, points, kSlowest);
-  engine_.set_velocities(state_, after.mobiles);
+  record();
+  solve_impact(state_.mobiles, points, kSlowest);
   emit(points, touches, now);
 }
 
 /// Gathers the points into spots, strongest first, and notes one pulse a spot and body.
-void Simulator::emit(const std::vector<ImpactPoint>& points, const std::vector<TouchPoint>& touches, const Snapshot& before) {
+void Island::emit(const std::vector<ImpactPoint>& points, const std::vector<TouchPoint>& touches, const Snapshot& before) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (dot(points[i].impulse, points[i].normal) > 0.0) order.push_back(i);
@@ -207,11 +194,11 @@ void Simulator::emit(const std::vector<ImpactPoint>& points, const std::vector<T
       const double wait = points[i].approach_m_s > kSlowest ? -touches[i].depth_m / points[i].approach_m_s : 0.0;
       wait_s = std::min(wait_s, wait);
     }
-    emit_spot(spot, state_.getTime() + std::clamp(wait_s, -kTogether, kTogether), before);
+    emit_spot(spot, state_.time_s + std::clamp(wait_s, -kTogether, kTogether), before);
   }
 }
 
-void Simulator::emit_spot(const std::vector<const ImpactPoint*>& points, double touch_s, const Snapshot& before) {
+void Island::emit_spot(const std::vector<const ImpactPoint*>& points, double touch_s, const Snapshot& before) {
   const ImpactPoint& first = *points.front();
   Point impulse(0), where(0), normal(0);
   double push = 0.0, approach = 0.0;
@@ -235,6 +222,7 @@ void Simulator::emit_spot(const std::vector<const ImpactPoint*>& points, double 
   if (first.b >= 0) largest_radius = std::min(largest_radius, 0.5 * engine_.surface(first.b).size_m());
   const Elastic elastic_a = engine_.make_elastic(first.a, before.poses[first.a], where, -normal);
   const Elastic elastic_b = engine_.make_elastic(first.b, first.b >= 0 ? before.poses[first.b] : Transform(), where, normal);
+  lasting_.note_impact(engine_, first.a, first.b, where, state_.time_s);
   Impulse pulse;
   pulse.duration_s = calc_hertz_duration(elastic_a, elastic_b, mass, speed, largest_radius);
   pulse.time_s = touch_s + 0.5 * pulse.duration_s;
@@ -247,77 +235,122 @@ void Simulator::emit_spot(const std::vector<const ImpactPoint*>& points, double 
     int face = 0;
     SimTK::Vec2 uv;
     engine_.surface(body).mesh().findNearestPoint(~pose * where, inside, face, uv);
-    pulse.body = body;
-    pulse.other = side == 0 ? first.b : first.a;
+    pulse.body = find_member(body);
+    pulse.other = find_member(side == 0 ? first.b : first.a);
     pulse.triangle = engine_.surface(body).bank_triangle(face);
     pulse.barycentric = {uv[0], uv[1], 1.0 - uv[0] - uv[1]};
     pulse.impulse_n_s = {on_body[0], on_body[1], on_body[2]};
-    result_.impulses.push_back(pulse);
+    events_.push_back(pulse);
   }
 }
 
-void Simulator::record_poses(bool fixed_as_well) {
-  const double now_s = state_.getTime();
-  const Snapshot now = engine_.calc_snapshot(state_);
-  for (std::size_t i = 0; i < now.poses.size(); ++i) {
-    auto& path = result_.poses[i];
-    if (engine_.is_fixed(static_cast<int>(i)) && !fixed_as_well) continue;
-    if (!path.empty() && path.back().time_s == now_s) continue;
-    const auto q = now.poses[i].R().convertRotationToQuaternion();
-    const Point& p = now.poses[i].p();
-    path.push_back({now_s, {p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}});
+void Island::record() {
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    if (engine_.is_fixed(static_cast<int>(i))) continue;
+    const SimTK::Quaternion q = state_.poses[i].R().convertRotationToQuaternion();
+    const Point &x = state_.mobiles[i].centre, &v = state_.mobiles[i].velocity;
+    events_.push_back(stream::Motion{state_.time_s, members_[i], {x[0], x[1], x[2]}, {v[0], v[1], v[2]}, {q[0], q[1], q[2], q[3]}});
   }
 }
 
-Simulation Simulator::run(const std::function<void(double)>& progress) {
-  const std::clock_t begin = std::clock();
-  result_.poses.resize(engine_.world().bodies.size());
-  record_poses(true);
-  double reported = 0.0;
-  std::int64_t next_pose = 1;
-  while (duration_s_ - state_.getTime() > kTouchTime) {
-    const Snapshot now = engine_.calc_snapshot(state_);
-    const auto touches = engine_.find_touches(now.poses);
-    old_ = find_old(now, touches);
-    remember(now, touches);
-    engine_.set_resting(touches);
-    // To the next pose at most, which are on a grid.
-    while (static_cast<double>(next_pose) * kPoseInterval <= state_.getTime() + kTouchTime) ++next_pose;
-    const double until = std::min(duration_s_, static_cast<double>(next_pose) * kPoseInterval);
-    const double step = std::min(until - state_.getTime(), engine_.calc_largest_step(now, !touches.empty()));
-    bool impact = false;
-    if (stuck_ > 30) {
-      // Impacts that leave each other no time (a body wedged in): let the soft force have it for a moment.
-      state_ = engine_.calc_advanced(state_, std::min(step, kTogether));
-      stuck_ = 0;
-    } else {
-      const Step next = calc_step(step);
-      impact = next.impact;
-      stuck_ = impact && next.state.getTime() - state_.getTime() < 1e-6 ? stuck_ + 1 : 0;
-      state_ = next.state;
-      if (impact) strike();
+void Island::follow_contacts() {
+  std::vector<stream::Contact> contacts;
+  lasting_.update(engine_, members_, state_, contacts);
+  for (stream::Contact& c : contacts) {
+    c.body = find_member(c.body);
+    c.other = find_member(c.other);
+    events_.push_back(c);
+  }
+}
+
+void Island::add_spots(std::vector<Spot>& out) const {
+  for (Spot spot : lasting_.spots()) {
+    spot.a = find_member(spot.a);
+    spot.b = find_member(spot.b);
+    for (stream::Contact& c : spot.last) {
+      c.body = find_member(c.body);
+      c.other = find_member(c.other);
     }
-    if (impact || state_.getTime() > until - kTouchTime) record_poses(false);
-    const double fraction = state_.getTime() / duration_s_;
-    if (progress && fraction >= reported + 0.01) progress(reported = std::min(fraction, 1.0));
+    out.push_back(std::move(spot));
   }
-  record_poses(true);
-  const auto earlier = [](const Impulse& x, const Impulse& y) { return x.time_s < y.time_s; };
-  std::stable_sort(result_.impulses.begin(), result_.impulses.end(), earlier);
-  result_.seconds_cpu = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-  if (progress) progress(1.0);
-  return std::move(result_);
 }
 
-}  // namespace
-
-Simulation run_simulation(const WorldModel& world, double duration_s, const std::function<void(double)>& progress) {
-  try {
-    Simulator simulator(world, duration_s);
-    return simulator.run(progress);
-  } catch (const SimTK::Exception::Base& e) {
-    throw SolveError(fmt::format("Simbody gave up on the world of {}: {}", list_names(world), e.what()));
+void Island::note_moves() {
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    const Surface& surface = engine_.surface(static_cast<int>(i));
+    const Transform &from = begin_poses_[i], &to = state_.poses[i];
+    const double turned = (from.R().asMat33() - to.R().asMat33()).norm();
+    moved_m_[i] = std::max(moved_m_[i], (from * surface.middle_m() - to * surface.middle_m()).norm() + turned * surface.radius_m());
   }
+}
+
+void Island::begin_window() {
+  begin_poses_ = state_.poses;
+  moved_m_.assign(members_.size(), 0.0);
+  events_.clear();
+}
+
+/// Does everything lie and stay? (In the air nothing does, at the top of its flight either.)
+bool Island::is_still(bool in_touch) const {
+  if (!in_touch) return false;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    const Mobile& m = state_.mobiles[i];
+    if (m.velocity.norm() + m.spin.norm() * engine_.surface(static_cast<int>(i)).size_m() > kStill) return false;
+  }
+  return true;
+}
+
+bool Island::is_asleep() const { return state_.time_s - still_since_s_ > kAsleepAfter; }
+
+bool Island::step(double until_s) {
+  if (until_s - state_.time_s <= kTouchTime) return true;
+  note_moves();
+  if (is_asleep()) {
+    state_.time_s = until_s;
+    record();
+    return true;
+  }
+  const auto touches = engine_.find_touches(state_.poses);
+  old_ = find_old(state_, touches);
+  remember(state_, touches);
+  engine_.set_resting(touches);
+  const double step = std::min(until_s - state_.time_s, engine_.calc_largest_step(state_, !touches.empty()));
+  bool impact = false;
+  if (stuck_ > 30) {
+    // Impacts that leave each other no time (a body wedged in): let the soft force have it for a moment.
+    state_ = engine_.calc_advanced(state_, std::min(step, kTogether));
+    stuck_ = 0;
+  } else {
+    const Step next = calc_step(step);
+    impact = next.impact;
+    stuck_ = impact && next.state.time_s - state_.time_s < 1e-6 ? stuck_ + 1 : 0;
+    state_ = next.state;
+    if (impact) strike();
+  }
+  const bool done = until_s - state_.time_s <= kTouchTime;
+  if (impact || !is_still(!touches.empty())) still_since_s_ = state_.time_s;
+  if (has_lasting_) follow_contacts();
+  if (impact || done) {
+    note_moves();
+    record();
+  }
+  return done;
+}
+
+void Island::store(WorldModel& scene) const {
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    if (engine_.is_fixed(static_cast<int>(i))) continue;
+    BodyModel& body = scene.bodies[members_[i]];
+    const SimTK::Quaternion q = state_.poses[i].R().convertRotationToQuaternion();
+    const Point &p = state_.poses[i].p(), &v = state_.mobiles[i].velocity, &w = state_.mobiles[i].spin;
+    body.initial = {state_.time_s, {p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}};
+    body.velocity_m_s = {v[0], v[1], v[2]};
+    body.angular_velocity_rad_s = {w[0], w[1], w[2]};
+  }
+}
+
+void Island::add_recent(std::vector<OldPoint>& out) const {
+  for (const OldPoint& o : recent_) out.push_back({find_member(o.a), find_member(o.b), o.in_a, o.time_s});
 }
 
 }  // namespace carillon::contact

@@ -1,0 +1,174 @@
+// Contacts that last: their force against weight, their speeds against Coulomb's and rolling's closed forms, and that nothing chatters.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "tests/contact/checks.hpp"
+#include "tests/contact/solids.hpp"
+
+namespace carillon::contact::tests {
+namespace {
+
+using stream::Contact;
+using stream::ContactState;
+
+constexpr double kGravity = 9.81;
+
+WorldSpec make_world(const bank::Bank& bank, Vec3 position, double friction) {
+  WorldSpec w;
+  w.ground = GroundSpec{};
+  w.ground->friction = friction;
+  BodySpec b;
+  b.name = "body";
+  b.bank = &bank;
+  b.initial.position_m = position;
+  b.friction = friction;
+  w.bodies = {b};
+  return w;
+}
+
+struct Outcome {
+  std::vector<Contact> contacts;
+  std::vector<Impulse> impulses;
+};
+
+Outcome run(const WorldSpec& spec, double end_s) {
+  World world(spec, {.end_s = end_s});
+  Outcome outcome;
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const stream::Event& e) {
+    EXPECT_EQ(stream::find_fault(e), nullptr) << stream::find_fault(e);
+    if (const auto* c = std::get_if<Contact>(&e)) outcome.contacts.push_back(*c);
+    if (const auto* p = std::get_if<Impulse>(&e)) outcome.impulses.push_back(*p);
+  });
+  return outcome;
+}
+
+/// Mean over the records in a span of time.
+template <class Get>
+double calc_mean(const Outcome& run, double from_s, double to_s, Get get) {
+  double sum = 0.0;
+  int count = 0;
+  for (const Contact& c : run.contacts) {
+    if (c.time_s < from_s || c.time_s > to_s) continue;
+    sum += get(c);
+    ++count;
+  }
+  EXPECT_GT(count, 0);
+  return sum / std::max(count, 1);
+}
+
+TEST(LastingContacts, CarryTheWeightOfABoxAtRestAndAreNoStrikes) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04});
+  const Outcome r = run(make_world(box, {0, 0, 0.05}, 0.5), 4.0);
+  for (const Impulse& p : r.impulses) EXPECT_LT(p.time_s, 0.6) << "it lies by then";
+  std::map<std::uint64_t, Contact> held;
+  for (const Contact& c : r.contacts) {
+    if (c.state == ContactState::kEnd) {
+      held.erase(c.id);
+    } else {
+      EXPECT_EQ(held.count(c.id) == 0, c.state == ContactState::kBegin);
+      if (c.state == ContactState::kBegin) {
+        EXPECT_EQ(c.force_n, 0.0) << "the impact was heard already";
+      }
+      held[c.id] = c;
+    }
+  }
+  EXPECT_EQ(held.size(), 4U) << "a corner each";
+  double force = 0.0;
+  for (const auto& [id, c] : held) {
+    force += c.force_n;
+    EXPECT_LT(norm(c.slip_m_s), 1e-4);
+    EXPECT_LT(c.sweep_m_s, 1e-4);
+    EXPECT_NEAR(c.normal[2], 1.0, 1e-3);
+  }
+  EXPECT_NEAR(force, box.rigid.mass_kg * kGravity, 1e-3 * box.rigid.mass_kg * kGravity);
+}
+
+TEST(LastingContacts, AreNotMadeForThoseWhoDoNotAskAndChangeNothing) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04});
+  const WorldSpec spec = make_world(box, {0.0, 0.0, 0.05}, 0.5);
+  std::vector<stream::Event> with, without;
+  for (const bool has : {true, false}) {
+    World world(spec, {.end_s = 0.5, .lasting_contacts = has});
+    world.advance(0.5, std::numeric_limits<double>::infinity(), [&](const stream::Event& e) {
+      EXPECT_TRUE(has || !std::holds_alternative<Contact>(e));
+      if (!std::holds_alternative<Contact>(e)) (has ? with : without).push_back(e);
+    });
+  }
+  ASSERT_EQ(with.size(), without.size());
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    ASSERT_EQ(with[i].index(), without[i].index());
+    ASSERT_EQ(stream::get_time_s(with[i]), stream::get_time_s(without[i]));
+    if (const auto* impulse = std::get_if<Impulse>(&with[i])) {
+      ASSERT_EQ(impulse->impulse_n_s, std::get<Impulse>(without[i]).impulse_n_s);
+    }
+  }
+}
+
+TEST(LastingContacts, OfABoxThatSlidesFlatSweepOnlyTheFloor) {
+  // v = v0 - mu g t; it starts on the floor.
+  const bank::Bank box = make_box({0.1, 0.1, 0.02});
+  const double mu = 0.1, v0 = 1.0;
+  WorldSpec w = make_world(box, {0, 0, 0.01}, mu);
+  w.bodies[0].velocity_m_s = {v0, 0, 0};
+  const Outcome r = run(w, 0.6);
+  EXPECT_TRUE(r.impulses.empty());
+  int seen = 0;
+  for (const Contact& c : r.contacts) {
+    if (c.time_s < 0.2 || c.time_s > 0.5) continue;
+    const double v = v0 - mu * kGravity * c.time_s;
+    EXPECT_NEAR(norm(c.slip_m_s), v, 0.01 * v0);
+    EXPECT_NEAR(c.other_sweep_m_s, v, 0.02 * v0);
+    EXPECT_LT(c.sweep_m_s, 0.02 * v0) << "the corner that carries stays the same corner";
+    ++seen;
+  }
+  EXPECT_GT(seen, 400);
+  const double force = 4 * calc_mean(r, 0.2, 0.5, [](const Contact& c) { return c.force_n; });
+  EXPECT_NEAR(force, box.rigid.mass_kg * kGravity, 0.02 * box.rigid.mass_kg * kGravity);
+}
+
+TEST(LastingContacts, OfABallThatRollsSweepBothSurfacesAndDoNotSlip) {
+  const double radius = 0.03, v = 0.4;
+  const bank::Bank ball = make_ball(radius, 5);
+  WorldSpec w = make_world(ball, {0, 0, radius}, 0.5);
+  w.bodies[0].velocity_m_s = {v, 0, 0};
+  w.bodies[0].angular_velocity_rad_s = {0, v / radius, 0};
+  const Outcome r = run(w, 0.5);
+  int late = 0;
+  for (const Impulse& p : r.impulses) late += p.time_s > 0.1 ? 1 : 0;
+  EXPECT_EQ(late, 0) << "its facets are no strikes";
+  EXPECT_NEAR(calc_mean(r, 0.1, 0.4, [](const Contact& c) { return c.sweep_m_s; }), v, 0.15 * v);
+  EXPECT_NEAR(calc_mean(r, 0.1, 0.4, [](const Contact& c) { return c.other_sweep_m_s; }), v, 0.15 * v);
+  EXPECT_LT(calc_mean(r, 0.1, 0.4, [](const Contact& c) { return norm(c.slip_m_s); }), 0.1 * v);
+  EXPECT_NEAR(calc_mean(r, 0.1, 0.4, [](const Contact& c) { return c.spin_rad_s; }), v / radius, 0.1 * v / radius);
+}
+
+TEST(LastingContacts, OfTwoBodiesComeInPairsOfOneId) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04}), shelf = make_box({0.3, 0.3, 0.02});
+  WorldSpec w = make_world(box, {0, 0, 0.03}, 0.5);
+  w.ground.reset();
+  BodySpec under = w.bodies[0];
+  under.name = "shelf";
+  under.bank = &shelf;
+  under.fixed = true;
+  under.initial.position_m = {0, 0, 0};
+  w.bodies.push_back(under);
+  const Outcome r = run(w, 0.3);
+  ASSERT_GT(r.contacts.size(), 8U);
+  std::map<std::pair<std::uint64_t, double>, std::vector<Contact>> pairs;
+  for (const Contact& c : r.contacts) pairs[{c.id, c.time_s}].push_back(c);
+  for (const auto& [key, both] : pairs) {
+    ASSERT_EQ(both.size(), 2U);
+    EXPECT_EQ(both[0].body, both[1].other);
+    EXPECT_EQ(both[0].force_n, both[1].force_n);
+    EXPECT_EQ(both[0].sweep_m_s, both[1].other_sweep_m_s);
+    // Both frames lie along the world's here.
+    EXPECT_LT(norm(both[0].normal + both[1].normal), 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace carillon::contact::tests
