@@ -1,4 +1,4 @@
-// carillon-render: a scene file to a stereo WAV file.
+// carillon-render: a scene file to a WAV file.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -21,16 +21,21 @@ int fail(int code, const char* message) {
 
 int main(int argc, char** argv) {
   carillon::host::ProgramOptions options;
-  CLI::App app("Simulates a scene of falling bodies and renders what two ears hear.", "carillon-render");
+  CLI::App app("Simulates a scene of falling bodies and renders what two ears or microphones hear.", "carillon-render");
   app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
-  app.add_option("-o,--output", options.wav, "Stereo WAV file to write")->required()->option_text("OUT.wav");
+  app.add_option("-o,--output", options.wav, "WAV file to write: stereo, or a channel for each microphone")
+      ->required()
+      ->option_text("OUT.wav");
   app.add_option("--spectrogram", options.spectrogram, "Picture of the sound: level over time and frequency")->option_text("OUT.png");
   app.add_option("--trajectory", options.trajectory, "Paths of the bodies and their contacts")->option_text("OUT.json");
   app.add_option("--report", options.report, "Figures of the run: counts, seconds, level, gain")->option_text("OUT.json");
+  app.add_option("--contacts", options.contacts, "Contacts file to play instead of the scene's physics and strikes")
+      ->option_text("IN.jsonl");
+  app.add_option("--record", options.record, "Contacts file to write: all that happens, to be played again")->option_text("OUT.jsonl");
   app.add_option("--rate", options.rate_hz, "Sample rate instead of the scene's, 8000 to 192000")
       ->check(CLI::Range(8000, 192000))
       ->option_text("HZ");
-  app.add_option("--format", options.format, "pcm16, pcm24 (default) or float, instead of the scene's")
+  app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
       ->check(CLI::IsMember(carillon::host::kSampleFormatNames))
       ->option_text("FORMAT");
   app.add_flag("-q,--quiet", options.quiet, "No progress");

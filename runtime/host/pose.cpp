@@ -13,7 +13,7 @@ contact::Vec3 calc_world_point(const contact::Pose& pose, const contact::Vec3& x
           pose.position_m[2] + x[2] + w * t[2] + a * t[1] - b * t[0]};
 }
 
-contact::Pose find_pose(const std::vector<contact::Pose>& poses, double time_s) {
+contact::Pose find_pose(std::span<const contact::Pose> poses, double time_s) {
   const auto after =
       std::upper_bound(poses.begin(), poses.end(), time_s, [](double t, const contact::Pose& pose) { return t < pose.time_s; });
   if (after == poses.begin()) return poses.front();

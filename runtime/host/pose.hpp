@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "runtime/contact/events.hpp"
@@ -13,6 +14,6 @@ contact::Vec3 calc_world_point(const contact::Pose& pose, const contact::Vec3& b
 
 /// The pose at a time, between its neighbours: position on a straight line, rotation along the shorter way, renormalised.
 /// `poses` in order of time, not empty; before the first and after the last the body rests.
-contact::Pose find_pose(const std::vector<contact::Pose>& poses, double time_s);
+contact::Pose find_pose(std::span<const contact::Pose> poses, double time_s);
 
 }  // namespace carillon::host

@@ -7,10 +7,10 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <map>
-#include <memory>
 
 #include "runtime/config/file.hpp"
+#include "runtime/host/banks.hpp"
+#include "runtime/host/events.hpp"
 #include "runtime/host/render.hpp"
 #include "runtime/host/report.hpp"
 #include "runtime/host/scene.hpp"
@@ -58,7 +58,9 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
   if (options.spectrogram) outputs.emplace_back(*options.spectrogram, "spectrogram");
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
   if (options.report) outputs.emplace_back(*options.report, "report");
+  if (options.record) outputs.emplace_back(*options.record, "contacts file");
   std::vector<std::pair<fs::path, std::string>> taken{{scene.file, "scene"}};
+  if (options.contacts) taken.emplace_back(*options.contacts, "contacts file to play");
   for (const SceneBody& body : scene.bodies) taken.emplace_back(body.bank, fmt::format("bank of \"{}\"", body.name));
   for (const auto& [file, what] : outputs) {
     for (const auto& [other, name] : taken) {
@@ -68,33 +70,6 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
     }
     config::check_writable(file, what);
     taken.emplace_back(file, what);
-  }
-}
-
-/// Reads every bank once. The scene's bodies point into the result.
-std::map<fs::path, std::unique_ptr<bank::Bank>> read_banks(Scene& scene) {
-  std::map<fs::path, std::unique_ptr<bank::Bank>> banks;
-  for (SceneBody& body : scene.bodies) {
-    auto& slot = banks[body.bank];
-    if (!slot) {
-      try {
-        slot = std::make_unique<bank::Bank>(bank::read_bank(body.bank));
-      } catch (const InputError& error) {
-        throw InputError(fmt::format("{}: the bank of body \"{}\": {}", scene.file.string(), body.name, error.what()));
-      }
-    }
-    body.spec.bank = slot.get();
-  }
-  return banks;
-}
-
-contact::Simulation simulate(const Scene& scene, const contact::WorldSpec& world, bool quiet) {
-  try {
-    return contact::simulate(world, scene.duration_s, Progress("physics", quiet));
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
-  } catch (const SolveError& error) {
-    throw SolveError(fmt::format("{}: {}", scene.file.string(), error.what()));
   }
 }
 
@@ -110,7 +85,7 @@ void print_summary(const Scene& scene, const Sound& sound, const Figures& figure
   fmt::print("sound              {:.2f} s for {:g} s at {} Hz\n", figures.sound_s, scene.duration_s, sound.rate_hz);
   fmt::print("real-time factor   {:.3f} (below 1 is faster than real time)\n", figures.real_time_factor);
   if (figures.peak_pa > 0.0) {
-    fmt::print("peak               {:.4g} Pa at the ears\n", figures.peak_pa);
+    fmt::print("peak               {:.4g} Pa at the {}\n", figures.peak_pa, scene.microphones_m.empty() ? "ears" : "microphones");
     fmt::print("level              {:.1f} dB re 20 uPa, loudest 125 ms {:.1f} dB\n", figures.levels.mean_db, figures.levels.loudest_db);
     fmt::print("gain               {:.4g} full scale per Pa, peak at {:.1f} dBFS\n", figures.gain.per_pa,
                20.0 * std::log10(figures.gain.per_pa * figures.peak_pa));
@@ -140,7 +115,7 @@ void run(const ProgramOptions& options) {
   Scene scene = parse_scene(config::read_document(options.scene));
   if (options.rate_hz) {
     scene.sample_rate_hz = *options.rate_hz;
-    if (scene.duration_s * scene.sample_rate_hz > kMostSamples) {
+    if (!fits_in_memory(scene)) {
       throw InputError(
           fmt::format("--rate {}: {:g} s at this rate need too much memory; give a lower rate", *options.rate_hz, scene.duration_s));
     }
@@ -150,22 +125,23 @@ void run(const ProgramOptions& options) {
     scene.output.format = static_cast<SampleFormat>(name - kSampleFormatNames.begin());
   }
   check_outputs(options, scene);
-  const auto banks = read_banks(scene);
+  const Banks banks = read_banks(scene);
 
-  contact::WorldSpec world;
   std::vector<const bank::Bank*> body_banks;
+  std::vector<contact::Vec3> centres_m;
   for (const SceneBody& body : scene.bodies) {
-    world.bodies.push_back(body.spec);
     body_banks.push_back(body.spec.bank);
+    centres_m.push_back(body.spec.bank->rigid.centre_m);
   }
-  world.ground = scene.ground;
-  world.gravity_m_s2 = scene.gravity_m_s2;
 
   Figures figures;
   figures.bodies = scene.bodies.size();
   auto started = Clock::now();
-  const contact::Simulation simulation = simulate(scene, world, options.quiet);
+  const Course course = options.contacts ? read_course(*options.contacts, scene)
+                                         : simulate(scene, options.record.has_value(), Progress("physics", options.quiet));
   figures.physics_s = get_seconds_since(started);
+  contact::Simulation simulation = contact::collect(course.recording.events, centres_m);
+  simulation.steps = course.steps;
   started = Clock::now();
   const Sound sound = calc_sound(scene, body_banks, simulation, scene.sample_rate_hz, Progress("sound", options.quiet));
   figures.sound_s = get_seconds_since(started);
@@ -183,12 +159,14 @@ void run(const ProgramOptions& options) {
                                                                         figures.contacts, figures.modes))
                               : "";
   const std::string trajectory = options.trajectory ? make_trajectory_json(scene, body_banks, simulation) : "";
+  const std::string recording = options.record ? stream::format_recording(course.recording) : "";
   const std::string report = options.report ? make_report_json(scene, simulation, sound, figures) : "";
   print_summary(scene, sound, figures);
   print_warnings(scene, sound, figures);
   if (options.spectrogram) write_output(*options.spectrogram, png, "spectrogram");
   if (options.trajectory) write_output(*options.trajectory, trajectory, "trajectory");
   if (options.report) write_output(*options.report, report, "report");
+  if (options.record) write_output(*options.record, recording, "contacts file");
   write_output(options.wav, wav, "sound");
 }
 

@@ -11,6 +11,8 @@ struct ProgramOptions {
   std::filesystem::path scene;
   std::filesystem::path wav;
   std::optional<std::filesystem::path> spectrogram, trajectory, report;
+  std::optional<std::filesystem::path> contacts;  // played instead of the scene's physics and strikes
+  std::optional<std::filesystem::path> record;
   std::optional<int> rate_hz;         // instead of the scene's
   std::optional<std::string> format;  // instead of the scene's
   bool quiet = false;                 // no progress

@@ -1,7 +1,6 @@
-// From a finished simulation to the pressure at two ears.
+// From a finished simulation to the pressure at two ears or any microphones.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -12,16 +11,17 @@
 
 namespace carillon::host {
 
-/// What the ears hear, and how much work it was.
+/// What is heard, and how much work it was.
 struct Sound {
   int rate_hz = 0;
-  std::array<std::vector<double>, 2> pressure_pa;  // left, right; the same length
-  int modes = 0;                                   // of all bodies, below Nyquist
-  std::vector<int> body_modes;                     // per body
-  std::vector<double> body_peak_pa;                // per body, at 1 m
-  std::int64_t strikes = 0;                        // impulses that were played
-  std::int64_t refused = 0;                        // impulses that could not be (too many at once, not finite)
-  std::int64_t resets = 0;                         // bodies cleared because their state was no number
+  // Per channel (left and right ear, or microphones), all of the same length.
+  std::vector<std::vector<double>> pressure_pa = std::vector<std::vector<double>>(2);
+  int modes = 0;                     // of all bodies, below Nyquist
+  std::vector<int> body_modes;       // per body
+  std::vector<double> body_peak_pa;  // per body, at 1 m
+  std::int64_t strikes = 0;          // impulses that were played
+  std::int64_t refused = 0;          // impulses that could not be (too many at once, not finite)
+  std::int64_t resets = 0;           // bodies cleared because their state was no number
   double seconds_cpu = 0.0;
 };
 
@@ -30,10 +30,10 @@ struct Sound {
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const contact::Simulation& simulation, int rate_hz,
                  const std::function<void(double)>& progress = {});
 
-/// Largest absolute pressure of both ears [Pa].
+/// Largest absolute pressure of all channels [Pa].
 double calc_peak_pa(const Sound& sound);
 
-/// Levels re 20 uPa, unweighted, both ears together: of the whole, and of the loudest 125 ms. Minus infinity for silence.
+/// Levels re 20 uPa, unweighted, the mean square of all channels: of the whole, and of the loudest 125 ms. Minus infinity for silence.
 struct Levels {
   double mean_db = 0.0;
   double loudest_db = 0.0;

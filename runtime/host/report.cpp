@@ -6,27 +6,13 @@
 #include <cmath>
 #include <iterator>
 
+#include "runtime/config/document.hpp"
 #include "runtime/host/pose.hpp"
 
 namespace carillon::host {
 namespace {
 
 constexpr double kPosesPerS = 200.0;
-
-std::string quote(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + '"';
-}
 
 /// JSON has no infinity: silence has the level null.
 std::string make_level(double db) { return std::isfinite(db) ? fmt::format("{:.2f}", db) : "null"; }
@@ -60,8 +46,8 @@ std::string make_trajectory_json(const Scene& scene, const std::vector<const ban
   auto out = std::back_inserter(json);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const SceneBody& body = scene.bodies[i];
-    fmt::format_to(out, "{}\n  {{\"name\": {}, \"bank\": {}, \"fixed\": {},\n   \"poses\": [", i == 0 ? "" : ",", quote(body.name),
-                   quote(body.bank.string()), body.spec.fixed);
+    fmt::format_to(out, "{}\n  {{\"name\": {}, \"bank\": {}, \"fixed\": {},\n   \"poses\": [", i == 0 ? "" : ",", config::quote(body.name),
+                   config::quote(body.bank.string()), body.spec.fixed);
     const std::vector<contact::Pose> poses =
         i < simulation.poses.size() ? find_kept_poses(simulation.poses[i]) : std::vector<contact::Pose>{};
     for (std::size_t k = 0; k < poses.size(); ++k) {
@@ -93,8 +79,9 @@ std::string make_trajectory_json(const Scene& scene, const std::vector<const ban
 std::string make_report_json(const Scene& scene, const contact::Simulation& simulation, const Sound& sound, const Figures& f) {
   std::string json = "{\n";
   auto out = std::back_inserter(json);
-  fmt::format_to(out, " \"scene\": {},\n \"duration_s\": {},\n \"sample_rate_hz\": {},\n \"samples\": {},\n", quote(scene.file.string()),
-                 scene.duration_s, sound.rate_hz, sound.pressure_pa[0].size());
+  fmt::format_to(out, " \"scene\": {},\n \"duration_s\": {},\n \"sample_rate_hz\": {},\n \"samples\": {},\n \"channels\": {},\n",
+                 config::quote(scene.file.string()), scene.duration_s, sound.rate_hz, sound.pressure_pa[0].size(),
+                 sound.pressure_pa.size());
   fmt::format_to(out,
                  " \"bodies\": {},\n \"modes\": {},\n \"contacts\": {},\n \"impulses\": {},\n \"impulses_played\": {},\n "
                  "\"impulses_refused\": {},\n \"resets\": {},\n",
@@ -109,7 +96,7 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
     const auto played = std::count_if(simulation.impulses.begin(), simulation.impulses.end(),
                                       [i](const contact::Impulse& impulse) { return impulse.body == static_cast<std::int32_t>(i); });
     fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g}}}", i == 0 ? "" : ",",
-                   quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i]);
+                   config::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i]);
   }
   json += "\n ]\n}\n";
   return json;

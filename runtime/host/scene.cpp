@@ -1,11 +1,14 @@
 #include "runtime/host/scene.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <set>
+#include <span>
 
 namespace carillon::host {
 namespace {
@@ -17,6 +20,11 @@ constexpr std::size_t kMostBodies = 1000;
 constexpr double kMaxSpeedMs = 300.0;  // below the speed of sound in air
 constexpr double kMaxSpinRadS = 1e4;
 constexpr double kMaxEarDistanceM = 10.0;
+constexpr std::size_t kMostWaypoints = 100000;
+constexpr std::size_t kMostMicrophones = 16;
+constexpr std::size_t kMostStrikes = 100000;
+constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
+constexpr double kLongestPulseS = 1.0;
 
 using Quaternion = std::array<double, 4>;
 
@@ -102,9 +110,85 @@ contact::GroundSpec parse_ground(config::Object& object) {
   return ground;
 }
 
+/// The body that "body" names.
+std::size_t find_body(config::Object& object, const std::vector<SceneBody>& bodies) {
+  const std::string name = object.string("body");
+  std::vector<std::string> names;
+  for (const SceneBody& body : bodies) names.push_back(body.name);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  const std::string nearest = config::find_nearest(name, names);
+  object.fail("body", fmt::format("no body is called \"{}\"; {}", name,
+                                  nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
+}
+
+SceneStrike parse_strike(config::Object& object, const Scene& scene) {
+  SceneStrike strike;
+  strike.place = object.find_place("");
+  strike.body = find_body(object, scene.bodies);
+  strike.time_s = object.number("time_s");
+  strike.duration_s = read_within(object, "duration_s", strike.duration_s, 0.0, kLongestPulseS);
+  if (!(strike.time_s - 0.5 * strike.duration_s >= 0.0 && strike.time_s <= scene.duration_s)) {
+    object.fail("time_s",
+                fmt::format("{} s is out of range; the middle of a pulse lies within the {} s of the scene, and its beginning too",
+                            strike.time_s, scene.duration_s));
+  }
+  if (object.has("point_m") == object.has("triangle")) {
+    object.fail(object.has("point_m") ? "triangle" : "point_m", "say where the body is struck: either \"point_m\" or \"triangle\"");
+  }
+  if (object.has("point_m")) {
+    strike.point_m = read_vector(object, "point_m", {}, kFarthestM);
+  } else {
+    strike.triangle = static_cast<std::int32_t>(object.integer("triangle", 0, std::numeric_limits<std::int32_t>::max()));
+  }
+  if (!object.has("impulse_n_s")) object.numbers<3>("impulse_n_s");  // its message
+  strike.impulse_n_s = read_vector(object, "impulse_n_s", {}, kMaxImpulseNs);
+  object.finish();
+  return strike;
+}
+
+/// A place in the world out of a row of numbers.
+Vec3 read_place(const config::Object& object, std::string_view key, std::span<const double> row) {
+  for (const double x : row) {
+    if (!(std::abs(x) <= kFarthestM)) {
+      object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}", x, -kFarthestM, kFarthestM));
+    }
+  }
+  return {row[0], row[1], row[2]};
+}
+
+/// Rows [t, x, y, z] in order of time, slower than sound.
+std::vector<synth::Place> read_path(config::Object& object, std::string_view key) {
+  std::vector<synth::Place> path;
+  for (const std::vector<double>& row : object.number_rows(key, 4, kMostWaypoints)) {
+    const synth::Place place{row[0], read_place(object, key, std::span(row).subspan(1))};
+    if (!(std::abs(place.time_s) <= kLongestS))
+      object.fail(key, fmt::format("time {} is out of range; give {} s at most", row[0], kLongestS));
+    if (!path.empty()) {
+      const synth::Place& last = path.back();
+      if (!(place.time_s > last.time_s)) {
+        object.fail(key, fmt::format("time {} follows {}; give rows [t, x, y, z] in order of time", place.time_s, last.time_s));
+      }
+      const Vec3 &a = last.position_m, &b = place.position_m;
+      const double speed = std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) / (place.time_s - last.time_s);
+      if (speed > kMaxSpeedMs) {
+        object.fail(key, fmt::format("moves at {:.4g} m/s after {} s; give {} m/s at most", speed, last.time_s, kMaxSpeedMs));
+      }
+    }
+    path.push_back(place);
+  }
+  return path;
+}
+
 Listener parse_listener(config::Object& object) {
   Listener listener;
-  listener.position_m = read_vector(object, "position_m", listener.position_m, kFarthestM);
+  if (object.has("path")) {
+    if (object.has("position_m")) object.fail("path", "says the same thing as \"position_m\"; keep one of them");
+    listener.path = read_path(object, "path");
+    listener.position_m = listener.path.front().position_m;
+  } else {
+    listener.position_m = read_vector(object, "position_m", listener.position_m, kFarthestM);
+  }
   listener.ear_distance_m = read_within(object, "ear_distance_m", listener.ear_distance_m, 0.0, kMaxEarDistanceM);
   Vec3 direction = listener.facing;
   std::string key = "facing";
@@ -121,6 +205,28 @@ Listener parse_listener(config::Object& object) {
   for (int k = 0; k < 3; ++k) listener.facing[k] = direction[k] / norm;
   object.finish();
   return listener;
+}
+
+/// A list of names: these effects are on, all others off.
+synth::EffectSet read_effects(config::Object& root) {
+  std::vector<std::string> playable;
+  for (int i = 0; i < synth::kEffectCount; ++i) {
+    const auto effect = static_cast<synth::Effect>(i);
+    if (kPlayableEffects.has(effect)) playable.emplace_back(synth::get_name(effect));
+  }
+  synth::EffectSet effects;
+  for (const config::Entry& entry : root.entries("effects", synth::kEffectCount)) {
+    if (entry.object) root.fail("effects", "must be a list of names of effects, and holds an object");
+    const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
+    if (!effect || !kPlayableEffects.has(*effect)) {
+      const std::string nearest = config::find_nearest(entry.text, playable);
+      root.fail("effects", fmt::format("\"{}\" is no effect that can be played{}; there are {}", entry.text,
+                                       nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest), fmt::join(playable, ", ")));
+    }
+    if (effects.has(*effect)) root.fail("effects", fmt::format("names \"{}\" twice", entry.text));
+    effects = effects.with(*effect);
+  }
+  return effects;
 }
 
 Output parse_output(config::Object& object) {
@@ -152,16 +258,12 @@ Scene parse_scene(const config::Document& document) {
     root.fail("duration_s", fmt::format("{} is out of range; give {} to {} s", scene.duration_s, kShortestS, kLongestS));
   }
   scene.sample_rate_hz = static_cast<int>(root.integer_if("sample_rate_hz", 8000, 192000).value_or(scene.sample_rate_hz));
-  if (scene.duration_s * scene.sample_rate_hz > kMostSamples) {
-    root.fail("duration_s", fmt::format("{} s at {} Hz need too much memory; give {:.0f} s at most or a lower \"sample_rate_hz\"",
-                                        scene.duration_s, scene.sample_rate_hz, kMostSamples / scene.sample_rate_hz));
-  }
   scene.gravity_m_s2 = read_vector(root, "gravity_m_s2", scene.gravity_m_s2, 1e4);
   if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground);
 
   std::vector<config::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
-    for (const char* later : {"listener", "output"}) root.has(later);
+    for (const char* later : {"strikes", "listener", "microphones", "effects", "radiation", "output"}) root.has(later);
     root.finish();  // a mistyped key is the likeliest reason
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
   }
@@ -173,10 +275,36 @@ Scene parse_scene(const config::Document& document) {
     if (!names.insert(name).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
   }
+  std::vector<config::Object> strikes = root.objects("strikes");
+  if (strikes.size() > kMostStrikes) {
+    root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMostStrikes));
+  }
+  for (config::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene));
   if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
+  if (root.has("microphones")) {
+    if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
+    for (const std::vector<double>& row : root.number_rows("microphones", 3, kMostMicrophones)) {
+      scene.microphones_m.push_back(read_place(root, "microphones", row));
+    }
+  }
+  if (!fits_in_memory(scene)) {
+    root.fail("duration_s", fmt::format("{} s at {} Hz and {} channels need too much memory; give fewer or a lower \"sample_rate_hz\"",
+                                        scene.duration_s, scene.sample_rate_hz, count_channels(scene)));
+  }
+  if (root.has("effects")) scene.effects = read_effects(root);
+  const std::string radiation = root.choice_or("radiation", kGainKindNames, "sphere");
+  scene.radiation =
+      static_cast<radiation::GainKind>(std::find(kGainKindNames.begin(), kGainKindNames.end(), radiation) - kGainKindNames.begin());
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
   root.finish();
   return scene;
+}
+
+std::size_t count_channels(const Scene& scene) { return scene.microphones_m.empty() ? 2 : scene.microphones_m.size(); }
+
+bool fits_in_memory(const Scene& scene) {
+  const double pairs = std::max(1.0, 0.5 * static_cast<double>(count_channels(scene)));
+  return scene.duration_s * scene.sample_rate_hz * pairs <= kMostSamples;
 }
 
 std::array<Vec3, 2> calc_ears(const Listener& listener) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -10,16 +11,27 @@
 
 #include "runtime/config/document.hpp"
 #include "runtime/contact/world.hpp"
+#include "runtime/radiation/gains.hpp"
+#include "runtime/synth/effects.hpp"
+#include "runtime/synth/track.hpp"
 
 namespace carillon::host {
 
 using Vec3 = std::array<double, 3>;
 
-inline constexpr double kMostSamples = 2e8;  // duration times rate; about 3 GB of intermediate results
+inline constexpr double kMostSamples = 2e8;  // duration times rate times pairs of channels; about 3 GB of intermediate results
 
-enum class SampleFormat { kPcm16, kPcm24, kFloat };
+enum class SampleFormat { kPcm16, kPcm24, kPcm32, kFloat };
 /// The names of --format and output.format, in the order of SampleFormat.
-inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "float"};
+inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm32", "float"};
+
+/// The names of the key "radiation", in the order of radiation::GainKind.
+inline const std::vector<std::string> kGainKindNames{"osg02", "sphere"};
+
+/// What carillon-render can play; without the key "effects" it plays the default.
+inline constexpr synth::EffectSet kPlayableEffects{synth::Effect::kModal,    synth::Effect::kHertzPulse, synth::Effect::kAccelerationNoise,
+                                                   synth::Effect::kAirDelay, synth::Effect::kDoppler,    synth::Effect::kTwoEars};
+inline constexpr synth::EffectSet kDefaultEffects = kPlayableEffects.without(synth::Effect::kAccelerationNoise);
 
 struct SceneBody {
   std::string name;
@@ -27,8 +39,20 @@ struct SceneBody {
   contact::BodySpec spec;      // spec.bank is filled when the banks are read
 };
 
+/// A blow that the scene gives without physics. Point and impulse are in the frame of the body's mesh.
+struct SceneStrike {
+  std::string place;                     // "file:line", for messages
+  std::size_t body = 0;                  // index into Scene::bodies
+  double time_s = 0.0;                   // centre of the pulse
+  std::optional<Vec3> point_m;           // its nearest point of the surface is struck; or
+  std::optional<std::int32_t> triangle;  // the middle of this triangle of the bank
+  Vec3 impulse_n_s{};
+  double duration_s = 0.0;  // of the pulse; 0 is an ideal impulse
+};
+
 struct Listener {
-  Vec3 position_m{0.0, -1.5, 0.5};  // between the ears
+  Vec3 position_m{0.0, -1.5, 0.5};  // between the ears; at the beginning
+  std::vector<synth::Place> path;   // of the listener when it moves
   Vec3 facing{0.0, 1.0, 0.0};       // unit vector
   double ear_distance_m = 0.2;      // OCE01
 };
@@ -47,14 +71,25 @@ struct Scene {
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
   std::optional<contact::GroundSpec> ground;
   std::vector<SceneBody> bodies;
+  std::vector<SceneStrike> strikes;  // in the order of the file
   Listener listener;
+  std::vector<Vec3> microphones_m;  // places in the world, a channel each, instead of the listener's ears
+  radiation::GainKind radiation = radiation::GainKind::kSphere;
+  synth::EffectSet effects = kDefaultEffects;
   Output output;
 };
 
 /// Reads a scene. Banks are only named, not opened. Throws InputError "file:line: ..." for anything that is not a scene.
 Scene parse_scene(const config::Document& document);
 
-/// The places of the left and the right ear: the line between them is level when the listener does not look straight up or down.
+/// Channels of the sound: microphones, or two ears.
+std::size_t count_channels(const Scene& scene);
+
+/// False when duration, rate and channels ask for more memory than kMostSamples stands for.
+bool fits_in_memory(const Scene& scene);
+
+/// The places of the left and the right ear at the beginning: the line between them is level when the listener does not look straight up or
+/// down.
 std::array<Vec3, 2> calc_ears(const Listener& listener);
 
 }  // namespace carillon::host

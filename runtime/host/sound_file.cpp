@@ -53,6 +53,8 @@ int get_subtype(SampleFormat format) {
       return SF_FORMAT_PCM_16;
     case SampleFormat::kPcm24:
       return SF_FORMAT_PCM_24;
+    case SampleFormat::kPcm32:
+      return SF_FORMAT_PCM_32;
     case SampleFormat::kFloat:
       return SF_FORMAT_FLOAT;
   }
@@ -66,7 +68,8 @@ std::string make_wav(const Sound& sound, double gain_per_pa, SampleFormat format
   SF_VIRTUAL_IO io{get_length, seek, read, write, tell};
   SF_INFO info{};
   info.samplerate = sound.rate_hz;
-  info.channels = 2;
+  const std::size_t channels = sound.pressure_pa.size();
+  info.channels = static_cast<int>(channels);
   info.format = SF_FORMAT_WAV | get_subtype(format);
   const auto close = [](SNDFILE* file) { sf_close(file); };
   std::unique_ptr<SNDFILE, decltype(close)> file(sf_open_virtual(&io, SFM_WRITE, &info, &memory), close);
@@ -77,9 +80,9 @@ std::string make_wav(const Sound& sound, double gain_per_pa, SampleFormat format
   std::vector<double> frames;
   for (std::size_t start = 0; start < samples; start += 4096) {
     const std::size_t count = std::min<std::size_t>(4096, samples - start);
-    frames.resize(2 * count);
+    frames.resize(channels * count);
     for (std::size_t n = 0; n < count; ++n) {
-      for (std::size_t ear = 0; ear < 2; ++ear) frames[2 * n + ear] = sound.pressure_pa[ear][start + n] * gain_per_pa;
+      for (std::size_t c = 0; c < channels; ++c) frames[channels * n + c] = sound.pressure_pa[c][start + n] * gain_per_pa;
     }
     if (sf_writef_double(file.get(), frames.data(), static_cast<sf_count_t>(count)) != static_cast<sf_count_t>(count)) {
       throw SystemError(fmt::format("cannot make a WAV file: {}", sf_strerror(file.get())));

@@ -1,4 +1,4 @@
-// Stereo WAV files.
+// WAV files.
 #pragma once
 
 #include <string>
@@ -7,7 +7,8 @@
 
 namespace carillon::host {
 
-/// The bytes of a stereo WAV file: pressure times `gain_per_pa`, full scale 1. Throws SystemError when libsndfile refuses.
+/// The bytes of a WAV file, a channel for each of the sound: pressure times `gain_per_pa`, full scale 1. Throws SystemError when libsndfile
+/// refuses.
 std::string make_wav(const Sound& sound, double gain_per_pa, SampleFormat format);
 
 }  // namespace carillon::host

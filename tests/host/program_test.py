@@ -10,6 +10,7 @@ import tempfile
 import unittest
 import wave
 
+import h5py
 import numpy as np
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
@@ -131,12 +132,16 @@ class RenderProgram(unittest.TestCase):
 
     def test_formats_and_rates_are_as_asked(self):
         scene = self.scene("formats.json")
-        for arguments, expected in ((["--format", "pcm16"], (48000, 2)), (["--rate", "44100"], (44100, 3)), (["--rate", "8000", "--format", "pcm16"], (8000, 2))):
+        cases = [(["--format", "pcm16"], (48000, 2)), (["--rate", "44100"], (44100, 3)), (["--rate", "8000", "--format", "pcm16"], (8000, 2)),
+                 (["--format", "pcm32"], (48000, 4))]
+        cases += [(["--rate", str(rate), "--format", "pcm32"], (rate, 4)) for rate in (8000, 11025, 12345, 22050, 88200, 96000, 176400, 192000)]
+        for arguments, expected in cases:
             run = render(scene, "-o", self.root / "format.wav", *arguments)
             self.assertEqual(run.returncode, 0, run.stderr)
             rate, width, sound = read_wav(self.root / "format.wav")
             self.assertEqual((rate, width), expected)
-            self.assertEqual(len(sound), rate // 2)
+            self.assertEqual(len(sound), (rate + 1) // 2)
+            self.assertAlmostEqual(20 * math.log10(np.abs(sound).max()), -1.0, places=2)
         run = render(scene, "-o", self.root / "float.wav", "--format", "float")
         data = (self.root / "float.wav").read_bytes()
         self.assertEqual(struct.unpack("<H", data[20:22])[0], 3)  # IEEE float
@@ -144,6 +149,38 @@ class RenderProgram(unittest.TestCase):
         sound = np.frombuffer(data[at + 8: at + 8 + struct.unpack("<I", data[at + 4: at + 8])[0]], dtype="<f4")
         self.assertTrue(np.isfinite(sound).all())
         self.assertAlmostEqual(20 * math.log10(np.abs(sound).max()), -1.0, places=3)
+
+    def test_radiation_chooses_whose_gains_are_heard(self):
+        levels = {}
+        for kind in ("osg02", "sphere"):
+            scene = self.scene(f"{kind}.json", radiation=kind, output={"gain": 1e-6})
+            run = render(scene, "-o", self.root / f"{kind}.wav", "--format", "float", "-q")
+            self.assertEqual(run.returncode, 0, run.stderr)
+            data = (self.root / f"{kind}.wav").read_bytes()
+            sound = np.frombuffer(data[data.index(b"data") + 8:], dtype="<f4").reshape(-1, 2)[:, 0]
+            spectrum, frequency = np.abs(np.fft.rfft(sound * np.hanning(len(sound)))), np.fft.rfftfreq(len(sound), 1 / 48000)
+            levels[kind] = [spectrum[abs(frequency - hz) < 0.05 * hz].max() for hz in MODES_HZ]
+        with h5py.File(self.root / "cube.h5") as bank:
+            osg02 = bank["modes/radiation_gain"][()]
+        # Cube of side s, phi = a (1 + 0.07 corner): it trembles and, a little, breathes. At its first mode, ka = 1, it is louder than the flow
+        # of its volume alone, s^2 0.07 a . (1, 2, 4), and softer than if the flow through both sides added up (both as rho0 omega flow / 4 pi).
+        a, hz = np.array([0.4, 0.7, 1.1]), MODES_HZ[0]
+        per_flow = 1.21 * hz / 2 / np.hypot(1, 2 * np.pi * hz / 343 * np.sqrt(6 * 0.01 / (4 * np.pi)))
+        ratio = levels["sphere"][0] / levels["osg02"][0] * osg02[0] / per_flow
+        self.assertGreater(ratio, 0.01 * 0.07 * a @ [1, 2, 4])
+        self.assertLess(ratio, 0.01 * 2 * (1 + 0.07 * 3.5) * a.sum())
+        self.assert_refused(render(self.scene("kind.json", radiation="sfere"), "-o", self.root / "x.wav"), 2, "radiation", "sphere")
+
+    def test_every_microphone_has_its_channel_and_walks_and_effects_are_played(self):
+        for name, channels in (("microphones", 5), ("walk", 2)):
+            (self.root / f"{name}.json").write_text((SOURCE / f"tests/host/scenes/{name}.json").read_text())
+            run = render(self.root / f"{name}.json", "-o", self.root / f"{name}.wav", "--report", self.root / f"{name}-report.json", "-q")
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual(json.loads((self.root / f"{name}-report.json").read_text())["channels"], channels)
+            with wave.open(str(self.root / f"{name}.wav")) as wav:
+                self.assertEqual((wav.getnchannels(), wav.getnframes()), (channels, 24000))
+                raw = np.frombuffer(wav.readframes(24000), dtype=np.uint8).reshape(-1, channels, 3)
+            self.assertTrue((raw.max(axis=(0, 2)) > 0).all())
 
     def test_a_given_gain_keeps_the_level_in_pascals(self):
         scene = self.scene("gain.json", output={"gain": 0.01})
@@ -168,11 +205,113 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(len(sound), 24000)
         self.assertEqual(np.abs(sound).max(), 0.0)
 
+    def test_a_strike_sounds_without_physics_as_its_closed_form_says(self):
+        # The cube of write_cube_bank hangs still at 1 m; all its modes move alike, so an ideal impulse J in z at the corner (-, -, -) gives
+        # p = gain 1.1 J sum e^(-d t) (cos w t - d / w sin w t) / r, a distance of r / 343 m/s later.
+        strike = {"time_s": 0.1, "body": "cube", "point_m": [-0.05, -0.05, -0.05], "impulse_n_s": [0, 0, 2e-3]}
+        scene = self.scene("struck.json", radiation="osg02", bodies=[{"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 0]}], strikes=[strike],
+                           listener={"position_m": [0, -1, 0], "ear_distance_m": 0}, output={"gain": 1.0, "format": "float"})
+        run = render(scene, "-o", self.root / "struck.wav", "--trajectory", self.root / "struck-path.json", "--report", self.root / "struck-report.json")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        data = (self.root / "struck.wav").read_bytes()
+        at = data.index(b"data")
+        sound = np.frombuffer(data[at + 8: at + 8 + struct.unpack("<I", data[at + 4: at + 8])[0]], dtype="<f4").reshape(-1, 2)
+        t = np.arange(len(sound)) / 48000 - 0.1 - 1 / 343
+        expected = np.zeros(len(t))
+        for freq in MODES_HZ:
+            w, d = 2 * math.pi * freq, 12.0
+            wd = math.sqrt(w * w - d * d)
+            expected += np.where(t >= 0, 0.3 * 1.1 * 2e-3 * np.exp(-d * np.abs(t)) * (np.cos(wd * t) - d / wd * np.sin(wd * t)), 0)
+        late = t > 0.005  # the delay's band limit rings about the jump
+        np.testing.assert_allclose(sound[late, 0], expected[late], atol=2e-3 * np.abs(expected).max())
+        self.assertEqual(np.abs(sound[t < -0.005]).max(), 0.0)
+        report, path = (json.loads((self.root / name).read_text()) for name in ("struck-report.json", "struck-path.json"))
+        self.assertEqual((report["contacts"], report["impulses_played"], report["physics_steps"]), (1, 1, 0))
+        self.assertEqual(path["bodies"][0]["poses"], [[0, 0, 0, 0, 1, 0, 0, 0]])
+        self.assertEqual((path["impulses"][0]["other"], path["impulses"][0]["world_m"]), (-1, [-0.05, -0.05, -0.05]))
+
+    def test_a_strike_joins_the_contacts_of_the_physics_in_order_of_time(self):
+        scene = self.scene("struck-drop.json", strikes=[{"time_s": t, "body": "cube", "triangle": 3, "impulse_n_s": [0, 0, 1e-3]} for t in (0.4, 0.01)])
+        run = render(scene, "-o", self.root / "struck-drop.wav", "--trajectory", self.root / "struck-drop-path.json", "-q")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        times = [i["time_s"] for i in json.loads((self.root / "struck-drop-path.json").read_text())["impulses"]]
+        self.assertEqual(times, sorted(times))
+        self.assertEqual(times[0], 0.01)
+        self.assertGreater(len(times), 2)
+
     def silent_scene(self):
         scene = json.loads(self.scene("silent.json").read_text())
         del scene["ground"]
         (self.root / "silent.json").write_text(json.dumps(scene))
         return self.root / "silent.json"
+
+    def test_a_recording_replays_to_the_same_bytes_without_physics(self):
+        # Two bodies that move, one fixed, a strike besides: all of it comes back from the file.
+        scene = self.scene("recorded.json", bodies=[
+            {"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.15], "rotation_deg": [20, 30, 0], "angular_velocity_rad_s": [3, 1, 2]},
+            {"name": "other", "bank": "cube.h5", "position_m": [0.3, 0, 0.1], "rotation_deg": [5, 30, 0]},
+            {"name": "shelf", "bank": "cube.h5", "position_m": [-0.3, 0, 0.5], "fixed": True}],
+            strikes=[{"time_s": 0.05, "body": "shelf", "triangle": 2, "impulse_n_s": [0, 0, 0.01], "duration_s": 3e-4}])
+        file = self.root / "recorded.jsonl"
+        run = render(scene, "-o", self.root / "recorded.wav", "--record", file, "--trajectory", self.root / "recorded_path.json")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        # Physics that would be heard: in the replay the scene drops its cubes from elsewhere, and strikes nothing.
+        moved = json.loads(scene.read_text())
+        moved["bodies"][0]["position_m"] = [0, 0, 0.4]
+        del moved["strikes"]
+        other = self.scene("moved.json", **moved)
+        run = render(other, "--contacts", file, "-o", self.root / "replayed.wav", "--record", self.root / "again.jsonl", "--trajectory",
+                     self.root / "replayed_path.json", "--report", self.root / "replayed_report.json")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertEqual((self.root / "replayed.wav").read_bytes(), (self.root / "recorded.wav").read_bytes())
+        self.assertEqual((self.root / "again.jsonl").read_bytes(), file.read_bytes())
+        self.assertEqual(json.loads((self.root / "replayed_path.json").read_text()), json.loads((self.root / "recorded_path.json").read_text()))
+        self.assertEqual(json.loads((self.root / "replayed_report.json").read_text())["physics_steps"], 0)
+        # Every line is plain JSON, of the kinds that the page names.
+        lines = [json.loads(line) for line in file.read_text().splitlines()]
+        self.assertEqual(lines[0]["events"], len(lines) - 1)
+        self.assertEqual({key for line in lines[1:] for key in line}, {"mark", "impulse", "motion", "contact"})
+
+    def test_a_contacts_file_by_hand_strikes_as_its_closed_form_says(self):
+        # One impulse of a body that nothing moves: the pulse and what the scene's own strike of it gives are the same sound.
+        strike = {"time_s": 0.05, "triangle": 2, "impulse_n_s": [0, 0, 0.01], "duration_s": 3e-4}
+        body = {"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.5], "fixed": True}
+        struck = self.scene("struck.json", bodies=[body], strikes=[{**strike, "body": "cube"}])
+        silent = self.scene("silent_by_itself.json", bodies=[body])
+        self.assertEqual(render(struck, "-o", self.root / "struck.wav", "--record", self.root / "struck.jsonl").returncode, 0)
+        triangles = json.loads((self.root / "struck.jsonl").read_text().splitlines()[0])["bodies"][0]["triangles"]
+        time = json.loads([line for line in (self.root / "struck.jsonl").read_text().splitlines() if "impulse" in line][0])["impulse"]["time_s"]
+        header = {"carillon_contacts": 1, "bodies": [{"name": "cube", "triangles": triangles}]}
+        hand = self.root / "hand.jsonl"
+        hand.write_text(json.dumps(header) + "\n\n" + json.dumps({"impulse": {**strike, "body": 0, "time_s": time, "barycentric": [1 / 3, 1 / 3, 1 / 3]}}) + "\n")
+        run = render(silent, "--contacts", hand, "-o", self.root / "hand.wav")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertEqual((self.root / "hand.wav").read_bytes(), (self.root / "struck.wav").read_bytes())
+
+    def test_bad_contacts_files_are_refused_and_named(self):
+        scene = self.scene("bad_contacts.json")
+        file = self.root / "bad.jsonl"
+        wav = self.root / "bad_contacts.wav"
+        self.assertEqual(render(scene, "-o", self.root / "good.wav", "--record", file).returncode, 0)
+        good = file.read_text()
+
+        def refuse(text, *words):
+            file.write_text(text)
+            self.assert_refused(render(scene, "--contacts", file, "-o", wav), 2, "bad.jsonl", *words)
+            self.assertFalse(wav.exists())
+
+        lines = good.splitlines(keepends=True)
+        refuse(good[: len(good) // 2])
+        refuse("".join(lines[:-1]), "a part of the file is missing")
+        refuse(good.replace('"cube"', '"sphere"', 1), '"sphere"', '"cube"')
+        refuse(good.replace('"triangles": ', '"triangles": 1', 1), "triangles")
+        refuse(lines[0].replace("}]", '}, {"name": "two", "triangles": 4}]') + "".join(lines[1:]), "2 bodies")
+        refuse(good.replace('"time_s": 0.0', '"time_s": NaN', 1), "bad.jsonl:2:")
+        refuse(good.replace('"rotation"', '"rotations"', 1), "bad.jsonl:2:", "rotation")
+        self.assert_refused(render(scene, "--contacts", self.root / "nowhere.jsonl", "-o", wav), 2, "nowhere.jsonl")
+        file.write_text(good)
+        self.assert_refused(render(scene, "--contacts", file, "--record", file, "-o", wav), 2, "would overwrite")
+        self.assertEqual(file.read_text(), good)
 
     def test_bad_inputs_are_refused_before_anything_is_written(self):
         out = self.root / "never.wav"
@@ -188,6 +327,9 @@ class RenderProgram(unittest.TestCase):
         scene = self.scene("overlap.json", bodies=[{"name": n, "bank": "cube.h5", "position_m": [x, x, 1], "rotation_deg": [x * 300, 0, 0]}
                                                 for n, x in (("one", 0), ("two", 0.03))])
         self.assert_refused(render(scene, "-o", out), 2, "overlap.json", "one", "two")
+        for change, word in (({"triangle": 12}, "has 12"), ({"point_m": [0, 0, 50]}, "49.95 m away")):
+            scene = self.scene("strike.json", strikes=[{"time_s": 0.1, "body": "cube", "impulse_n_s": [0, 0, 1], **change}])
+            self.assert_refused(render(scene, "-o", out), 2, "strike.json:", word)
         self.assertFalse(out.exists())
 
     def test_bad_outputs_are_found_before_the_simulation(self):

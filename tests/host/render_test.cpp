@@ -1,9 +1,12 @@
 #include "runtime/host/render.hpp"
 
 #include <gtest/gtest.h>
+#include <sndfile.h>
 
 #include <cmath>
 #include <complex>
+#include <cstdio>
+#include <fstream>
 #include <limits>
 #include <numbers>
 
@@ -55,6 +58,99 @@ TEST(Render, PressureAtTheEarsIsTheClosedForm) {
   EXPECT_NEAR(sound.body_peak_pa[0], 2.0, 1e-3);
   EXPECT_EQ(sound.modes, 1);
   EXPECT_EQ(sound.strikes, 1);
+}
+
+TEST(Render, AnyListOfMicrophonesIsHeardEachAtItsPlace) {
+  for (const std::size_t count : {1u, 2u, 5u}) {
+    Case c({{1000.0, 0.0, 2.0}}, {0.5, 0.0, 0.2}, 0.1);
+    for (std::size_t i = 0; i < count; ++i) c.scene.microphones_m.push_back({0.7 * static_cast<double>(i), 1.0, -0.3});
+    const Sound sound = c.render();
+    ASSERT_EQ(sound.pressure_pa.size(), count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double r = std::hypot(0.7 * static_cast<double>(i) - 0.5, 1.0, 0.5);
+      for (int n = 6000; n < 24000; ++n) {
+        ASSERT_NEAR(sound.pressure_pa[i][n], 2.0 / r * std::cos(2 * pi * 1000.0 * (n / 48000.0 - 0.1 - r / 343.0)), 2e-4 * 2.0 / r)
+            << i << " " << n;
+      }
+    }
+    const std::string wav = make_wav(sound, 0.1, SampleFormat::kPcm16);
+    EXPECT_EQ(wav[22], static_cast<char>(count));
+    EXPECT_EQ(wav.size(), 44 + 24000 * 2 * count);
+    EXPECT_TRUE(std::isfinite(calc_levels(sound).mean_db));
+  }
+}
+
+TEST(Render, AListenerThatWalksTakesItsEarsAlong) {
+  Case c({{1000.0, 0.0, 2.0}}, {0.0, 0.0, 0.0}, 0.01);
+  c.scene.listener.path = {{0.0, {1.0, -3.0, 0.0}}, {0.6, {1.0, 3.0, 0.0}}};
+  c.scene.listener.position_m = {1.0, -3.0, 0.0};
+  const Sound sound = c.render();
+  for (int ear = 0; ear < 2; ++ear) {
+    for (int n = 2000; n < 24000; ++n) {
+      const double t = n / 48000.0, r = std::hypot(ear == 0 ? 0.9 : 1.1, -3.0 + 10.0 * t);
+      ASSERT_NEAR(sound.pressure_pa[ear][n], 2.0 / r * std::cos(2 * pi * 1000.0 * (t - 0.01 - r / 343.0)), 5e-4 * 2.0 / r)
+          << ear << " " << n;
+    }
+  }
+}
+
+TEST(Render, AccelerationNoiseIsADipoleAlongThePush) {
+  // The cube (10 cm, 1 kg) weighs nothing in its modes: what is heard is its click, rho0 c0 a / m times e^{-t/T} (cos t/T - sin t/T) for an
+  // impulse of 1 N s along z, turned to x by the pose; T = a / c0, from the time that sound needs from the nearest point of its sphere.
+  Case c({{1000.0, 5.0, 0.0}}, {0.0, 0.0, 0.0}, 0.1);
+  const double half = std::sqrt(0.5);
+  for (contact::Pose& pose : c.simulation.poses[0]) pose.rotation = {half, 0.0, half, 0.0};  // a quarter turn about y: z to x
+  c.simulation.impulses[0].duration_s = 2e-4;
+  c.scene.microphones_m = {{2.0, 0.0, 0.0}, {0.0, 2.0, 0.0}, {-2.0, 0.0, 0.0}, {1.2, 1.6, 0.0}};
+  EXPECT_EQ(calc_peak_pa(c.render()), 0.0);  // only where the scene asks for it
+  c.scene.effects = kPlayableEffects;
+  const Sound sound = c.render();
+  const double radius = 0.1 * std::cbrt(3.0 / (4.0 * pi)), lag = radius / 343.0;
+  double scale = 0.0;
+  for (int n = 4700; n < 5400; ++n) {
+    const double t = n / 48000.0 - (0.1 - 1e-4) - (2.0 - radius) / 343.0;
+    double expected = 0.0, area = 0.0;
+    for (int i = 0; i < 1000; ++i) {
+      const double x = (i + 0.5) / 1000.0, u = (t - 2e-4 * x) / lag;
+      area += std::pow(std::sin(pi * x), 1.5);
+      if (u > 0.0) expected += std::pow(std::sin(pi * x), 1.5) * std::exp(-u) * (std::cos(u) - std::sin(u));
+    }
+    expected *= 1.21 * 343.0 * radius / 1.0 / 2.0 / area;
+    scale = std::max(scale, std::abs(expected));
+    ASSERT_NEAR(sound.pressure_pa[0][n], expected, 0.1) << n;  // of a peak of 12: the delay's band limit
+    ASSERT_NEAR(sound.pressure_pa[1][n], 0.0, 1e-5);
+    ASSERT_NEAR(sound.pressure_pa[2][n], -sound.pressure_pa[0][n], 1e-5);
+    ASSERT_NEAR(sound.pressure_pa[3][n], 0.6 * sound.pressure_pa[0][n], 1e-4);
+  }
+  EXPECT_GT(scale, 5.0);
+  c.scene.bodies[0].spec.fixed = true;  // nothing moves it
+  EXPECT_EQ(calc_peak_pa(c.render()), 0.0);
+}
+
+TEST(Render, EffectsCanBeTakenAway) {
+  using synth::Effect;
+  Case c({{1000.0, 0.0, 2.0}}, {0.0, 3.43, 0.0}, 0.1);
+  c.simulation.impulses[0].duration_s = 1e-3;
+  c.scene.effects = {Effect::kHertzPulse};
+  EXPECT_EQ(calc_peak_pa(c.render()), 0.0);
+  // An ideal impulse, at once, in the middle: 2 / 3.43 cos from 0.1 s on in both channels.
+  c.scene.effects = {Effect::kModal};
+  c.scene.listener.ear_distance_m = 3.0;
+  const Sound sound = c.render();
+  EXPECT_EQ(sound.pressure_pa[0], sound.pressure_pa[1]);
+  for (int n = 4900; n < 24000; ++n) {
+    ASSERT_NEAR(sound.pressure_pa[0][n], 2.0 / 3.43 * std::cos(2 * pi * 1000.0 * (n / 48000.0 - 0.1)), 2e-4) << n;
+  }
+  // With the pulse it is softer by its spectrum, and with the delay 10 ms later but without Doppler shift when it flies away.
+  c.scene.effects = {Effect::kModal, Effect::kHertzPulse};
+  EXPECT_LT(calc_peak_pa(c.render()), 0.8 * calc_peak_pa(sound));
+  c.scene.effects = {Effect::kModal, Effect::kAirDelay};
+  c.simulation.poses[0] = {{0.0, {0.0, 3.43, 0.0}}, {0.5, {0.0, 13.43, 0.0}}};
+  const Sound away = c.render();
+  for (int n = 5500; n < 23000; ++n) {
+    const double t = n / 48000.0;
+    ASSERT_NEAR(away.pressure_pa[0][n] * (3.43 + 20.0 * t), 2.0 * std::cos(2 * pi * 1000.0 * (t - 0.11)), 0.13) << n;
+  }
 }
 
 TEST(Render, NoSoundComesBeforeTheContactCanBeHeard) {
@@ -125,6 +221,47 @@ TEST(Render, ImpulsesThatAreNoNumbersAreLeftOutAndCounted) {
   EXPECT_EQ(sound.refused, 1);
   EXPECT_EQ(sound.strikes, 1);
   EXPECT_TRUE(std::isfinite(calc_peak_pa(sound)));
+}
+
+TEST(SoundFile, LibsndfileReadsEveryFormatAndRateBack) {
+  struct Format {
+    SampleFormat format;
+    int subtype;
+    double step;
+  };
+  const Format formats[] = {{SampleFormat::kPcm16, SF_FORMAT_PCM_16, std::pow(2.0, -15)},
+                            {SampleFormat::kPcm24, SF_FORMAT_PCM_24, std::pow(2.0, -23)},
+                            {SampleFormat::kPcm32, SF_FORMAT_PCM_32, std::pow(2.0, -31)},
+                            {SampleFormat::kFloat, SF_FORMAT_FLOAT, std::pow(2.0, -24)}};
+  const std::string file = ::testing::TempDir() + "carillon-formats.wav";
+  for (const int rate : {8000, 12345, 44100, 48000, 96000, 192000}) {
+    Sound sound;
+    sound.rate_hz = rate;
+    for (int n = 0; n < 5000; ++n) {
+      sound.pressure_pa[0].push_back(4.0 * std::sin(0.37 * n));
+      sound.pressure_pa[1].push_back(n == 17 ? 4.0 : n == 18 ? -4.0 : 1e-6 * n);  // full scale must not wrap round
+    }
+    for (const Format& format : formats) {
+      std::ofstream(file, std::ios::binary) << make_wav(sound, 0.25, format.format);
+      SF_INFO info{};
+      SNDFILE* in = sf_open(file.c_str(), SFM_READ, &info);
+      ASSERT_NE(in, nullptr) << sf_strerror(nullptr);
+      EXPECT_EQ(info.samplerate, rate);
+      EXPECT_EQ(info.channels, 2);
+      EXPECT_EQ(info.format, SF_FORMAT_WAV | format.subtype);
+      ASSERT_EQ(info.frames, 5000);
+      std::vector<double> frames(10000);
+      EXPECT_EQ(sf_readf_double(in, frames.data(), 5000), 5000);
+      sf_close(in);
+      for (std::size_t n = 0; n < 5000; ++n) {
+        for (std::size_t ear = 0; ear < 2; ++ear) {
+          ASSERT_NEAR(frames[2 * n + ear], 0.25 * sound.pressure_pa[ear][n], 1.01 * format.step)
+              << rate << " " << format.subtype << " " << n;
+        }
+      }
+    }
+  }
+  std::remove(file.c_str());
 }
 
 TEST(Render, GainIsAutomaticGivenOrReducedButNeverClips) {

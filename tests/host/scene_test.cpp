@@ -37,6 +37,23 @@ TEST(Scene, AWholeSceneIsRead) {
   EXPECT_FALSE(scene.output.gain_per_pa.has_value());
 }
 
+TEST(Scene, StrikesAreRead) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kBody + R"(, "strikes": [
+    {"time_s": 0.5, "body": "a", "point_m": [0.1, 0, 0], "impulse_n_s": [0, 0, -0.01], "duration_s": 1e-3},
+    {"time_s": 0, "body": "a", "triangle": 7, "impulse_n_s": [1, 2, 3]}]})");
+  ASSERT_EQ(scene.strikes.size(), 2u);
+  EXPECT_EQ(scene.strikes[0].body, 0u);
+  EXPECT_EQ(scene.strikes[0].time_s, 0.5);
+  EXPECT_EQ(scene.strikes[0].point_m, (Vec3{0.1, 0.0, 0.0}));
+  EXPECT_FALSE(scene.strikes[0].triangle.has_value());
+  EXPECT_EQ(scene.strikes[0].impulse_n_s[2], -0.01);
+  EXPECT_EQ(scene.strikes[0].duration_s, 1e-3);
+  EXPECT_EQ(scene.strikes[1].triangle, 7);
+  EXPECT_EQ(scene.strikes[1].duration_s, 0.0);
+  EXPECT_EQ(scene.strikes[1].place, "/somewhere/scene.json:3");
+  EXPECT_TRUE(parse("{\"duration_s\": 2, " + kBody + "}").strikes.empty());
+}
+
 TEST(Scene, WhatIsLeftOutHasItsDefault) {
   const Scene scene = parse("{\"duration_s\": 2, " + kBody + "}");
   EXPECT_EQ(scene.sample_rate_hz, 48000);
@@ -44,6 +61,8 @@ TEST(Scene, WhatIsLeftOutHasItsDefault) {
   EXPECT_FALSE(scene.ground.has_value());
   EXPECT_EQ(scene.listener.ear_distance_m, 0.2);
   EXPECT_EQ(scene.output.format, SampleFormat::kPcm24);
+  EXPECT_EQ(scene.radiation, radiation::GainKind::kSphere);
+  EXPECT_EQ(parse("{\"duration_s\": 2, \"radiation\": \"osg02\", " + kBody + "}").radiation, radiation::GainKind::kOsg02);
   EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": 0.25}, " + kBody + "}").output.gain_per_pa, 0.25);
   EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": \"auto\"}, " + kBody + "}").output.gain_per_pa, std::nullopt);
 }
@@ -59,6 +78,32 @@ TEST(Scene, AnglesTurnAboutTheFixedAxesXThenYThenZ) {
   check({0, 1, 0}, {1, 2, 4});
   check({1, 0, 0}, {1, 3, 3});
   check({0, 0, 1}, {2, 2, 3});
+}
+
+TEST(Scene, AListenerMayMoveAndMicrophonesMayTakeItsPlace) {
+  const auto parse_root = [](const std::string& keys) { return parse("{\"duration_s\": 2, " + kBody + ", " + keys + "}"); };
+  const Scene moving = parse_root(R"("listener": {"path": [[0, 1, 2, 3], [0.5, 2, 2, 3]], "look_at_m": [1, 5, 3]})");
+  ASSERT_EQ(moving.listener.path.size(), 2u);
+  EXPECT_EQ(moving.listener.path[1].time_s, 0.5);
+  EXPECT_EQ(moving.listener.path[1].position_m, (Vec3{2, 2, 3}));
+  EXPECT_EQ(moving.listener.position_m, (Vec3{1, 2, 3}));
+  EXPECT_NEAR(moving.listener.facing[1], 1.0, 1e-12);
+  EXPECT_EQ(count_channels(moving), 2u);
+  const Scene scene = parse_root(R"("microphones": [[0, 0, 1], [0, 1, 1], [2, 0, 1]])");
+  EXPECT_EQ(count_channels(scene), 3u);
+  EXPECT_EQ(scene.microphones_m[2], (Vec3{2, 0, 1}));
+}
+
+TEST(Scene, EffectsAreThoseOfTheList) {
+  using synth::Effect;
+  const auto parse_effects = [](const std::string& list) {
+    return parse("{\"duration_s\": 2, " + kBody + ", \"effects\": " + list + "}").effects;
+  };
+  EXPECT_EQ(parse("{\"duration_s\": 2, " + kBody + "}").effects, kDefaultEffects);
+  EXPECT_FALSE(kDefaultEffects.has(Effect::kAccelerationNoise));
+  EXPECT_EQ(parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears"])"), kPlayableEffects);
+  EXPECT_EQ(parse_effects(R"(["doppler"])"), synth::EffectSet{Effect::kDoppler});
+  EXPECT_EQ(parse_effects("[]"), synth::EffectSet{});
 }
 
 TEST(Scene, TheLeftEarIsOnTheLeft) {
@@ -98,57 +143,117 @@ TEST_P(BadSceneTest, IsRefusedWithAMessageThatNamesThePlace) {
 std::string with_body(const std::string& keys) {
   return "{\"duration_s\": 1,\n \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\",\n  " + keys + "}]}";
 }
+std::string with_strike(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n\"strikes\": [{" + keys + "}]}"; }
 std::string with_root(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n" + keys + "}"; }
 
 INSTANTIATE_TEST_SUITE_P(
     Scene, BadSceneTest,
-    ::testing::Values(BadScene{"empty", "", {"JSON"}}, BadScene{"cut_short", "{\"duration_s\": 1, \"bodies\": [", {"JSON"}},
-                      BadScene{"a_list", "[1, 2]", {"object"}}, BadScene{"no_duration", "{" + kBody + "}", {"duration_s", "missing"}},
-                      BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "greater than 0"}},
-                      BadScene{"duration_as_text", "{\"duration_s\": \"1\", " + kBody + "}", {"duration_s", "number"}},
-                      BadScene{"endless", "{\"duration_s\": 1e9, " + kBody + "}", {"duration_s", "out of range", "3600"}},
-                      BadScene{"an_instant", "{\"duration_s\": 1e-9, " + kBody + "}", {"duration_s", "out of range", "0.001"}},
-                      BadScene{"too_much_memory",
-                               "{\"duration_s\": 3000, \"sample_rate_hz\": 192000, " + kBody + "}",
-                               {"duration_s", "memory", "sample_rate_hz"}},
-                      BadScene{"low_rate", with_root("\"sample_rate_hz\": 100"), {":2:", "sample_rate_hz", "8000"}},
-                      BadScene{"no_bodies", "{\"duration_s\": 1}", {"bodies", "at least one"}},
-                      BadScene{"mistyped_bodies", "{\"duration_s\": 1,\n \"bodys\": []}", {":2:", "bodys", "did you mean \"bodies\"?"}},
-                      BadScene{"empty_bodies", "{\"duration_s\": 1, \"bodies\": []}", {"bodies", "at least one"}},
-                      BadScene{"misspelt_key", with_root("\"gravity_ms2\": [0, 0, 0]"), {":2:", "gravity_ms2", "gravity_m_s2"}},
-                      BadScene{"misspelt_body_key", with_body("\"positon_m\": [0, 0, 0]"), {":3:", "positon_m", "position_m"}},
-                      BadScene{"body_without_bank", "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\"}]}", {"bank", "missing"}},
-                      BadScene{"body_without_name", "{\"duration_s\": 1, \"bodies\": [{\"bank\": \"a.h5\"}]}", {"name", "missing"}},
-                      BadScene{
-                          "twice_the_name",
-                          "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\"}, {\"name\": \"a\", \"bank\": \"b.h5\"}]}",
-                          {"already", "\"a\"", "another name"}},
-                      BadScene{"two_numbers", with_body("\"position_m\": [0, 0]"), {":3:", "position_m", "3 numbers"}},
-                      BadScene{"far_away", with_body("\"position_m\": [0, 0, 1e9]"), {"position_m", "out of range", "10000"}},
-                      BadScene{"bent_quaternion", with_body("\"quaternion\": [1, 1, 0, 0]"), {"quaternion", "1.41421", "length 1"}},
-                      BadScene{"two_rotations",
-                               with_body("\"quaternion\": [1, 0, 0, 0], \"rotation_deg\": [0, 0, 0]"),
-                               {"quaternion", "rotation_deg", "keep one"}},
-                      BadScene{"moving_shelf", with_body("\"fixed\": true, \"velocity_m_s\": [1, 0, 0]"), {"velocity_m_s", "fixed"}},
-                      BadScene{"too_bouncy", with_body("\"restitution\": 1.5"), {"restitution", "from 0 to 1"}},
-                      BadScene{"negative_friction", with_body("\"friction\": -0.1"), {"friction", "out of range"}},
-                      BadScene{"faster_than_sound", with_body("\"velocity_m_s\": [400, 0, 0]"), {"velocity_m_s", "300"}},
-                      BadScene{"fixed_as_number", with_body("\"fixed\": 1"), {"fixed", "true or false"}},
-                      BadScene{"soft_ground", with_root("\"ground\": {\"young_modulus_pa\": 0}"), {"young_modulus_pa", "greater than 0"}},
-                      BadScene{"impossible_ground", with_root("\"ground\": {\"poisson_ratio\": 0.5}"), {"poisson_ratio", "0.5"}},
-                      BadScene{"ground_as_number", with_root("\"ground\": 0"), {"ground", "object"}},
-                      BadScene{"nowhere_to_look",
-                               with_root("\"listener\": {\"position_m\": [1, 1, 1], \"look_at_m\": [1, 1, 1]}"),
-                               {"look_at_m", "direction"}},
-                      BadScene{"two_directions",
-                               with_root("\"listener\": {\"facing\": [1, 0, 0], \"look_at_m\": [1, 1, 1]}"),
-                               {"look_at_m", "facing", "keep one"}},
-                      BadScene{"giant_head", with_root("\"listener\": {\"ear_distance_m\": 11}"), {"ear_distance_m", "from 0 to 10"}},
-                      BadScene{"gain_word", with_root("\"output\": {\"gain\": \"loud\"}"), {"gain", "auto", "number"}},
-                      BadScene{"gain_list", with_root("\"output\": {\"gain\": [1]}"), {"gain", "auto", "number"}},
-                      BadScene{"gain_zero", with_root("\"output\": {\"gain\": 0}"), {"gain", "greater than 0"}},
-                      BadScene{"unknown_format", with_root("\"output\": {\"format\": \"pcm25\"}"), {"format", "pcm24"}},
-                      BadScene{"key_twice", "{\"duration_s\": 1, \"duration_s\": 2, " + kBody + "}", {"duration_s"}}),
+    ::testing::Values(
+        BadScene{"empty", "", {"JSON"}}, BadScene{"cut_short", "{\"duration_s\": 1, \"bodies\": [", {"JSON"}},
+        BadScene{"a_list", "[1, 2]", {"object"}}, BadScene{"no_duration", "{" + kBody + "}", {"duration_s", "missing"}},
+        BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "greater than 0"}},
+        BadScene{"duration_as_text", "{\"duration_s\": \"1\", " + kBody + "}", {"duration_s", "number"}},
+        BadScene{"endless", "{\"duration_s\": 1e9, " + kBody + "}", {"duration_s", "out of range", "3600"}},
+        BadScene{"an_instant", "{\"duration_s\": 1e-9, " + kBody + "}", {"duration_s", "out of range", "0.001"}},
+        BadScene{"too_much_memory",
+                 "{\"duration_s\": 3000, \"sample_rate_hz\": 192000, " + kBody + "}",
+                 {"duration_s", "memory", "sample_rate_hz"}},
+        BadScene{"low_rate", with_root("\"sample_rate_hz\": 100"), {":2:", "sample_rate_hz", "8000"}},
+        BadScene{"no_bodies", "{\"duration_s\": 1}", {"bodies", "at least one"}},
+        BadScene{"mistyped_bodies", "{\"duration_s\": 1,\n \"bodys\": []}", {":2:", "bodys", "did you mean \"bodies\"?"}},
+        BadScene{"empty_bodies", "{\"duration_s\": 1, \"bodies\": []}", {"bodies", "at least one"}},
+        BadScene{"misspelt_key", with_root("\"gravity_ms2\": [0, 0, 0]"), {":2:", "gravity_ms2", "gravity_m_s2"}},
+        BadScene{"misspelt_body_key", with_body("\"positon_m\": [0, 0, 0]"), {":3:", "positon_m", "position_m"}},
+        BadScene{"body_without_bank", "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\"}]}", {"bank", "missing"}},
+        BadScene{"body_without_name", "{\"duration_s\": 1, \"bodies\": [{\"bank\": \"a.h5\"}]}", {"name", "missing"}},
+        BadScene{"twice_the_name",
+                 "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\"}, {\"name\": \"a\", \"bank\": \"b.h5\"}]}",
+                 {"already", "\"a\"", "another name"}},
+        BadScene{"two_numbers", with_body("\"position_m\": [0, 0]"), {":3:", "position_m", "3 numbers"}},
+        BadScene{"far_away", with_body("\"position_m\": [0, 0, 1e9]"), {"position_m", "out of range", "10000"}},
+        BadScene{"bent_quaternion", with_body("\"quaternion\": [1, 1, 0, 0]"), {"quaternion", "1.41421", "length 1"}},
+        BadScene{"two_rotations",
+                 with_body("\"quaternion\": [1, 0, 0, 0], \"rotation_deg\": [0, 0, 0]"),
+                 {"quaternion", "rotation_deg", "keep one"}},
+        BadScene{"moving_shelf", with_body("\"fixed\": true, \"velocity_m_s\": [1, 0, 0]"), {"velocity_m_s", "fixed"}},
+        BadScene{"too_bouncy", with_body("\"restitution\": 1.5"), {"restitution", "from 0 to 1"}},
+        BadScene{"negative_friction", with_body("\"friction\": -0.1"), {"friction", "out of range"}},
+        BadScene{"faster_than_sound", with_body("\"velocity_m_s\": [400, 0, 0]"), {"velocity_m_s", "300"}},
+        BadScene{"fixed_as_number", with_body("\"fixed\": 1"), {"fixed", "true or false"}},
+        BadScene{"soft_ground", with_root("\"ground\": {\"young_modulus_pa\": 0}"), {"young_modulus_pa", "greater than 0"}},
+        BadScene{"impossible_ground", with_root("\"ground\": {\"poisson_ratio\": 0.5}"), {"poisson_ratio", "0.5"}},
+        BadScene{"ground_as_number", with_root("\"ground\": 0"), {"ground", "object"}},
+        BadScene{"nowhere_to_look",
+                 with_root("\"listener\": {\"position_m\": [1, 1, 1], \"look_at_m\": [1, 1, 1]}"),
+                 {"look_at_m", "direction"}},
+        BadScene{"two_directions",
+                 with_root("\"listener\": {\"facing\": [1, 0, 0], \"look_at_m\": [1, 1, 1]}"),
+                 {"look_at_m", "facing", "keep one"}},
+        BadScene{"giant_head", with_root("\"listener\": {\"ear_distance_m\": 11}"), {"ear_distance_m", "from 0 to 10"}},
+        BadScene{"gain_word", with_root("\"output\": {\"gain\": \"loud\"}"), {"gain", "auto", "number"}},
+        BadScene{"gain_list", with_root("\"output\": {\"gain\": [1]}"), {"gain", "auto", "number"}},
+        BadScene{"gain_zero", with_root("\"output\": {\"gain\": 0}"), {"gain", "greater than 0"}},
+        BadScene{"unknown_format", with_root("\"output\": {\"format\": \"pcm25\"}"), {"format", "pcm24"}},
+        BadScene{"unknown_effect", with_root("\"effects\": [\"dopler\"]"), {":2:", "effects", "dopler", "did you mean \"doppler\"?"}},
+        BadScene{"effect_of_tomorrow", with_root("\"effects\": [\"contact_damping\"]"), {"contact_damping", "acceleration_noise"}},
+        BadScene{"effect_twice", with_root("\"effects\": [\"modal\", \"modal\"]"), {"effects", "twice"}},
+        BadScene{"effects_as_object", with_root("\"effects\": {}"), {"effects", "list of names"}},
+        BadScene{"path_and_position",
+                 with_root("\"listener\": {\"path\": [[0, 0, 0, 0]], \"position_m\": [1, 1, 1]}"),
+                 {":2:", "path", "position_m", "keep one"}},
+        BadScene{"path_without_rows", with_root("\"listener\": {\"path\": []}"), {"path", "lists of 4"}},
+        BadScene{"path_back_in_time", with_root("\"listener\": {\"path\": [[1, 0, 0, 0], [1, 0, 0, 1]]}"), {"path", "order of time"}},
+        BadScene{
+            "path_faster_than_sound", with_root("\"listener\": {\"path\": [[0, 0, 0, 0], [1, 0, 0, 400]]}"), {"path", "400 m/s", "300"}},
+        BadScene{"path_far_away", with_root("\"listener\": {\"path\": [[0, 0, 0, 1e6]]}"), {"path", "out of range"}},
+        BadScene{"path_for_ever", with_root("\"listener\": {\"path\": [[1e9, 0, 0, 0]]}"), {"path", "out of range"}},
+        BadScene{"no_microphones", with_root("\"microphones\": []"), {":2:", "microphones", "1 to 16"}},
+        BadScene{"flat_microphones", with_root("\"microphones\": [0, 0, 1]"), {"microphones", "list of 3 numbers"}},
+        BadScene{"microphones_and_listener",
+                 with_root("\"microphones\": [[0, 0, 1]], \"listener\": {}"),
+                 {"microphones", "listener", "keep one"}},
+        BadScene{
+            "too_many_channels",
+            "{\"duration_s\": 1000, \"sample_rate_hz\": 96000, \"microphones\": [[0,0,1],[0,0,1],[0,0,1],[0,0,1],[0,0,1]], " + kBody + "}",
+            {"duration_s", "5 channels", "memory"}},
+        BadScene{"unknown_radiation", with_root("\"radiation\": \"sfere\""), {":2:", "radiation", "sphere"}},
+        BadScene{"strikes_as_object", with_root("\"strikes\": {}"), {":2:", "strikes", "list"}},
+        BadScene{"strike_at_nobody",
+                 with_strike("\"time_s\": 0, \"body\": \"b\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"),
+                 {":2:", "body", "no body is called \"b\""}},
+        BadScene{"strike_without_time", with_strike("\"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"), {"time_s", "missing"}},
+        BadScene{"strike_after_the_end",
+                 with_strike("\"time_s\": 1.5, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"),
+                 {"time_s", "1.5", "out of range"}},
+        BadScene{"strike_before_the_beginning",
+                 with_strike("\"time_s\": 0.001, \"duration_s\": 0.003, \"body\": \"a\", \"triangle\": 0, "
+                             "\"impulse_n_s\": [0, 0, 1]"),
+                 {"time_s", "out of range", "beginning"}},
+        BadScene{
+            "strike_nowhere", with_strike("\"time_s\": 0, \"body\": \"a\", \"impulse_n_s\": [0, 0, 1]"), {"point_m", "triangle", "either"}},
+        BadScene{"strike_in_two_places",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"point_m\": [0, 0, 0], "
+                             "\"impulse_n_s\": [0, 0, 1]"),
+                 {"point_m", "triangle", "either"}},
+        BadScene{"strike_without_impulse", with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0"), {"impulse_n_s", "missing"}},
+        BadScene{"strike_with_a_number",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": 1"),
+                 {"impulse_n_s", "3 numbers"}},
+        BadScene{"strike_of_a_giant",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1e9]"),
+                 {"impulse_n_s", "out of range"}},
+        BadScene{"endless_strike",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1], \"duration_s\": 2"),
+                 {"duration_s", "from 0 to 1"}},
+        BadScene{"negative_triangle",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": -1, \"impulse_n_s\": [0, 0, 1]"),
+                 {"triangle", "-1"}},
+        BadScene{
+            "half_a_triangle", with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0.5, \"impulse_n_s\": [0, 0, 1]"), {"triangle"}},
+        BadScene{"misspelt_strike_key",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1], \"durations\": 0"),
+                 {":2:", "durations", "duration_s"}},
+        BadScene{"key_twice", "{\"duration_s\": 1, \"duration_s\": 2, " + kBody + "}", {"duration_s"}}),
     [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace

@@ -6,7 +6,10 @@
 #include "tests/synth/cube_bank.hpp"
 
 int main(int argc, char** argv) {
-  if (argc < 2) return 2;
+  if (argc < 2) {
+    std::fputs("usage: write_cube_bank OUT.h5 [GAIN]\n", stderr);
+    return 1;
+  }
   const double gain = argc > 2 ? std::atof(argv[2]) : 0.3;
   std::vector<carillon::testing::InventedMode> modes;
   for (const double freq : {820.0, 1730.0, 2950.0, 4410.0, 7020.0}) modes.push_back({freq, 12.0, gain, {0.4, 0.7, 1.1}, 0.07});

@@ -1,0 +1,19 @@
+// The banks that a scene names.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/host/scene.hpp"
+
+namespace carillon::host {
+
+using Banks = std::map<std::filesystem::path, std::unique_ptr<bank::Bank>>;
+
+/// Reads every bank once, and gives it the gains that the scene asks for. The scene's bodies point into the result. Throws InputError,
+/// which names scene and body.
+Banks read_banks(Scene& scene);
+
+}  // namespace carillon::host

@@ -1,0 +1,107 @@
+#include "runtime/host/events.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "runtime/contact/world.hpp"
+#include "runtime/host/pose.hpp"
+#include "runtime/host/strikes.hpp"
+
+namespace carillon::host {
+namespace {
+
+std::vector<stream::RecordedBody> list_bodies(const Scene& scene) {
+  std::vector<stream::RecordedBody> bodies;
+  for (const SceneBody& body : scene.bodies) bodies.push_back({body.name, static_cast<std::int64_t>(body.spec.bank->triangles.size())});
+  return bodies;
+}
+
+/// Where no body can move there is no physics: every body stays where the scene puts it.
+std::vector<stream::Event> make_still(const Scene& scene) {
+  std::vector<stream::Event> events;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const contact::BodySpec& spec = scene.bodies[i].spec;
+    stream::Motion motion;
+    motion.body = static_cast<std::int32_t>(i);
+    motion.position_m = calc_world_point(spec.initial, spec.bank->rigid.centre_m);
+    motion.rotation = spec.initial.rotation;
+    events.emplace_back(motion);
+  }
+  return events;
+}
+
+Course run_physics(const Scene& scene, bool has_contacts, const std::function<void(double)>& progress) {
+  contact::World world(make_world(scene), {.end_s = scene.duration_s, .lasting_contacts = has_contacts});
+  Course course;
+  constexpr int kParts = 100;
+  for (int part = 1; part <= kParts; ++part) {
+    world.advance(scene.duration_s * part / kParts, std::numeric_limits<double>::infinity(),
+                  [&](const stream::Event& event) { course.recording.events.push_back(event); });
+    if (progress) progress(static_cast<double>(part) / kParts);
+  }
+  course.steps = world.get_statistics().steps;
+  return course;
+}
+
+}  // namespace
+
+bool has_physics(const Scene& scene) {
+  return std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const SceneBody& body) { return !body.spec.fixed; });
+}
+
+contact::WorldSpec make_world(const Scene& scene) {
+  contact::WorldSpec spec;
+  for (const SceneBody& body : scene.bodies) spec.bodies.push_back(body.spec);
+  spec.ground = scene.ground;
+  spec.gravity_m_s2 = scene.gravity_m_s2;
+  return spec;
+}
+
+Course simulate(const Scene& scene, bool has_contacts, const std::function<void(double)>& progress) {
+  Course course;
+  std::vector<const bank::Bank*> banks;
+  for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
+  const std::vector<contact::Impulse> strikes = make_impulses(scene, banks);  // refused before the physics, if at all
+  if (!has_physics(scene)) {
+    course.recording.events = make_still(scene);
+  } else {
+    try {
+      course = run_physics(scene, has_contacts, progress);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
+    } catch (const SolveError& error) {
+      throw SolveError(fmt::format("{}: {}", scene.file.string(), error.what()));
+    }
+  }
+  std::vector<stream::Event>& events = course.recording.events;
+  events.insert(events.end(), strikes.begin(), strikes.end());
+  std::stable_sort(events.begin(), events.end(),
+                   [](const stream::Event& a, const stream::Event& b) { return stream::get_time_s(a) < stream::get_time_s(b); });
+  course.recording.bodies = list_bodies(scene);
+  return course;
+}
+
+Course read_course(const std::filesystem::path& file, const Scene& scene) {
+  Course course{stream::read_recording(file), 0};
+  const std::vector<stream::RecordedBody>&theirs = course.recording.bodies, ours = list_bodies(scene);
+  if (theirs.size() != ours.size()) {
+    throw InputError(fmt::format("{}: is of {} bodies, and the scene has {}; play it with the scene that it was made for", file.string(),
+                                 theirs.size(), ours.size()));
+  }
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    if (theirs[i].name != ours[i].name) {
+      throw InputError(fmt::format("{}: body {} is \"{}\", and \"{}\" in the scene; play it with the scene that it was made for",
+                                   file.string(), i, theirs[i].name, ours[i].name));
+    }
+    if (theirs[i].triangles != ours[i].triangles) {
+      throw InputError(
+          fmt::format("{}: was made for a bank of \"{}\" with {} triangles, and the scene's has {}; use banks of the same mesh",
+                      file.string(), ours[i].name, theirs[i].triangles, ours[i].triangles));
+    }
+  }
+  return course;
+}
+
+}  // namespace carillon::host

@@ -1,0 +1,125 @@
+// Method:     PortAudio's callback with separate channels, which is what process() fills.
+// Source:     PortAudio V19 reference, portaudio.h.
+// Deviations: none.
+#include "runtime/live/device.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <portaudio.h>
+#include <unistd.h>
+
+#include <atomic>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::live {
+namespace {
+
+/// PortAudio, started once for as long as somebody needs it.
+class Library {
+ public:
+  Library() {
+    // Its back ends tell about every sound system that is not there, on standard error.
+    const int kept = dup(STDERR_FILENO);
+    const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (kept >= 0 && nothing >= 0) dup2(nothing, STDERR_FILENO);
+    const PaError error = Pa_Initialize();
+    if (kept >= 0) {
+      dup2(kept, STDERR_FILENO);
+      close(kept);
+    }
+    if (nothing >= 0) close(nothing);
+    if (error != paNoError) throw SystemError(fmt::format("the sound system does not start: {}", Pa_GetErrorText(error)));
+  }
+  ~Library() { Pa_Terminate(); }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+};
+
+/// Index of every output device, the default one first.
+std::vector<PaDeviceIndex> find_outputs() {
+  std::vector<PaDeviceIndex> outputs;
+  const PaDeviceIndex preferred = Pa_GetDefaultOutputDevice();
+  if (preferred != paNoDevice) outputs.push_back(preferred);
+  for (PaDeviceIndex i = 0; i < Pa_GetDeviceCount(); ++i)
+    if (i != preferred && Pa_GetDeviceInfo(i)->maxOutputChannels > 0) outputs.push_back(i);
+  return outputs;
+}
+
+PaDeviceIndex find_device(const std::string& name) {
+  const std::vector<PaDeviceIndex> outputs = find_outputs();
+  if (outputs.empty()) throw SystemError("there is no sound card, and no sound server runs");
+  if (name.empty()) return outputs.front();
+  std::string names;
+  for (const PaDeviceIndex i : outputs) {
+    if (Pa_GetDeviceInfo(i)->name == name) return i;
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", Pa_GetDeviceInfo(i)->name);
+  }
+  throw InputError(fmt::format("no output is called \"{}\"; there are {}", name, names));
+}
+
+}  // namespace
+
+struct Device::State {
+  Library library;
+  synth::Synthesiser* synthesiser = nullptr;
+  PaStream* stream = nullptr;
+  std::atomic<std::int64_t> callbacks{0}, frames{0}, underflows{0};
+  bool is_running = false;
+
+  static int play(const void*, void* out, unsigned long frames, const PaStreamCallbackTimeInfo*, PaStreamCallbackFlags flags, void* self) {
+    auto& state = *static_cast<State*>(self);
+    if ((flags & paOutputUnderflow) != 0) state.underflows.fetch_add(1, std::memory_order_relaxed);
+    state.callbacks.fetch_add(1, std::memory_order_relaxed);
+    state.frames.fetch_add(static_cast<std::int64_t>(frames), std::memory_order_relaxed);
+    state.synthesiser->process(static_cast<float* const*>(out), state.synthesiser->get_microphone_count(), static_cast<int>(frames));
+    return paContinue;
+  }
+};
+
+std::vector<std::string> list_devices() {
+  const Library library;
+  std::vector<std::string> names;
+  for (const PaDeviceIndex i : find_outputs()) names.emplace_back(Pa_GetDeviceInfo(i)->name);
+  return names;
+}
+
+Device::Device(synth::Synthesiser& synthesiser, const DeviceOptions& options) : state_(std::make_unique<State>()) {
+  state_->synthesiser = &synthesiser;
+  PaStreamParameters output{};
+  output.device = find_device(options.name);
+  output.channelCount = synthesiser.get_microphone_count();
+  output.sampleFormat = paFloat32 | paNonInterleaved;
+  output.suggestedLatency = Pa_GetDeviceInfo(output.device)->defaultLowOutputLatency;
+  const PaError error = Pa_OpenStream(&state_->stream, nullptr, &output, options.rate_hz, static_cast<unsigned long>(options.frames),
+                                      paNoFlag, State::play, state_.get());
+  if (error != paNoError) {
+    throw SystemError(fmt::format("\"{}\" does not play {} channels at {} Hz: {}", Pa_GetDeviceInfo(output.device)->name,
+                                  output.channelCount, options.rate_hz, Pa_GetErrorText(error)));
+  }
+}
+
+Device::~Device() {
+  if (state_->stream != nullptr) Pa_CloseStream(state_->stream);
+}
+
+void Device::start() {
+  const PaError error = Pa_StartStream(state_->stream);
+  if (error != paNoError) throw SystemError(fmt::format("the sound card does not start: {}", Pa_GetErrorText(error)));
+  state_->is_running = true;
+}
+
+void Device::stop() {
+  if (state_->is_running) Pa_StopStream(state_->stream);
+  state_->is_running = false;
+}
+
+DeviceStatistics Device::get_statistics() const noexcept {
+  const PaStreamInfo* info = Pa_GetStreamInfo(state_->stream);
+  return {.callbacks = state_->callbacks.load(std::memory_order_relaxed),
+          .frames = state_->frames.load(std::memory_order_relaxed),
+          .underflows = state_->underflows.load(std::memory_order_relaxed),
+          .latency_s = info != nullptr ? info->outputLatency : 0.0};
+}
+
+}  // namespace carillon::live

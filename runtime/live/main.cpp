@@ -1,0 +1,56 @@
+// carillon-live: a scene file to a sound card.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "runtime/config/error.hpp"
+#include "runtime/live/device.hpp"
+#include "runtime/live/player.hpp"
+
+namespace {
+
+int fail(int code, const char* message) {
+  fmt::print(stderr, "carillon-live: {}\n", message);
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  carillon::live::PlayerOptions options;
+  bool lists = false;
+  CLI::App app("Plays a scene of falling bodies while it happens.", "carillon-live");
+  auto* scene = app.add_option("scene", options.scene, "Scene file (JSON)")->option_text("SCENE.json");
+  app.add_flag("--list", lists, "List the sound cards' outputs, the default one first")->excludes(scene);
+  app.add_option("--device", options.device, "Output to play on, by its name")->option_text("NAME");
+  app.add_option("--frames", options.frames, "Frames of a block, 16 to 8192")->check(CLI::Range(16, 8192))->option_text("N");
+  app.add_option("--look-ahead", options.look_ahead_s, "Seconds by which physics runs ahead of the sound, 0.02 to 10")
+      ->check(CLI::Range(0.02, 10.0))
+      ->option_text("S");
+  app.add_option("--gain", options.gain_per_pa, "Full scale per pascal, instead of the scene's (or 1)")
+      ->check(CLI::PositiveNumber)
+      ->option_text("G");
+  app.add_flag("-q,--quiet", options.quiet, "Print nothing");
+  try {
+    app.parse(argc, argv);
+    if (!lists && scene->empty()) throw CLI::RequiredError("scene");
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : carillon::kExitInput;
+  }
+  try {
+    if (lists) {
+      for (const std::string& name : carillon::live::list_devices()) fmt::print("{}\n", name);
+      return 0;
+    }
+    carillon::live::play(options);
+  } catch (const carillon::InputError& error) {
+    return fail(carillon::kExitInput, error.what());
+  } catch (const carillon::SolveError& error) {
+    return fail(carillon::kExitSolve, error.what());
+  } catch (const std::exception& error) {
+    return fail(carillon::kExitSystem, error.what());
+  }
+  return 0;
+}

@@ -1,0 +1,142 @@
+// Method:     one thread runs the physics in slices until it is `look_ahead_s` ahead of the card and hands its events on in order of time;
+//             the card's thread plays them. Where physics falls behind, impulses act late, which is counted.
+// Source:     none.
+// Deviations: none.
+#include "runtime/live/player.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <limits>
+#include <map>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "runtime/contact/world.hpp"
+#include "runtime/host/banks.hpp"
+#include "runtime/host/events.hpp"
+#include "runtime/host/microphones.hpp"
+#include "runtime/host/pose.hpp"
+#include "runtime/host/scene.hpp"
+#include "runtime/host/strikes.hpp"
+#include "runtime/live/device.hpp"
+#include "runtime/synth/model.hpp"
+#include "runtime/synth/synthesiser.hpp"
+
+namespace carillon::live {
+namespace {
+
+constexpr double kSliceS = 0.01;  // of CPU time for physics, between two looks at the ring
+
+/// Physics and strikes of a scene as one stream, in order of time.
+class Course {
+ public:
+  Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks) : strikes_(host::make_impulses(scene, banks)) {
+    std::stable_sort(strikes_.begin(), strikes_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+    if (!host::has_physics(scene)) return;
+    world_ = std::make_unique<contact::World>(host::make_world(scene),
+                                              contact::WorldOptions{.end_s = scene.duration_s, .lasting_contacts = false});
+    end_s_ = scene.duration_s;
+  }
+
+  /// Goes on towards a time, for a slice of CPU time.
+  void advance(double until_s) {
+    if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return;
+    time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) { waiting_.push_back(event); });
+  }
+  /// Up to where it is known what happens.
+  double get_time_s() const { return world_ == nullptr || time_s_ >= end_s_ ? std::numeric_limits<double>::infinity() : time_s_; }
+
+  /// Hands on what happens before a time, as far as there is room.
+  void hand_on(double until_s, synth::Synthesiser& synthesiser) {
+    while (true) {
+      const bool has_strike = next_ < strikes_.size() && strikes_[next_].time_s <= until_s;
+      const bool has_event = !waiting_.empty() && stream::get_time_s(waiting_.front()) <= until_s;
+      if (!has_strike && !has_event) return;
+      const bool takes_strike = has_strike && (!has_event || strikes_[next_].time_s < stream::get_time_s(waiting_.front()));
+      if (!synthesiser.push(takes_strike ? stream::Event(strikes_[next_]) : waiting_.front())) return;  // full: later
+      if (takes_strike)
+        ++next_;
+      else
+        waiting_.pop_front();
+    }
+  }
+
+ private:
+  std::vector<stream::Impulse> strikes_;
+  std::size_t next_ = 0;
+  std::unique_ptr<contact::World> world_;
+  std::deque<stream::Event> waiting_;
+  double time_s_ = 0.0, end_s_ = 0.0;
+};
+
+/// The way of a listener that walks, as events.
+class Walk {
+ public:
+  explicit Walk(const synth::Track& way) : way_(&way), next_(way.is_still() ? std::numeric_limits<std::int64_t>::max() : 0) {}
+  void hand_on(double until_s, synth::Synthesiser& synthesiser) {
+    constexpr double kEveryS = 0.01;
+    for (; static_cast<double>(next_) * kEveryS <= until_s; ++next_) {
+      const synth::Waypoint at = way_->find(static_cast<double>(next_) * kEveryS);
+      if (!synthesiser.push(stream::Listener{.time_s = at.time_s, .position_m = at.position_m, .velocity_m_s = at.velocity_m_s})) return;
+    }
+  }
+
+ private:
+  const synth::Track* way_;
+  std::int64_t next_;
+};
+
+}  // namespace
+
+void play(const PlayerOptions& options) {
+  host::Scene scene = host::parse_scene(config::read_document(options.scene));
+  const host::Banks banks = host::read_banks(scene);
+  std::vector<const bank::Bank*> body_banks;
+  for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
+  const double rate_hz = scene.sample_rate_hz;
+
+  const host::Microphones microphones = host::make_microphones(scene);
+  synth::Synthesiser synthesiser({.rate_hz = rate_hz,
+                                  .microphones_m = microphones.offset_m,
+                                  .listener_m = microphones.centre.find(0.0).position_m,
+                                  .max_bodies = static_cast<int>(scene.bodies.size()),
+                                  .max_waypoints = 1024,
+                                  .ring_events = 1 << 14});
+  synthesiser.set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
+  std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
+  for (const host::SceneBody& body : scene.bodies) {
+    auto& model = models[body.spec.bank];
+    if (model == nullptr) model = synth::Model::make(*body.spec.bank, {.rate_hz = rate_hz});
+    synthesiser.add_body(model, {.position_m = host::calc_world_point(body.spec.initial, body.spec.bank->rigid.centre_m)});
+  }
+  Course course(scene, body_banks);
+  Walk walk(microphones.centre);
+  Device device(synthesiser, {.name = options.device, .rate_hz = rate_hz, .frames = options.frames});
+  while (course.get_time_s() < options.look_ahead_s) course.advance(options.look_ahead_s);
+  course.hand_on(options.look_ahead_s, synthesiser);
+  walk.hand_on(options.look_ahead_s, synthesiser);
+  device.start();
+  std::int64_t behind = 0;  // looks at which physics was not ahead
+  for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
+    const double until = now + options.look_ahead_s;
+    course.advance(until);
+    course.hand_on(until, synthesiser);
+    walk.hand_on(until, synthesiser);
+    if (course.get_time_s() < synthesiser.get_horizon_s()) ++behind;
+    if (course.get_time_s() >= until) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  device.stop();
+  const DeviceStatistics card = device.get_statistics();
+  const synth::SynthesiserCounters counters = synthesiser.get_counters();
+  if (options.quiet) return;
+  fmt::print("played             {:.2f} s in {} blocks, {} underflows, latency {:.1f} ms\n", static_cast<double>(card.frames) / rate_hz,
+             card.callbacks, card.underflows, 1e3 * card.latency_s);
+  fmt::print("strikes            {}, {} late, {} refused\n", counters.strikes, counters.late, counters.refused);
+  fmt::print("physics            {} times behind the sound\n", behind);
+}
+
+}  // namespace carillon::live

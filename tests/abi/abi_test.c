@@ -1,0 +1,207 @@
+/* Every function of carillon.h, with good and with bad arguments. */
+#include <carillon.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int failures = 0;
+
+#define CHECK(condition)                                                  \
+  do {                                                                    \
+    if (!(condition)) {                                                   \
+      fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);     \
+      ++failures;                                                         \
+    }                                                                     \
+  } while (0)
+
+static char message[256];
+
+static void* read_file(const char* name, size_t* size) {
+  FILE* file = fopen(name, "rb");
+  void* bytes;
+  if (file == NULL) exit(2);
+  fseek(file, 0, SEEK_END);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  bytes = malloc(*size);
+  if (bytes == NULL || fread(bytes, 1, *size, file) != *size) exit(2);
+  fclose(file);
+  return bytes;
+}
+
+static void check_banks(const char* name, carillon_bank** bank) {
+  size_t size;
+  char* bytes = read_file(name, &size);
+  carillon_bank* other = (carillon_bank*)1;
+  char small[8];
+  CHECK(carillon_bank_open(name, bank, message, sizeof message) == CARILLON_OK);
+  CHECK(message[0] == '\0');
+  CHECK(carillon_bank_parse(bytes, size, &other, NULL, 0) == CARILLON_OK);
+  CHECK(carillon_bank_mode_count(other) == carillon_bank_mode_count(*bank) && carillon_bank_mode_count(other) > 0);
+  CHECK(carillon_bank_triangle_count(other) > 0);
+  CHECK(carillon_bank_frequency_hz(other, 0) == carillon_bank_frequency_hz(*bank, 0) && carillon_bank_frequency_hz(other, 0) > 0);
+  CHECK(carillon_bank_frequency_hz(other, -1) == 0 && carillon_bank_frequency_hz(other, 1 << 30) == 0);
+  carillon_bank_close(other);
+  bytes[size / 2] ^= 1;
+  CHECK(carillon_bank_parse(bytes, size, &other, message, sizeof message) == CARILLON_BAD_INPUT);
+  CHECK(other == NULL && strlen(message) > 10);
+  CHECK(carillon_bank_parse(bytes, 10, &other, small, sizeof small) == CARILLON_BAD_INPUT);
+  CHECK(strlen(small) == sizeof small - 1);
+  CHECK(carillon_bank_open("/nowhere", &other, message, sizeof message) == CARILLON_BAD_INPUT && strstr(message, "/nowhere") != NULL);
+  CHECK(carillon_bank_open(NULL, &other, message, sizeof message) == CARILLON_BAD_ARGUMENT && strlen(message) > 10);
+  CHECK(carillon_bank_open(name, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_parse(NULL, 5, &other, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_mode_count(NULL) == 0 && carillon_bank_triangle_count(NULL) == 0);
+  carillon_bank_close(NULL);
+  free(bytes);
+}
+
+static void check_models(const carillon_bank* bank, carillon_model** model) {
+  carillon_model_options options;
+  carillon_model* other;
+  carillon_model_options_init(&options);
+  carillon_model_options_init(NULL);
+  CHECK(carillon_model_make(bank, &options, model, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_model_mode_count(*model) > 0 && carillon_model_mode_count(*model) <= carillon_bank_mode_count(bank));
+  options.radiation = CARILLON_RADIATION_OSG02;
+  CHECK(carillon_model_make(bank, &options, &other, NULL, 0) == CARILLON_OK);
+  carillon_model_release(other);
+  options.radiation = 77;
+  CHECK(carillon_model_make(bank, &options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT && other == NULL);
+  options.radiation = 0;
+  options.rate_hz = -1;
+  CHECK(carillon_model_make(bank, &options, &other, message, sizeof message) == CARILLON_BAD_INPUT && other == NULL && message[0] != '\0');
+  options.size = 0;
+  CHECK(carillon_model_make(bank, &options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_model_make(NULL, NULL, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_model_mode_count(NULL) == 0);
+  carillon_model_release(NULL);
+}
+
+static float play(carillon_synth* synth, int blocks) {
+  float left[64], right[64];
+  float* out[2];
+  float peak = 0;
+  int n;
+  out[0] = left;
+  out[1] = right;
+  for (; blocks > 0; --blocks) {
+    carillon_process(synth, out, 2, 64);
+    for (n = 0; n < 64; ++n) peak = fmaxf(peak, fmaxf(fabsf(left[n]), fabsf(right[n])));
+  }
+  return peak;
+}
+
+static void check_events(carillon_synth* synth, int32_t body) {
+  carillon_impulse impulse;
+  carillon_motion motion;
+  carillon_listener listener;
+  carillon_impulse_init(&impulse);
+  carillon_motion_init(&motion);
+  carillon_listener_init(&listener);
+  carillon_impulse_init(NULL);
+  carillon_motion_init(NULL);
+  carillon_listener_init(NULL);
+  impulse.body = motion.body = body;
+  motion.position_m[1] = 1;
+  impulse.time_s = carillon_horizon_s(synth) + 0.001;
+  impulse.duration_s = 1e-4;
+  impulse.impulse_n_s[0] = impulse.impulse_n_s[2] = 0.01;
+  CHECK(carillon_push_motion(synth, &motion) == CARILLON_OK);
+  CHECK(carillon_push_listener(synth, &listener) == CARILLON_OK);
+  CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_OK);
+  CHECK(play(synth, 100) > 0);
+  impulse.gaussian = 1;
+  impulse.time_s = carillon_horizon_s(synth) + 0.001;
+  CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_OK);
+  impulse.impulse_n_s[1] = nan("");
+  CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_BAD_INPUT);
+  motion.position_m[0] = INFINITY;
+  CHECK(carillon_push_motion(synth, &motion) == CARILLON_BAD_INPUT);
+  listener.velocity_m_s[2] = -INFINITY;
+  CHECK(carillon_push_listener(synth, &listener) == CARILLON_BAD_INPUT);
+  impulse.size = 3;
+  CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_push_impulse(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_impulse(NULL, &impulse) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_push_motion(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_motion(NULL, &motion) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_push_listener(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_listener(NULL, &listener) == CARILLON_BAD_ARGUMENT);
+}
+
+static void check_synth(const carillon_model* model) {
+  static const double place[3] = {0, 1, 0}, nowhere[3] = {0, NAN, 0};
+  static const double microphones[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}};
+  carillon_options options;
+  carillon_synth* synth;
+  carillon_synth* other;
+  carillon_counters counters;
+  carillon_motion motion;
+  int32_t body, second;
+  int i;
+  carillon_options_init(&options);
+  carillon_options_init(NULL);
+  options.max_bodies = 2;
+  options.ring_events = 16;
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_time_s(synth) == 0);
+  CHECK(carillon_add_body(synth, model, place, &body, message, sizeof message) == CARILLON_OK && body == 0);
+  CHECK(carillon_add_body(synth, model, nowhere, &second, message, sizeof message) == CARILLON_BAD_INPUT && second == -1);
+  CHECK(carillon_add_body(synth, model, place, &second, NULL, 0) == CARILLON_OK && second == 1);
+  CHECK(carillon_add_body(synth, model, place, &second, message, sizeof message) == CARILLON_FULL && second == -1 && message[0] != '\0');
+  CHECK(carillon_add_body(synth, NULL, place, &second, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_add_body(NULL, NULL, NULL, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  check_events(synth, body);
+  carillon_set_gain(synth, 0);
+  carillon_set_gain(NULL, 1);
+  CHECK(play(synth, 10) == 0);
+  carillon_set_gain(synth, 1);
+  CHECK(play(synth, 10) > 0);
+  CHECK(fabs(carillon_time_s(synth) - 120 * 64 / 48000.0) < 1e-12 && carillon_horizon_s(synth) >= carillon_time_s(synth));
+  CHECK(carillon_remove_body(synth, body) == CARILLON_OK);
+  CHECK(carillon_remove_body(synth, body) == CARILLON_BAD_INPUT);
+  CHECK(carillon_remove_body(synth, -4) == CARILLON_BAD_INPUT && carillon_remove_body(NULL, 0) == CARILLON_BAD_ARGUMENT);
+  (void)play(synth, 4);
+  carillon_collect(synth);
+  carillon_collect(NULL);
+  CHECK(carillon_add_body(synth, model, place, &second, NULL, 0) == CARILLON_OK && second == body);
+
+  carillon_motion_init(&motion);
+  for (i = 0; i < 16; ++i) CHECK(carillon_push_motion(synth, &motion) == CARILLON_OK);
+  CHECK(carillon_push_motion(synth, &motion) == CARILLON_FULL);
+  (void)play(synth, 1);
+  counters.size = sizeof counters;
+  CHECK(carillon_get_counters(synth, &counters) == CARILLON_OK);
+  CHECK(counters.strikes == 2 && counters.faults == 3 && counters.overflows == 1 && counters.late == 0 && counters.resets == 0);
+  CHECK(counters.mode_samples > 0);
+  counters.size = 4;
+  CHECK(carillon_get_counters(synth, &counters) == CARILLON_BAD_ARGUMENT && carillon_get_counters(NULL, NULL) == CARILLON_BAD_ARGUMENT);
+  carillon_process(synth, NULL, 2, 64);
+  carillon_process(NULL, NULL, 2, 64);
+  CHECK(carillon_time_s(NULL) == 0 && carillon_horizon_s(NULL) == 0);
+  carillon_destroy(synth);
+
+  options.microphones_m = microphones;
+  CHECK(carillon_create(&options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT && other == NULL);
+  options.microphone_count = 3;
+  CHECK(carillon_create(&options, &other, NULL, 0) == CARILLON_OK);
+  carillon_destroy(other);
+  options.rate_hz = 0;
+  CHECK(carillon_create(&options, &other, message, sizeof message) == CARILLON_BAD_INPUT && other == NULL && message[0] != '\0');
+  options.size = 1;
+  CHECK(carillon_create(&options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_create(NULL, &other, NULL, 0) == CARILLON_BAD_ARGUMENT && carillon_create(&options, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  carillon_destroy(NULL);
+}
+
+int main(int argc, char** argv) {
+  carillon_bank* bank = NULL;
+  carillon_model* model = NULL;
+  if (argc != 2) return 2;
+  CHECK(carillon_abi_version() == CARILLON_ABI_VERSION);
+  check_banks(argv[1], &bank);
+  check_models(bank, &model);
+  carillon_bank_close(bank); /* the model stays */
+  check_synth(model);
+  carillon_model_release(model);
+  return failures == 0 ? 0 : 1;
+}

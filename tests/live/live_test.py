@@ -1,0 +1,85 @@
+#!/usr/bin/python3
+"""carillon-live on a real sound server: jackd with its dummy driver, which keeps time and has no card. The count of underflows is printed; on
+a busy machine a few are the machine's, so what is asked for is that most blocks come in time, and that none is lost."""
+import json
+import os
+import pathlib
+import re
+import subprocess
+import tempfile
+import time
+import unittest
+
+BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
+SERVER = f"carillon-{os.getpid()}"
+ENVIRONMENT = {**os.environ, "JACK_DEFAULT_SERVER": SERVER, "JACK_NO_AUDIO_RESERVATION": "1", "JACK_NO_START_SERVER": "1"}
+
+
+def live(*arguments, environment=ENVIRONMENT):
+    return subprocess.run([BIN / "carillon-live", *map(str, arguments)], capture_output=True, text=True, timeout=60, env=environment)
+
+
+class Live(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.folder.name)
+        subprocess.run([BIN / "write_cube_bank", cls.root / "cube.h5"], check=True)
+        scene = {"duration_s": 2.0, "ground": {"height_m": 0.0}, "listener": {"path": [[0, 0, -1, 0.2], [2, 0, -2, 0.2]]},
+                 "bodies": [{"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.15], "rotation_deg": [20, 30, 0]},
+                            {"name": "gong", "bank": "cube.h5", "position_m": [1, 0, 0.5], "fixed": True}],
+                 "strikes": [{"body": "gong", "time_s": 0.1 + 0.2 * i, "triangle": 3, "impulse_n_s": [0, 0, 0.01], "duration_s": 1e-4}
+                             for i in range(9)]}
+        cls.scene = cls.root / "scene.json"
+        cls.scene.write_text(json.dumps(scene))
+        cls.log = open(cls.root / "jackd.log", "w+")
+        cls.jack = subprocess.Popen(["jackd", "--no-realtime", "-n", SERVER, "-d", "dummy", "-r", "48000", "-p", "256"], stdout=cls.log,
+                                    stderr=subprocess.STDOUT, env=ENVIRONMENT)
+        for _ in range(100):
+            if "system" in live("--list").stdout:
+                return
+            time.sleep(0.1)
+        cls.log.seek(0)
+        raise RuntimeError("jackd does not start: " + cls.log.read())
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.jack.terminate()
+        cls.jack.wait()
+        cls.folder.cleanup()
+
+    def test_a_scene_is_played_to_its_end_while_it_happens(self):
+        started = time.monotonic()
+        run = live(self.scene, "--device", "system", "--look-ahead", "0.3")
+        seconds = time.monotonic() - started
+        self.assertEqual(run.returncode, 0, run.stderr)
+        print(run.stdout)
+        played = re.search(r"played +(\S+) s in (\d+) blocks, (\d+) underflows, latency (\S+) ms", run.stdout)
+        self.assertIsNotNone(played, run.stdout)
+        blocks, underflows = int(played[2]), int(played[3])
+        self.assertGreaterEqual(float(played[1]), 2.0)
+        self.assertLess(float(played[1]), 2.5)
+        self.assertAlmostEqual(float(played[1]) * 48000 / 256, blocks, delta=1)  # to the hundredth of a second that is printed
+        self.assertGreater(seconds, 1.9)  # at the pace of the card, not as fast as it can
+        self.assertLess(underflows, 0.2 * blocks)
+        strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
+        self.assertGreater(int(strikes[1]), 10)  # nine on the gong, and the cube's
+        self.assertEqual(int(strikes[3]), 0)
+
+    def test_bad_input_is_one_clear_line_and_no_sound(self):
+        for arguments, code, words in [((self.scene, "--device", "nobody"), 2, ["nobody", "system"]),
+                                       ((self.root / "none.json",), 2, ["none.json"]),
+                                       ((), 2, ["scene"])]:
+            run = live(*arguments)
+            self.assertEqual(run.returncode, code, run.stderr)
+            for word in words:
+                self.assertIn(word, run.stderr)
+
+    def test_without_a_sound_server_it_says_so(self):
+        run = live(self.scene, "--device", "system", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
+        self.assertNotEqual(run.returncode, 0)
+        self.assertRegex(run.stderr, r"^carillon-live: .*(no sound card|no output is called)")
+
+
+if __name__ == "__main__":
+    unittest.main()
