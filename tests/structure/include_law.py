@@ -19,6 +19,7 @@ LIBRARIES = {
     "simbody": ["Simbody.h", "SimTKcommon", "SimTKmath", "simbody/", "SimTK"],
     "sndfile": ["sndfile"],
     "cairo": ["cairo"],
+    "portaudio": ["portaudio.h"],
     "metis": ["metis.h"],
     "mpi": ["mpi.h"],
     "petsc": ["petsc", "slepc"],
@@ -32,9 +33,13 @@ LIBRARIES = {
 LAW = {
     "runtime/config": ([], ["json", "fmt"]),
     "runtime/bank": (["runtime/config"], ["json", "fmt", "hdf5", "openssl", "cli"]),
-    "runtime/synth": (["runtime/config", "runtime/bank"], []),
-    "runtime/contact": (["runtime/config", "runtime/bank"], ["fmt", "simbody"]),
-    "runtime/host": (["runtime/config", "runtime/bank", "runtime/synth", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
+    "runtime/stream": (["runtime/config"], ["fmt"]),
+    "runtime/radiation": (["runtime/config", "runtime/bank"], []),
+    "runtime/synth": (["runtime/config", "runtime/bank", "runtime/stream"], []),
+    "runtime/abi": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth"], []),
+    "runtime/contact": (["runtime/config", "runtime/bank", "runtime/stream"], ["fmt", "simbody"]),
+    "runtime/host": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
+    "runtime/live": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/synth", "runtime/contact", "runtime/host"], ["fmt", "cli", "portaudio"]),
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
@@ -57,7 +62,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
-SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dlfcn|signal|pthread|poll|termios|errno|limits|stdlib|stdio|string|math|time|spawn|immintrin|xmmintrin)\.h$")
+SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dlfcn|signal|pthread|poll|termios|errno|limits|stddef|stdint|stdlib|stdio|string|math|time|spawn|immintrin|xmmintrin)\.h$")
 
 
 def library_of(path):

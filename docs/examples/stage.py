@@ -1,0 +1,117 @@
+"""What every example does: solve jobs, render scenes, draw, measure, and hold figures against those of a paper or of a closed form."""
+import copy
+import json
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+
+import measure
+
+HERE = pathlib.Path(__file__).resolve().parent
+ENVIRONMENT = HERE.parent.parent / "deploy/environment"  # how mpirun starts as any user on a machine of any size
+RANKS = 2
+
+
+def read_json(file):
+    """A job or a scene: JSON with // comments."""
+    return json.loads(re.sub(r'("(?:[^"\\]|\\.)*")|//[^\n]*', lambda found: found[1] or "", pathlib.Path(file).read_text()))
+
+
+def change(document, changes):
+    """A copy with the values of dotted keys replaced: {"body.nodes": 2000}."""
+    document = copy.deepcopy(document)
+    for path, value in changes.items():
+        *above, last = path.split(".")
+        at = document
+        for key in above:
+            at = at.setdefault(key, {})
+        at[last] = value
+    return document
+
+
+def print_table(rows):
+    widths = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
+    for index, row in enumerate(rows):
+        print("  " + "  ".join(str(cell).ljust(w) if i == 0 else str(cell).rjust(w) for i, (cell, w) in enumerate(zip(row, widths))))
+        if index == 0:
+            print("  " + "  ".join("-" * w for w in widths))
+
+
+class Stage:
+    """One run of one example: `folder` holds its job and scene files, `out` takes what comes of them."""
+
+    def __init__(self, folder, bin_dir, out, quick):
+        self.folder, self.bin, self.out, self.quick = folder, bin_dir, out, quick
+        self.checks = []
+        self.pictures = []
+        self.out.mkdir(parents=True, exist_ok=True)
+
+    def run(self, what, *command):
+        """Runs a program in the output folder and ends the example when it fails. Seconds."""
+        words = [str(word) for word in command]
+        print(f"$ {shlex.join(os.path.basename(word) if pathlib.Path(word).parent == self.bin else word for word in words)}", flush=True)
+        begin = time.monotonic()
+        done = subprocess.run(["bash", "-c", '. "$0"; exec "$@"', ENVIRONMENT, *words], cwd=self.out, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        if done.returncode != 0:
+            sys.exit(f"{done.stdout}{done.stderr}\n{what} failed (exit code {done.returncode}); its message stands above")
+        return time.monotonic() - begin
+
+    def solve(self, job, name, changes=None, quick=None):
+        """Solves the job file of the example with some of its values changed (by `quick` too in the short form), as NAME.hdf. The bank's facts."""
+        document = change(read_json(self.folder / job), {**(changes or {}), **(quick or {} if self.quick else {}), "bank": f"{name}.hdf"})
+        (self.out / f"{name}.json").write_text(json.dumps(document, indent=1) + "\n")
+        ranks = () if self.quick else ("mpirun", "-np", RANKS)
+        seconds = self.run(f"the solve of {name}", *ranks, self.bin / "carillon-precompute", f"{name}.json")
+        text = subprocess.run([self.bin / "carillon-bank", "info", "--json", self.out / f"{name}.hdf"], check=True, capture_output=True, text=True).stdout
+        bank = json.loads(text)
+        print(f"  {name}: {bank['element']}, {bank['counts']['nodes']} nodes, {bank['mode_count']} modes, {bank['frequencies_hz'][0]:.2f} Hz and up,"
+              f" {seconds:.1f} s")
+        return bank
+
+    def render(self, name, scene, *options, picture=True):
+        """Renders a scene (a document) as NAME.wav with spectrogram (`picture`: for the page), trajectory and report, with further options
+        of carillon-render; looks at the sound. (rate, samples, report)"""
+        (self.out / f"{name}.json").write_text(json.dumps(scene, indent=1) + "\n")
+        self.run(f"the scene {name}", self.bin / "carillon-render", f"{name}.json", "-o", f"{name}.wav", "--spectrogram", f"{name}-spectrogram.png",
+                 "--trajectory", f"{name}-trajectory.json", "--report", f"{name}-report.json", "--quiet", *options)
+        rate, samples = measure.read_wav(self.out / f"{name}.wav")
+        report = json.loads((self.out / f"{name}-report.json").read_text())
+        peak = abs(samples).max()
+        print(f"  {name}: {report['duration_s']:.3g} s, {report['contacts']} contacts, {report['modes']} modes, peak {report['peak_pa']:.3g} Pa,"
+              f" {report['real_time_factor']:.3g} x real time")
+        sane = report["resets"] == 0 and report["impulses_refused"] == 0 and 0.05 < peak < 1.0
+        self.expect(f"{name}.wav is loud, not clipped, and nothing was lost", sane)
+        if picture:
+            self.pictures.append(f"{name}-spectrogram.png")
+        return rate, samples, report
+
+    def draw(self, picture, *command):
+        """A picture by carillon-draw, in the long form only."""
+        if self.quick:
+            return
+        self.run(f"the picture {picture}", self.bin / "carillon-draw", *command, "-o", picture)
+        self.pictures.append(picture)
+
+    def expect(self, what, met):
+        self.checks.append((what, bool(met)))
+
+    def compare(self, what, value, wanted, percent):
+        """Holds a value against a wanted one; the limit stands in the line that finish() prints."""
+        off = 100 * (value / wanted - 1)
+        self.expect(f"{what}: {value:.6g}, wanted {wanted:.6g} +- {percent:g} % (off by {off:+.3f} %)", abs(off) <= percent)
+
+    def finish(self, keep_pictures):
+        if keep_pictures:
+            for picture in self.pictures:
+                shutil.copy(self.out / picture, self.folder)
+        print("\nChecks")
+        for what, met in self.checks:
+            print(f"  {'ok  ' if met else 'NOT '} {what}")
+        print(f"\nHear and see: {self.out}")
+        failed = sum(not met for _, met in self.checks)
+        return f"{failed} of {len(self.checks)} checks failed" if failed else None

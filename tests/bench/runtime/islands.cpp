@@ -1,0 +1,52 @@
+// CPU of bodies that do not touch each other: an island each against one Simbody system for all, in one run.
+//
+// usage: bench_islands [BOXES [SECONDS]]     prints CPU seconds a simulated second and their ratio; exit 1 when the ratio is below 3
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+#include "runtime/contact/world.hpp"
+#include "tests/contact/solids.hpp"
+
+namespace {
+
+using namespace carillon;
+
+contact::WorldSpec make_rain(const bank::Bank& box, int count) {
+  contact::WorldSpec w;
+  w.ground = contact::GroundSpec{};
+  for (int i = 0; i < count; ++i) {
+    contact::BodySpec b;
+    b.name = fmt::format("box {}", i);
+    b.bank = &box;
+    b.initial.position_m = {0.3 * (i % 5), 0.3 * (i / 5), 0.3 + 0.02 * i};
+    b.initial.rotation = {std::cos(0.1 + 0.07 * i), std::sin(0.1 + 0.07 * i) * 0.6, std::sin(0.1 + 0.07 * i) * 0.8, 0.0};
+    b.angular_velocity_rad_s = {2.0, 0.3 * i, 0.0};
+    w.bodies.push_back(b);
+  }
+  return w;
+}
+
+contact::Statistics run(const contact::WorldSpec& spec, double end_s, bool islands) {
+  contact::World world(spec, {.end_s = end_s, .islands = islands});
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [](const stream::Event&) {});
+  return world.get_statistics();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int boxes = argc > 1 ? std::atoi(argv[1]) : 20;
+  const double end_s = argc > 2 ? std::atof(argv[2]) : 2.0;
+  const bank::Bank box = contact::tests::make_box({0.06, 0.05, 0.04}, {4, 4, 4});
+  const contact::WorldSpec spec = make_rain(box, boxes);
+  const contact::Statistics together = run(spec, end_s, false), apart = run(spec, end_s, true);
+  const double ratio = together.seconds_cpu / apart.seconds_cpu;
+  fmt::print("{} boxes dropped 0.3 m apart, {:g} s\n", boxes, end_s);
+  fmt::print("one system  {:8.3f} CPU s/s  {:8} steps\n", together.seconds_cpu / end_s, together.steps);
+  fmt::print("islands     {:8.3f} CPU s/s  {:8} steps  {} systems made\n", apart.seconds_cpu / end_s, apart.steps, apart.made);
+  fmt::print("ratio       {:8.2f}\n", ratio);
+  return ratio >= 3.0 ? 0 : 1;
+}
