@@ -3,6 +3,7 @@
 
 #include <array>
 #include <complex>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -33,6 +34,12 @@ class Click {
   void process(const std::array<std::span<float>, 3>& dipole_pa) noexcept;
 
   bool is_awake() const { return awake_; }
+  /// process() would only give zeros.
+  bool is_idle() const { return !awake_ && pulses_.empty(); }
+  /// As process() of so many samples of a click that is idle, whose zeros nobody wants. [audio-thread]
+  void skip(std::int64_t samples) noexcept { position_ += samples; }
+  /// Memory that it has taken.
+  std::size_t calc_bytes() const { return sizeof(Click) + pulses_.capacity() * sizeof(Pulse); }
   std::int64_t get_refused() const { return refused_; }
 
  private:

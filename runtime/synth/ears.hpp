@@ -46,19 +46,34 @@ class Ear {
   /// without the first sound takes no time, without the second it takes as long as at the beginning, wherever its source goes.
   Ear(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler});
 
+  /// Says where the first sample is: without kDoppler its sound takes as long for ever. Without a call it is the first that is processed.
+  /// [audio-thread]
+  void begin(const Source& source, const Track& listener, std::int64_t sample) noexcept;
+
+  /// How long the sound that arrives at this sample took, as this ear hears it. [audio-thread]
+  double calc_delay_s(const Source& source, const Track& listener, std::int64_t sample) const noexcept;
+
   /// Adds the pressure [Pa] of samples `sample` to `sample + received_pa.size()`. The source's histories hold these samples already. Blocks
-  /// of any size give the same bits. [audio-thread]: no heap, no lock, no throw.
-  void process(const Source& source, const Track& listener, std::int64_t sample, std::span<double> received_pa) noexcept;
+  /// of any size give the same bits. Returns how many samples came by a way whose length changed; those of a source and a listener that
+  /// stand still are cheap. [audio-thread]: no heap, no lock, no throw.
+  int process(const Source& source, const Track& listener, std::int64_t sample, std::span<double> received_pa) noexcept;
 
  private:
+  Way find_way(const Source& source, const Track& listener, std::int64_t border, double& travel_s) noexcept;
   void find_ways(const Source& source, const Track& listener, std::int64_t quantum) noexcept;
+  void process_still(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept;
+  void process_moving(const Source& source, std::int64_t sample, std::span<double> received_pa) const noexcept;
 
   Vec3 offset_m_{};
   double rate_hz_ = 0.0;
   EffectSet effects_;
   std::int64_t quantum_ = -1;  // of which `from_` is the beginning and `to_` the end
   Way from_, to_;
+  bool is_placed_ = false;      // first_delay_s_ is known
   double first_delay_s_ = 0.0;  // for ears without kDoppler
+  double travel_s_ = 0.0;       // of what arrives at the end of quantum_, whatever this ear's effects make of it
+  double phase_ = -1.0;         // of taps_
+  std::array<float, kTaps> taps_{};
 };
 
 }  // namespace carillon::synth

@@ -4,6 +4,9 @@
 #include "runtime/synth/effects.hpp"
 
 #include <array>
+#include <string>
+
+#include "runtime/config/error.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -20,6 +23,16 @@ std::optional<Effect> find_effect(std::string_view name) noexcept {
     if (name == kNames[i]) return static_cast<Effect>(i);
   }
   return std::nullopt;
+}
+
+void check_compiled(EffectSet effects) {
+  const EffectSet missing = effects.without(kCompiledEffects);
+  for (int i = 0; i < kEffectCount; ++i) {
+    const auto effect = static_cast<Effect>(i);
+    if (missing.has(effect))
+      throw InputError(std::string("the effect \"") + get_name(effect) +
+                       "\" is not in this build; leave it out, or build with it in the CMake option CARILLON_EFFECTS");
+  }
 }
 
 }  // namespace carillon::synth

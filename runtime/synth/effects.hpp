@@ -1,10 +1,17 @@
 // The effects that a scene may call for: the one list of them.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <optional>
 #include <string_view>
+
+// The effects of this build, bit i for effect i; the CMake option CARILLON_EFFECTS gives it.
+#ifndef CARILLON_EFFECTS_MASK
+#define CARILLON_EFFECTS_MASK 0x1ff
+#endif
 
 namespace carillon::synth {
 
@@ -42,6 +49,9 @@ class EffectSet {
   constexpr EffectSet without(Effect effect) const { return make(bits_ & ~bit(effect)); }
   constexpr EffectSet with(EffectSet other) const { return make(bits_ | other.bits_); }
   constexpr EffectSet without(EffectSet other) const { return make(bits_ & ~other.bits_); }
+  constexpr EffectSet common(EffectSet other) const { return make(bits_ & other.bits_); }
+  constexpr bool is_empty() const { return bits_ == 0; }
+  static constexpr EffectSet from_mask(unsigned mask) { return make(mask & all().bits_); }
   friend constexpr bool operator==(EffectSet, EffectSet) = default;
 
  private:
@@ -52,6 +62,29 @@ class EffectSet {
     return set;
   }
   std::uint16_t bits_ = 0;
+};
+
+/// What this build can play. Code of other effects is not in it.
+inline constexpr EffectSet kCompiledEffects = EffectSet::from_mask(CARILLON_EFFECTS_MASK);
+
+/// What a body has when nobody says anything: it rings, struck by pulses that last, heard late, with Doppler shift, by every microphone at
+/// its own place.
+inline constexpr EffectSet kUsualEffects =
+    EffectSet{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars}.common(kCompiledEffects);
+
+/// Throws InputError that names the first effect of `effects` that this build was made without. [main-thread]
+void check_compiled(EffectSet effects);
+
+/// One number for each effect.
+template <typename T>
+class PerEffect {
+ public:
+  constexpr T& operator[](Effect effect) { return values_[static_cast<std::size_t>(effect)]; }
+  constexpr const T& operator[](Effect effect) const { return values_[static_cast<std::size_t>(effect)]; }
+  friend constexpr bool operator==(const PerEffect&, const PerEffect&) = default;
+
+ private:
+  std::array<T, kEffectCount> values_{};
 };
 
 }  // namespace carillon::synth

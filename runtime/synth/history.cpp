@@ -1,9 +1,13 @@
-// Method:     a ring of a power of two samples, written twice, so that a window of it is one piece of memory.
+// Method:     a ring of as many samples as the longest way holds, whose beginning stands behind its end once more, so that a window of it
+// is
+//             one piece of memory.
 // Source:     textbook.
 // Deviations: none.
 #include "runtime/synth/history.hpp"
 
-#include <bit>
+#include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/config/error.hpp"
@@ -13,17 +17,39 @@ namespace carillon::synth {
 History::History(double longest_m, double sample_rate_hz, int block) {
   if (!(longest_m >= 0.0) || !(longest_m < 1e5)) throw InputError("a source must stay within 100 km of the listener");
   if (!(sample_rate_hz > 0.0) || block < 1) throw InputError("a history needs a positive sample rate and block");
-  const double samples = longest_m / bank::kSoundSpeedMs * sample_rate_hz + 2.0 * kTaps + block;
-  size_ = std::bit_ceil(static_cast<std::size_t>(samples));
-  samples_.assign(2 * size_, 0.0F);
+  size_ =
+      static_cast<std::size_t>(std::ceil(longest_m / bank::kSoundSpeedMs * sample_rate_hz)) + 2 * kTaps + static_cast<std::size_t>(block);
+  twice_ = kTaps + static_cast<std::size_t>(block);
+  samples_.assign(size_ + twice_, 0.0F);
 }
 
 void History::push(std::span<const float> samples) noexcept {
-  for (const float sample : samples) {
-    const std::size_t at = static_cast<std::size_t>(position_++) & (size_ - 1);
-    samples_[at] = samples_[at + size_] = sample;
-    if (sample != 0.0F) loud_end_ = position_;
+  for (std::size_t n = samples.size(); n > 0; --n) {
+    if (samples[n - 1] == 0.0F) continue;
+    loud_end_ = position_ + static_cast<std::int64_t>(n);
+    break;
   }
+  while (!samples.empty()) {
+    const auto piece = samples.first(std::min(samples.size(), size_ - next_));
+    std::copy(piece.begin(), piece.end(), samples_.begin() + static_cast<std::ptrdiff_t>(next_));
+    if (next_ < twice_) {
+      const auto again = piece.first(std::min(piece.size(), twice_ - next_));
+      std::copy(again.begin(), again.end(), samples_.begin() + static_cast<std::ptrdiff_t>(size_ + next_));
+    }
+    next_ = next_ + piece.size() == size_ ? 0 : next_ + piece.size();
+    position_ += static_cast<std::int64_t>(piece.size());
+    samples = samples.subspan(piece.size());
+  }
+}
+
+void History::push_silence(std::int64_t samples) noexcept {
+  constexpr std::array<float, 64> kZeros{};
+  for (; samples > 0 && !is_silent();) {
+    const std::int64_t count = std::min<std::int64_t>(samples, kZeros.size());
+    push(std::span(kZeros).first(static_cast<std::size_t>(count)));
+    samples -= count;
+  }
+  position_ += samples;
 }
 
 }  // namespace carillon::synth

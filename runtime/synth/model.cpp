@@ -43,6 +43,8 @@ void check(const bank::Bank& bank, const ModelOptions& options) {
   if (!is_positive(options.rate_hz)) throw InputError("the sample rate must be a positive number of Hz");
   if (!is_positive(options.reference_impulse_n_s)) throw InputError("the reference impulse must be a positive number of N s");
   if (!is_positive(options.silence_pa)) throw InputError("the pressure of silence must be a positive number of Pa");
+  if (!std::isfinite(options.sphere_radius_m) || options.sphere_radius_m < 0.0)
+    throw InputError("the radius of the body's sphere must be a number of m, 0 or more");
   if (!options.gains.empty() && options.gains.size() != m) throw InputError("there must be one gain a mode of the bank");
 }
 
@@ -84,6 +86,9 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
                    [](const Sorted& a, const Sorted& b) { return a.heard_s != b.heard_s ? a.heard_s > b.heard_s : a.level > b.level; });
   const auto model = std::make_shared<Model>(Model());
   model->rate_hz_ = options.rate_hz;
+  model->mass_kg_ = bank.rigid.mass_kg;
+  model->sphere_radius_m_ = options.sphere_radius_m > 0.0 ? options.sphere_radius_m
+                                                          : std::cbrt(std::max(0.0, bank.rigid.volume_m3) * 3.0 / (4.0 * std::numbers::pi));
   model->triangles_ = bank.triangles;
   for (const Sorted& sorted : ringing) model->add_ringing_mode(sorted.mode);
   model->add_damped_modes(std::move(damped));

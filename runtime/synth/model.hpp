@@ -22,6 +22,7 @@ struct ModelOptions {
   std::span<const double> gains{};      // (m) Pa at 1 m for unit modal velocity; empty: those of the bank
   double reference_impulse_n_s = 1e-3;  // the strike by which audibility is judged
   double silence_pa = 1e-10;            // -106 dB re 20 uPa: what is not heard
+  double sphere_radius_m = 0.0;         // radiation::calc_sphere_radius_m(); 0: of the solid's own volume, without its cavities
 };
 
 /// Immutable; any number of voices on any threads may share one.
@@ -44,6 +45,9 @@ class Model {
   /// phi(x) . direction [kg^-1/2] at a point of a triangle. Throws InputError when the bank has no such triangle.
   double calc_projection(int mode, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction) const;
   double get_rate_hz() const { return rate_hz_; }
+  /// Of the rigid body, for acceleration noise: its mass, and the sphere that stands for it. 0 where the bank does not say.
+  double get_mass_kg() const { return mass_kg_; }
+  double get_sphere_radius_m() const { return sphere_radius_m_; }
   /// Memory of the tables, which all voices share.
   std::size_t calc_bytes() const;
 
@@ -71,6 +75,7 @@ class Model {
   }
 
   double rate_hz_ = 0.0;
+  double mass_kg_ = 0.0, sphere_radius_m_ = 0.0;
   std::vector<Mode> modes_;
   int ringing_ = 0;  // modes in groups, the first of modes_; the rest is damped_
   std::vector<SoundTable> sound_;

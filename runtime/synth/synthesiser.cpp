@@ -1,13 +1,16 @@
 // Method:     time is cut into periods of kPeriod samples from the first one; a host's block is served from as many whole quanta as it asks
 //             for, never across a period. Events are taken from the ring before each piece is made, and act at their own times. Bodies come
-//             and go at periods, handed over by two queues with one writer and one reader.
+//             and go at periods, and effects change, handed over by two queues with one writer and one reader. Of bodies that sleep only a
+//             bit is looked at, 64 at once.
 // Source:     Lamport 1983, Specifying concurrent program modules (the queue with one writer and one reader).
 // Deviations: none.
 #include "runtime/synth/synthesiser.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "runtime/config/error.hpp"
 #include "runtime/synth/fp_guard.hpp"
@@ -62,42 +65,18 @@ class Synthesiser::Pipe {
   alignas(64) std::atomic<std::size_t> tail_{0};
 };
 
-struct Synthesiser::Body {
-  Body(std::shared_ptr<const Model> model, const BodySettings& settings, const SynthesiserOptions& options)
-      : voice(std::move(model), {.max_strikes = options.max_strikes, .silence_pa = settings.silence_pa, .isa = settings.isa}),
-        history(options.longest_m, options.rate_hz, kPeriod),
-        track(static_cast<std::size_t>(options.max_waypoints)) {
-    track.push({.position_m = settings.position_m});
-    source.track = &track;
-    source.monopole = &history;
-    for (const Vec3& place : options.microphones_m) ears.emplace_back(place, options.rate_hz);
-  }
-
-  /// [audio-thread] The voice begins with this sample.
-  void begin(std::int64_t sample) noexcept {
-    first = sample;
-    history.skip(sample);
-  }
-
-  Voice voice;
-  History history;
-  Track track;
-  Source source;
-  std::vector<Ear> ears;   // one a microphone
-  std::int64_t first = 0;  // sample of the scene with which the voice began
-};
-
 Synthesiser::Synthesiser(SynthesiserOptions options)
     : options_(check(std::move(options))),
       ring_(static_cast<std::size_t>(options_.ring_events)),
       listener_(static_cast<std::size_t>(options_.max_waypoints)) {
   const auto bodies = static_cast<std::size_t>(options_.max_bodies);
-  // A number is in at most one command to come and one to leave.
-  commands_ = std::make_unique<Pipe<Command>>(2 * bodies);
-  gone_ = std::make_unique<Pipe<Command>>(bodies);
+  // A number comes, changes and goes in at most three commands, and two come back.
+  commands_ = std::make_unique<Pipe<Command>>(3 * bodies);
+  gone_ = std::make_unique<Pipe<Command>>(2 * bodies);
   owned_.resize(bodies);
-  leaving_.resize(bodies);
+  published_bodies_ = std::make_unique<Published[]>(bodies);
   playing_.resize(bodies);
+  awake_.resize((bodies + 63) / 64);
   mix_.resize(options_.microphones_m.size());
   listener_.push({.position_m = options_.listener_m});
 }
@@ -109,37 +88,111 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   if (model->get_rate_hz() != options_.rate_hz)
     throw InputError("the model is made for " + std::to_string(model->get_rate_hz()) + " Hz, the synthesiser runs at " +
                      std::to_string(options_.rate_hz) + " Hz");
-  for (const double x : settings.position_m)
-    if (!std::isfinite(x)) throw InputError("a body must be at a finite place");
+  if (stream::find_fault(stream::Motion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
+    throw InputError("a body must be at a finite place, turned by a unit quaternion");
+  if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0)
+    throw InputError("a body needs a longest distance below 100 km and room for waypoints");
   collect();
-  const auto free = std::find(owned_.begin(), owned_.end(), nullptr);
+  const auto free = std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; });
   if (free == owned_.end())
     throw InputError("there are " + std::to_string(options_.max_bodies) + " bodies already; raise max_bodies, or remove one");
   const auto number = static_cast<int>(free - owned_.begin());
-  *free = std::make_unique<Body>(std::move(model), settings, options_);
-  commands_->push({.body = free->get(), .number = number});
+  auto body =
+      std::make_unique<Body>(std::move(model),
+                             BodyFrame{.rate_hz = options_.rate_hz,
+                                       .microphones_m = options_.microphones_m,
+                                       .max_strikes = options_.max_strikes,
+                                       .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
+                                       .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
+                                       .silence_pa = settings.silence_pa,
+                                       .isa = settings.isa},
+                             settings.position_m, settings.rotation);
+  auto change = body->make_change({}, settings.effects);
+  Published& published = published_bodies_[static_cast<std::size_t>(number)];
+  for (int e = 0; e < kEffectCount; ++e) {
+    published.units[static_cast<std::size_t>(e)].store(0, std::memory_order_relaxed);
+    published.ticks[static_cast<std::size_t>(e)].store(0, std::memory_order_relaxed);
+  }
+  published.peak_pa.store(0.0F, std::memory_order_relaxed);
+  *free = Owned{.body = std::move(body),
+                .change = std::move(change),
+                .effects = settings.effects,
+                .wanted = settings.effects,
+                .bytes = {},
+                .is_leaving = false};
+  free->bytes = free->change->calc_bytes();
+  publish_bytes(number);
+  commands_->push({.body = free->body.get(), .change = free->change.get(), .number = number});
   return number;
 }
 
-void Synthesiser::remove_body(int body) {
-  if (body < 0 || body >= options_.max_bodies || owned_[static_cast<std::size_t>(body)] == nullptr ||
-      leaving_[static_cast<std::size_t>(body)])
+Synthesiser::Owned& Synthesiser::find_owned(int body) {
+  if (body < 0 || body >= options_.max_bodies || owned_[static_cast<std::size_t>(body)].body == nullptr ||
+      owned_[static_cast<std::size_t>(body)].is_leaving)
     throw InputError("there is no body " + std::to_string(body));
-  leaving_[static_cast<std::size_t>(body)] = true;
-  commands_->push({.body = owned_[static_cast<std::size_t>(body)].get(), .number = body, .removes = true});
+  return owned_[static_cast<std::size_t>(body)];
+}
+
+void Synthesiser::set_effects(int body, EffectSet effects) {
+  collect();
+  Owned& owned = find_owned(body);
+  // Refused here, whether it has to wait or not.
+  owned.body->check(effects);
+  owned.wanted = effects;
+  send_change(body);
+}
+
+EffectSet Synthesiser::get_effects(int body) const { return const_cast<Synthesiser*>(this)->find_owned(body).wanted; }
+
+/// Makes the change to what is wanted, unless an earlier one is on its way.
+void Synthesiser::send_change(int number) {
+  Owned& owned = owned_[static_cast<std::size_t>(number)];
+  if (owned.change != nullptr || owned.is_leaving || owned.wanted == owned.effects) return;
+  owned.change = owned.body->make_change(owned.effects, owned.wanted);
+  owned.effects = owned.wanted;
+  const EffectBytes more = owned.change->calc_bytes();
+  for (int e = 0; e < kEffectCount; ++e) owned.bytes[static_cast<Effect>(e)] += more[static_cast<Effect>(e)];
+  publish_bytes(number);
+  commands_->push({.body = owned.body.get(), .change = owned.change.get(), .number = number});
+}
+
+void Synthesiser::publish_bytes(int number) {
+  const auto i = static_cast<std::size_t>(number);
+  for (int e = 0; e < kEffectCount; ++e) {
+    published_bodies_[i].bytes[static_cast<std::size_t>(e)].store(owned_[i].bytes[static_cast<Effect>(e)], std::memory_order_relaxed);
+  }
+}
+
+void Synthesiser::remove_body(int body) {
+  Owned& owned = find_owned(body);
+  owned.is_leaving = true;
+  commands_->push({.body = owned.body.get(), .number = body, .removes = true});
 }
 
 void Synthesiser::collect() {
   Command command;
   while (gone_->pop(command)) {
-    owned_[static_cast<std::size_t>(command.number)].reset();
-    leaving_[static_cast<std::size_t>(command.number)] = false;
+    Owned& owned = owned_[static_cast<std::size_t>(command.number)];
+    if (command.removes) {
+      owned = Owned{};
+      publish_bytes(command.number);
+      continue;
+    }
+    const EffectBytes less = owned.change->calc_bytes();
+    for (int e = 0; e < kEffectCount; ++e) owned.bytes[static_cast<Effect>(e)] -= less[static_cast<Effect>(e)];
+    owned.change.reset();
+    publish_bytes(command.number);
+    send_change(command.number);
   }
 }
 
 bool Synthesiser::is_full() {
   collect();
-  return std::find(owned_.begin(), owned_.end(), nullptr) == owned_.end();
+  return std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; }) == owned_.end();
+}
+
+void Synthesiser::set_awake(int number) noexcept {
+  awake_[static_cast<std::size_t>(number) / 64] |= std::uint64_t{1} << (static_cast<unsigned>(number) % 64U);
 }
 
 void Synthesiser::apply_commands() noexcept {
@@ -150,13 +203,40 @@ void Synthesiser::apply_commands() noexcept {
       place = nullptr;
       gone_->push(command);
     } else {
-      command.body->begin(sample_);
       place = command.body;
+      command.body->apply(*command.change, listener_, sample_);
+      set_awake(command.number);
     }
   }
 }
 
-Synthesiser::Body* Synthesiser::find_body(std::int32_t number) noexcept {
+/// Calls `work(number, body)` for every body that is awake, in the order of their numbers; those for which it returns false fall asleep.
+template <typename Work>
+void Synthesiser::for_awake(Work&& work) noexcept {
+  for (std::size_t w = 0; w < awake_.size(); ++w) {
+    for (std::uint64_t left = awake_[w]; left != 0; left &= left - 1) {
+      const auto number = static_cast<int>(w * 64) + std::countr_zero(left);
+      Body* body = playing_[static_cast<std::size_t>(number)];
+      if (body == nullptr || !work(number, *body)) awake_[w] &= ~(left & (~left + 1));
+    }
+  }
+}
+
+/// Runs `work` on a body and adds to the totals what it has done.
+template <typename Work>
+void Synthesiser::count(const Body& body, Work&& work) noexcept {
+  const BodyWork& now = body.get_work();
+  const std::int64_t strikes = now.strikes, refused = now.refused, late = now.late, resets = now.resets;
+  const std::int64_t mode_samples = now.units[Effect::kModal];
+  work();
+  work_.strikes += now.strikes - strikes;
+  work_.refused += now.refused - refused;
+  work_.late += now.late - late;
+  work_.resets += now.resets - resets;
+  work_.mode_samples += now.units[Effect::kModal] - mode_samples;
+}
+
+Body* Synthesiser::find_body(std::int32_t number) noexcept {
   Body* body = number >= 0 && number < options_.max_bodies ? playing_[static_cast<std::size_t>(number)] : nullptr;
   if (body == nullptr) ++work_.refused;
   return body;
@@ -165,19 +245,20 @@ Synthesiser::Body* Synthesiser::find_body(std::int32_t number) noexcept {
 void Synthesiser::take(const stream::Impulse& impulse) noexcept {
   Body* body = find_body(impulse.body);
   if (body == nullptr) return;
-  stream::Impulse own = impulse;
-  own.time_s -= static_cast<double>(body->first) / options_.rate_hz;
-  const VoiceCounters before = body->voice.get_counters();
-  body->voice.strike(own);
-  const VoiceCounters& after = body->voice.get_counters();
-  work_.strikes += after.accepted - before.accepted;
-  work_.refused += after.refused - before.refused;
-  work_.late += after.late - before.late;
+  count(*body, [&] {
+    if (body->take(impulse, sample_)) set_awake(impulse.body);
+  });
+  publish(impulse.body);
+}
+
+void Synthesiser::take(const stream::Contact& contact) noexcept {
+  Body* body = find_body(contact.body);
+  if (body != nullptr && body->take(contact, sample_)) set_awake(contact.body);
 }
 
 void Synthesiser::take(const stream::Motion& motion) noexcept {
   Body* body = find_body(motion.body);
-  if (body != nullptr && !body->track.push({motion.time_s, motion.position_m, motion.velocity_m_s})) ++work_.refused;
+  if (body != nullptr && !body->take(motion)) ++work_.refused;
 }
 
 void Synthesiser::take(const stream::Listener& listener) noexcept {
@@ -188,29 +269,33 @@ void Synthesiser::take_events() noexcept {
   stream::Event event;
   while (ring_.pop(event)) {
     if (const auto* impulse = std::get_if<stream::Impulse>(&event)) take(*impulse);
+    if (const auto* contact = std::get_if<stream::Contact>(&event)) take(*contact);
     if (const auto* motion = std::get_if<stream::Motion>(&event)) take(*motion);
     if (const auto* listener = std::get_if<stream::Listener>(&event)) take(*listener);
   }
 }
 
+/// Changes of effects that are over go back, at the beginning of a period.
+void Synthesiser::finish_changes() noexcept {
+  for_awake([this](int number, Body& body) {
+    if (BodyChange* change = body.finish_change(listener_, sample_)) gone_->push({.body = &body, .change = change, .number = number});
+    return true;
+  });
+}
+
 /// Fills mix_ with the next samples: whole quanta, all of one period.
 void Synthesiser::render(int samples) noexcept {
-  if (sample_ % kPeriod == 0) apply_commands();
+  const bool begins = sample_ % kPeriod == 0;
+  if (begins) apply_commands();
   take_events();
+  if (begins) finish_changes();
   for (auto& mix : mix_) std::fill_n(mix.begin(), samples, 0.0);
-  const auto count = static_cast<std::size_t>(samples);
-  for (Body* body : playing_) {
-    if (body == nullptr) continue;
-    std::fill_n(mono_.begin(), samples, 0.0F);
-    const VoiceCounters before = body->voice.get_counters();
-    body->voice.process(std::span(mono_).first(count));
-    const VoiceCounters& after = body->voice.get_counters();
-    work_.resets += after.resets - before.resets;
-    work_.mode_samples += after.mode_samples - before.mode_samples;
-    body->history.push(std::span<const float>(mono_).first(count));
-    if (body->history.is_silent()) continue;
-    for (std::size_t m = 0; m < mix_.size(); ++m) body->ears[m].process(body->source, listener_, sample_, std::span(mix_[m]).first(count));
-  }
+  for_awake([&](int number, Body& body) {
+    if (body.is_asleep()) return false;
+    count(body, [&] { body.render(sample_, static_cast<std::size_t>(samples), listener_, scratch_, mix_, options_.ticks); });
+    publish(number);
+    return true;
+  });
   sample_ += samples;
   rendered_ = held_ = samples;
   horizon_.store(sample_, std::memory_order_relaxed);
@@ -221,6 +306,10 @@ void Synthesiser::process(float* const* out, int channels, int frames) noexcept 
   const auto gain = static_cast<double>(gain_.load(std::memory_order_relaxed));
   const int heard = std::min(channels, get_microphone_count());
   for (int c = heard; c < channels; ++c) std::fill_n(out[c], frames, 0.0F);
+  if (frames <= 0) {
+    if (held_ == 0 && sample_ % kPeriod == 0) apply_commands();
+    take_events();
+  }
   for (int done = 0; done < frames;) {
     if (held_ == 0) {
       const auto left = static_cast<int>(kPeriod - sample_ % kPeriod);
@@ -237,6 +326,35 @@ void Synthesiser::process(float* const* out, int channels, int frames) noexcept 
   }
   position_.store(sample_ - held_, std::memory_order_relaxed);
   publish_counters();
+}
+
+void Synthesiser::publish(int number) noexcept {
+  const auto i = static_cast<std::size_t>(number);
+  const BodyWork& work = playing_[i]->get_work();
+  Published& published = published_bodies_[i];
+  for (std::size_t e = 0; e < kEffectCount; ++e) {
+    published.units[e].store(work.units[static_cast<Effect>(e)], std::memory_order_relaxed);
+    if (options_.ticks != nullptr) published.ticks[e].store(work.ticks[static_cast<Effect>(e)], std::memory_order_relaxed);
+  }
+  published.peak_pa.store(work.peak_pa, std::memory_order_relaxed);
+}
+
+EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
+  EffectCounters counters;
+  if (body < 0 || body >= options_.max_bodies) return counters;
+  const Published& published = published_bodies_[static_cast<std::size_t>(body)];
+  for (std::size_t e = 0; e < kEffectCount; ++e) {
+    const auto effect = static_cast<Effect>(e);
+    counters.units[effect] = published.units[e].load(std::memory_order_relaxed);
+    counters.ticks[effect] = published.ticks[e].load(std::memory_order_relaxed);
+    counters.bytes[effect] = published.bytes[e].load(std::memory_order_relaxed);
+  }
+  return counters;
+}
+
+double Synthesiser::get_peak_pa(int body) const noexcept {
+  if (body < 0 || body >= options_.max_bodies) return 0.0;
+  return static_cast<double>(published_bodies_[static_cast<std::size_t>(body)].peak_pa.load(std::memory_order_relaxed));
 }
 
 void Synthesiser::publish_counters() noexcept {

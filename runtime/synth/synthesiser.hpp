@@ -5,7 +5,9 @@
 //   synthesiser.push(stream::Impulse{.time_s = 0.01, .body = body, .triangle = 12, .impulse_n_s = {0, 0, 0.01}, .duration_s = 1e-4});
 //   synthesiser.process(channels, 2, 256);  // in the audio callback
 //
-// Threads: the constructor, add_body, remove_body and collect() belong to one main thread, process() to one audio thread;
+// What a body costs is what its effects cost: an effect that it has not takes no memory and executes nothing.
+//
+// Threads: the constructor, add_body, remove_body, set_effects and collect() belong to one main thread, process() to one audio thread;
 // push() and the get_ members may be called by any thread at any time.
 #pragma once
 
@@ -18,9 +20,10 @@
 
 #include "runtime/stream/events.hpp"
 #include "runtime/stream/ring.hpp"
+#include "runtime/synth/body.hpp"
 #include "runtime/synth/ears.hpp"
+#include "runtime/synth/effects.hpp"
 #include "runtime/synth/model.hpp"
-#include "runtime/synth/voice.hpp"
 
 namespace carillon::synth {
 
@@ -34,12 +37,29 @@ struct SynthesiserOptions {
   int max_waypoints = 64;   // of a body's way that are remembered
   int ring_events = 4096;   // that may wait between two calls of process()
   double longest_m = 60.0;  // what is further away is not heard
+  /// A counter of time, for what effects cost; nullptr: nothing is measured, and nothing paid for that.
+  TickFunction ticks = nullptr;
 };
 
 struct BodySettings {
-  Vec3 position_m{};          // of the centre of mass until the first Motion
+  Vec3 position_m{};                                // of the centre of mass until the first Motion
+  stream::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of the frame of its mesh until then
+  EffectSet effects = kUsualEffects;
   double silence_pa = 1e-10;  // VoiceOptions
+  double longest_m = 0.0;     // as in SynthesiserOptions; 0: what it says there
+  int max_waypoints = 0;
   Isa isa = Isa::kBest;
+};
+
+/// What the effects of one body have done since it was added, and what they hold. An effect that is off keeps its units and holds nothing.
+struct EffectCounters {
+  /// Work: of modal mode-samples, of hertz_pulse pulses, of acceleration_noise samples (of three dipoles), of air_delay samples that an ear
+  /// read with travel time, of doppler those whose travel time changed, of two_ears those of the second microphone and all further.
+  PerEffect<std::int64_t> units{};
+  /// Of SynthesiserOptions::ticks. What pulses cost is in modal; an ear's time is that of doppler where the way changes, else of air_delay,
+  /// else of what it hears, and of two_ears for the second microphone and all further.
+  PerEffect<std::int64_t> ticks{};
+  EffectBytes bytes{};  // without the model, which bodies share, and without what a body has that has no effects
 };
 
 /// Since the beginning.
@@ -65,13 +85,23 @@ class Synthesiser {
   /// there, or when the model is for another rate. [main-thread]
   int add_body(std::shared_ptr<const Model> model, const BodySettings& settings = {});
 
+  /// Gives a body another set of effects: makes what it lacks here, and lets the audio thread put it in and take out what is not needed any
+  /// more, at a period and without a click: what is heard goes over within a period, as soon as the new way of the air is filled. One
+  /// change of a body is on its way at a time: a later one waits, and begins with the first collect() (or call of this) after the earlier
+  /// one is over. Throws InputError when there is no such body, or for an effect that this build or the body's model cannot have.
+  /// [main-thread]
+  void set_effects(int body, EffectSet effects);
+
+  /// What was asked for last. Throws InputError when there is no such body. [main-thread]
+  EffectSet get_effects(int body) const;
+
   /// The body falls silent at the next period. Its number may be given to a new body after collect(). [main-thread]
   void remove_body(int body);
 
   /// Whether add_body() would find no room. [main-thread]
   bool is_full();
 
-  /// Gives back the memory of removed bodies that the audio thread has let go. [main-thread]
+  /// Gives back the memory of removed bodies and effects that the audio thread has let go, and sends changes that wait. [main-thread]
   void collect();
 
   /// Full scale per pascal; 1 at first. [any-thread]
@@ -83,7 +113,8 @@ class Synthesiser {
 
   /// The next frames of up to as many channels as there are microphones; further channels are silent. out[c] has room for `frames` numbers.
   /// Frame n is what arrives at (n - kLatency) / rate. Any number of frames, in any order, gives the same bits, as long as events come
-  /// before the horizon. [audio-thread]: no heap, no lock, no system call, no throw.
+  /// before the horizon. No frames: takes the events out of the ring, so that there is room for more. [audio-thread]: no heap, no lock, no
+  /// system call, no throw.
   void process(float* const* out, int channels, int frames) noexcept;
 
   static constexpr int kLatency = Ear::kLatency;
@@ -93,37 +124,66 @@ class Synthesiser {
   /// An event at or after this is in time: at most kPeriod frames after get_time_s(). [any-thread]
   double get_horizon_s() const noexcept { return static_cast<double>(horizon_.load(std::memory_order_relaxed)) / options_.rate_hz; }
   SynthesiserCounters get_counters() const noexcept;
+  /// Zeros for a number that is no body's. [any-thread]
+  EffectCounters get_effect_counters(int body) const noexcept;
+  /// The loudest that its modes have been so far [Pa at 1 m]. [any-thread]
+  double get_peak_pa(int body) const noexcept;
 
  private:
-  struct Body;
-  /// What the main thread asks of the audio thread, and what comes back.
+  /// What the main thread asks of the audio thread, and what comes back: a body that goes, or a change that is over.
   struct Command {
     Body* body = nullptr;
+    BodyChange* change = nullptr;
     int number = -1;
     bool removes = false;
+  };
+  /// A body as the main thread sees it.
+  struct Owned {
+    std::unique_ptr<Body> body;
+    std::unique_ptr<BodyChange> change;  // on its way
+    EffectSet effects, wanted;           // with that change; after those that wait
+    EffectBytes bytes;
+    bool is_leaving = false;
+  };
+  /// What all threads may see of a body.
+  struct Published {
+    std::array<std::atomic<std::int64_t>, kEffectCount> units{}, ticks{}, bytes{};
+    std::atomic<float> peak_pa{0.0F};
   };
   template <typename T>
   class Pipe;
 
+  Owned& find_owned(int body);
+  void send_change(int number);
+  void publish_bytes(int number);
   void apply_commands() noexcept;
+  void finish_changes() noexcept;
   void take_events() noexcept;
   void take(const stream::Impulse& impulse) noexcept;
+  void take(const stream::Contact& contact) noexcept;
   void take(const stream::Motion& motion) noexcept;
   void take(const stream::Listener& listener) noexcept;
   void render(int samples) noexcept;
   Body* find_body(std::int32_t number) noexcept;
+  void set_awake(int number) noexcept;
+  template <typename Work>
+  void count(const Body& body, Work&& work) noexcept;
+  template <typename Work>
+  void for_awake(Work&& work) noexcept;
+  void publish(int number) noexcept;
   void publish_counters() noexcept;
 
   SynthesiserOptions options_;
   stream::EventRing ring_;
   std::unique_ptr<Pipe<Command>> commands_;
   std::unique_ptr<Pipe<Command>> gone_;
-  std::vector<std::unique_ptr<Body>> owned_;  // by number; the main thread's
-  std::vector<bool> leaving_;                 // the main thread's
-  std::vector<Body*> playing_;                // by number; the audio thread's
+  std::vector<Owned> owned_;  // by number; the main thread's
+  std::unique_ptr<Published[]> published_bodies_;
+  std::vector<Body*> playing_;        // by number; the audio thread's
+  std::vector<std::uint64_t> awake_;  // bit i % 64 of word i / 64: body i has something to do
   Track listener_;
-  std::vector<std::array<double, kPeriod>> mix_;  // per microphone
-  std::array<float, kPeriod> mono_{};
+  Mix mix_;
+  BodyScratch scratch_;
   int rendered_ = 0;          // samples in mix_
   int held_ = 0;              // of them not yet handed out: the last
   std::int64_t sample_ = 0;   // rendered so far

@@ -16,9 +16,13 @@ bool Track::push(const Waypoint& waypoint) noexcept {
   bool finite = std::isfinite(waypoint.time_s);
   for (std::size_t k = 0; k < 3; ++k) finite = finite && std::isfinite(waypoint.position_m[k]) && std::isfinite(waypoint.velocity_m_s[k]);
   if (!finite) return false;
+  constexpr Vec3 kRest{};
   if (count_ > 0) {
-    const double last = get(count_ - 1).time_s;
+    const Waypoint& before = get(count_ - 1);
+    const double last = before.time_s;
     if (waypoint.time_s < last) return false;
+    const bool rests = waypoint.position_m == before.position_m && waypoint.velocity_m_s == kRest && before.velocity_m_s == kRest;
+    if (!rests) rest_begin_s_ = waypoint.time_s;
     if (waypoint.time_s == last) {
       const Waypoint& same = get(count_ - 1);
       if (waypoint.position_m == same.position_m && waypoint.velocity_m_s == same.velocity_m_s) return true;
@@ -55,6 +59,44 @@ Waypoint Track::find(double time_s) const noexcept {
     here.position_m[k] = a.position_m[k] + h01 * step + h10 * a.velocity_m_s[k] + h11 * b.velocity_m_s[k];
     here.velocity_m_s[k] = slope01 * step + slope10 * a.velocity_m_s[k] + slope11 * b.velocity_m_s[k];
   }
+  return here;
+}
+
+Attitude::Attitude(std::size_t capacity) : turns_(std::max<std::size_t>(capacity, 1)) {}
+
+void Attitude::push(double time_s, const stream::Quaternion& rotation) noexcept {
+  if (count_ > 0) {
+    const double last = get(count_ - 1).time_s;
+    if (time_s < last) return;
+    if (time_s == last) --count_;
+  }
+  if (count_ == turns_.size()) {
+    first_ = (first_ + 1) % turns_.size();
+    --count_;
+  }
+  turns_[(first_ + count_) % turns_.size()] = {time_s, rotation};
+  ++count_;
+}
+
+stream::Quaternion Attitude::find(double time_s) const noexcept {
+  if (count_ == 0) return {1.0, 0.0, 0.0, 0.0};
+  if (!(time_s > get(0).time_s)) return get(0).rotation;
+  if (time_s >= get(count_ - 1).time_s) return get(count_ - 1).rotation;
+  std::size_t low = 0, high = count_ - 1;
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    (get(middle).time_s <= time_s ? low : high) = middle;
+  }
+  const Turn &a = get(low), &b = get(high);
+  const double u = (time_s - a.time_s) / (b.time_s - a.time_s);
+  double dot = 0.0, norm = 0.0;
+  for (std::size_t k = 0; k < 4; ++k) dot += a.rotation[k] * b.rotation[k];
+  stream::Quaternion here{};
+  for (std::size_t k = 0; k < 4; ++k) {
+    here[k] = (1.0 - u) * a.rotation[k] + (dot < 0.0 ? -u : u) * b.rotation[k];
+    norm += here[k] * here[k];
+  }
+  for (double& x : here) x /= std::sqrt(norm);
   return here;
 }
 

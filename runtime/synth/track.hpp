@@ -3,8 +3,11 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
+
+#include "runtime/stream/events.hpp"
 
 namespace carillon::synth {
 
@@ -32,10 +35,40 @@ class Track {
 
   bool is_still() const { return count_ < 2; }
 
+  /// [audio-thread] Whether it stays where it is from this time on, as far as is known.
+  bool is_still_from(double time_s) const noexcept { return rest_begin_s_ <= time_s; }
+
  private:
   const Waypoint& get(std::size_t i) const { return waypoints_[(first_ + i) % waypoints_.size()]; }
 
   std::vector<Waypoint> waypoints_;  // a ring
+  std::size_t first_ = 0, count_ = 0;
+  double rest_begin_s_ = -std::numeric_limits<double>::infinity();
+};
+
+/// How something is turned over time: between its last attitudes by the shorter way; before the first and after the last it does not turn.
+/// One thread at a time.
+class Attitude {
+ public:
+  /// Takes memory for `capacity` >= 1 attitudes, of which the oldest are forgotten first.
+  explicit Attitude(std::size_t capacity);
+
+  /// [audio-thread] Adds an attitude, a unit quaternion; one at the time of the last replaces it. One that is earlier is not taken.
+  void push(double time_s, const stream::Quaternion& rotation) noexcept;
+
+  /// [audio-thread] Not turned when nothing was pushed.
+  stream::Quaternion find(double time_s) const noexcept;
+
+  std::size_t get_bytes() const noexcept { return turns_.size() * sizeof(Turn); }
+
+ private:
+  struct Turn {
+    double time_s = 0.0;
+    stream::Quaternion rotation{1.0, 0.0, 0.0, 0.0};
+  };
+  const Turn& get(std::size_t i) const { return turns_[(first_ + i) % turns_.size()]; }
+
+  std::vector<Turn> turns_;  // a ring
   std::size_t first_ = 0, count_ = 0;
 };
 

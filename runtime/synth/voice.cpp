@@ -258,6 +258,11 @@ void Voice::reset() noexcept {
   ++counters_.resets;
 }
 
+std::size_t Voice::calc_bytes() const {
+  return sizeof(Voice) + state_.capacity() * sizeof(ModeState) + starts_.capacity() * sizeof(Starts) +
+         damped_.capacity() * sizeof(DampedState) + damped_amplitude_.capacity() * sizeof(double) + pulses_.capacity() * sizeof(Pulse);
+}
+
 int Voice::get_live_mode_count() const {
   return std::min(live_ * kGroup, model_->ringing_) + (damped_live_ ? static_cast<int>(damped_.size()) : 0);
 }

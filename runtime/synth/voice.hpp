@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -61,6 +62,12 @@ class Voice {
   /// Modes that are advanced at this moment, in whole groups.
   int get_live_mode_count() const;
   bool is_awake() const { return live_ > 0 || damped_live_; }
+  /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
+  bool is_idle() const { return !is_awake() && !fading_ && pulses_.empty() && held_ == 0; }
+  /// As process() for a multiple of kQuantum samples of a voice that is idle, whose zeros nobody wants. [audio-thread]
+  void skip(std::int64_t samples) noexcept { horizon_ += samples; }
+  /// Memory that this voice has taken, without that of the model.
+  std::size_t calc_bytes() const;
   const VoiceCounters& get_counters() const { return counters_; }
   /// Sum over the sounded modes of (q'^2 + lambda q^2) / 2 [J] at the horizon, which must be a multiple of kPeriod.
   double calc_energy_j() const noexcept;

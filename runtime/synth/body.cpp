@@ -1,0 +1,311 @@
+// Method:     modes and click are heard by way of the air: histories that ears read. A change of effects that touches the air makes another
+//             air beside the old one; both are fed until the new one holds all that its ears read, then the sound goes over from one to the
+//             other within a period, and the old air and the modules that nobody hears any more go back.
+// Source:     none.
+// Deviations: none.
+#include "runtime/synth/body.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::synth {
+namespace {
+
+constexpr EffectSet kOfTheAir{Effect::kModal, Effect::kAccelerationNoise, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars};
+
+/// Whether a build and a body have an effect: false without a look where the build has not.
+constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
+
+/// The middle of the microphones, where those are who hear a body without two ears.
+Vec3 calc_middle(const std::vector<Vec3>& places) {
+  Vec3 middle{};
+  for (const Vec3& place : places)
+    for (std::size_t k = 0; k < 3; ++k) middle[k] += place[k] / static_cast<double>(places.size());
+  return middle;
+}
+
+std::unique_ptr<Air> make_air(EffectSet effects, const BodyFrame& frame) {
+  auto air = std::make_unique<Air>();
+  air->effects = effects;
+  const double longest_m = effects.has(Effect::kAirDelay) ? frame.longest_m : 0.0;
+  const auto make_history = [&] { return std::make_unique<History>(longest_m, frame.rate_hz, kPeriod); };
+  if (effects.has(Effect::kModal)) air->monopole = make_history();
+  air->source.monopole = air->monopole.get();
+  for (std::size_t k = 0; k < 3 && effects.has(Effect::kAccelerationNoise); ++k) {
+    air->dipole[k] = make_history();
+    air->source.dipole[k] = air->dipole[k].get();
+  }
+  if (effects.has(Effect::kTwoEars)) {
+    air->ears.reserve(frame.microphones_m.size());
+    for (const Vec3& place : frame.microphones_m) air->ears.emplace_back(place, frame.rate_hz, effects);
+  } else {
+    air->ears.emplace_back(calc_middle(frame.microphones_m), frame.rate_hz, effects);
+  }
+  return air;
+}
+
+}  // namespace
+
+bool Air::is_silent() const noexcept {
+  if (monopole && !monopole->is_silent()) return false;
+  return !dipole[0] || (dipole[0]->is_silent() && dipole[1]->is_silent() && dipole[2]->is_silent());
+}
+
+EffectBytes BodyChange::calc_bytes() const {
+  EffectBytes bytes;
+  if (voice) bytes[Effect::kModal] += static_cast<std::int64_t>(voice->calc_bytes());
+  if (clicker) {
+    bytes[Effect::kAccelerationNoise] +=
+        static_cast<std::int64_t>(sizeof(Clicker) - sizeof(Click) + clicker->click.calc_bytes() + clicker->attitude.get_bytes());
+  }
+  if (!air) return bytes;
+  // What a history holds beyond one without travel time belongs to the travel time.
+  const History still(0.0, 1.0, kPeriod);
+  const auto add = [&](const History& history, Effect effect) {
+    bytes[effect] += static_cast<std::int64_t>(sizeof(History) + still.get_bytes());
+    bytes[Effect::kAirDelay] += static_cast<std::int64_t>(history.get_bytes() - still.get_bytes());
+  };
+  if (air->monopole) add(*air->monopole, Effect::kModal);
+  for (const auto& history : air->dipole)
+    if (history) add(*history, Effect::kAccelerationNoise);
+  const Effect source = air->monopole ? Effect::kModal : Effect::kAccelerationNoise;
+  bytes[source] += static_cast<std::int64_t>(sizeof(Air) + sizeof(Ear));
+  bytes[Effect::kTwoEars] += static_cast<std::int64_t>((air->ears.size() - 1) * sizeof(Ear));
+  return bytes;
+}
+
+Body::Body(std::shared_ptr<const Model> model, BodyFrame frame, const Vec3& position_m, const stream::Quaternion& rotation)
+    : model_(std::move(model)), frame_(std::move(frame)), track_(static_cast<std::size_t>(frame_.max_waypoints)), rotation_(rotation) {
+  track_.push({.position_m = position_m});
+}
+
+void Body::check(EffectSet effects) const {
+  check_compiled(effects);
+  if (!effects.has(Effect::kAccelerationNoise)) return;
+  if (!(model_->get_sphere_radius_m() > 0.0 && model_->get_mass_kg() > 0.0))
+    throw InputError("acceleration_noise needs a body with a mass and a volume; the bank of this one gives none");
+}
+
+std::unique_ptr<BodyChange> Body::make_change(EffectSet from, EffectSet to) const {
+  check(to);
+  auto change = std::make_unique<BodyChange>();
+  change->effects = to;
+  if (to.has(Effect::kModal) && !from.has(Effect::kModal)) {
+    change->voice = std::make_unique<Voice>(
+        model_, VoiceOptions{.max_strikes = frame_.max_strikes, .silence_pa = frame_.silence_pa, .isa = frame_.isa});
+  }
+  if (to.has(Effect::kAccelerationNoise) && !from.has(Effect::kAccelerationNoise)) {
+    change->clicker =
+        std::make_unique<Clicker>(Clicker{Click(model_->get_sphere_radius_m(), model_->get_mass_kg(), frame_.rate_hz, frame_.max_strikes),
+                                          Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
+  }
+  const bool sounds = to.has(Effect::kModal) || to.has(Effect::kAccelerationNoise);
+  if (to.common(kOfTheAir) != from.common(kOfTheAir) && sounds) change->air = make_air(to, frame_);
+  return change;
+}
+
+void Body::apply(BodyChange& change, const Track& listener, std::int64_t sample) noexcept {
+  if (is_asleep()) wake(sample);
+  rendered_ = sample;
+  change_ = &change;
+  effects_ = change.effects;
+  if (change.voice) {
+    std::swap(voice_, change.voice);
+    first_ = sample;
+  }
+  if (change.clicker) {
+    std::swap(clicker_, change.clicker);
+    clicker_->first = sample;
+    clicker_->attitude.push(turned_s_, rotation_);
+  }
+  if (!change.air) return;
+  std::swap(next_air_, change.air);
+  next_air_->source.track = &track_;
+  next_air_->first = sample;
+  if (next_air_->monopole) next_air_->monopole->push_silence(sample);
+  for (const auto& history : next_air_->dipole)
+    if (history) history->push_silence(sample);
+  for (Ear& ear : next_air_->ears) ear.begin(next_air_->source, listener, sample);
+}
+
+/// Whether the ears of a new air find in its histories all that the old one could have given them.
+bool Body::is_filled(const Air& air, const Track& listener, std::int64_t sample) const noexcept {
+  if (!air_ || air_->is_silent()) return true;
+  const std::int64_t filled = sample - air.first;
+  const History& history = air.monopole ? *air.monopole : *air.dipole[0];
+  double longest_s = 0.0;
+  if (has(air.effects, Effect::kAirDelay)) {
+    for (const Ear& ear : air.ears) longest_s = std::max(longest_s, ear.calc_delay_s(air.source, listener, sample));
+  }
+  const double needed = longest_s * frame_.rate_hz + Ear::kLatency + kTaps + kPeriod;
+  return static_cast<double>(filled) >= needed || filled >= history.get_size();
+}
+
+BodyChange* Body::finish_change(const Track& listener, std::int64_t sample) noexcept {
+  if (change_ == nullptr) return nullptr;
+  const bool sounds = has(effects_, Effect::kModal) || has(effects_, Effect::kAccelerationNoise);
+  if (!fading_ && (next_air_ || (!sounds && air_))) {
+    // The old air goes on until the new one can take over; with nothing to be heard it does so at once.
+    fading_ = next_air_ == nullptr || is_filled(*next_air_, listener, sample);
+    const bool is_heard = air_ && !(air_->is_silent() && (!voice_ || voice_->is_idle()) && (!clicker_ || clicker_->click.is_idle()));
+    if (is_heard) return nullptr;
+  }
+  fading_ = false;
+  if (next_air_ || !sounds) change_->air = std::exchange(air_, std::move(next_air_));
+  if (!has(effects_, Effect::kModal)) change_->voice = std::move(voice_);
+  if (!has(effects_, Effect::kAccelerationNoise)) change_->clicker = std::move(clicker_);
+  return std::exchange(change_, nullptr);
+}
+
+bool Body::is_asleep() const noexcept {
+  return change_ == nullptr && (!air_ || air_->is_silent()) && (!voice_ || voice_->is_idle()) && (!clicker_ || clicker_->click.is_idle());
+}
+
+/// Lets the modules of a body that slept catch up.
+void Body::wake(std::int64_t sample) noexcept {
+  const std::int64_t slept = sample - rendered_;
+  if (slept <= 0) return;
+  rendered_ = sample;
+  if (voice_) voice_->skip(slept);
+  if (clicker_) clicker_->click.skip(slept);
+  if (!air_) return;
+  if (air_->monopole) air_->monopole->push_silence(slept);
+  for (const auto& history : air_->dipole)
+    if (history) history->push_silence(slept);
+}
+
+bool Body::take(const stream::Impulse& impulse, std::int64_t sample) noexcept {
+  wake(sample);
+  stream::Impulse own = impulse;
+  if (!has(effects_, Effect::kHertzPulse)) own.duration_s = 0.0;
+  bool is_taken = false, is_refused = false;
+  if (has(effects_, Effect::kModal) && voice_) {
+    own.time_s = impulse.time_s - static_cast<double>(first_) / frame_.rate_hz;
+    const std::int64_t late = voice_->get_counters().late;
+    (voice_->strike(own) ? is_taken : is_refused) = true;
+    work_.late += voice_->get_counters().late - late;
+  }
+  if (has(effects_, Effect::kAccelerationNoise) && clicker_) {
+    own.time_s = impulse.time_s - static_cast<double>(clicker_->first) / frame_.rate_hz;
+    (clicker_->click.strike(own, clicker_->attitude.find(impulse.time_s)) ? is_taken : is_refused) = true;
+  }
+  if (is_taken) {
+    ++work_.strikes;
+    if (own.duration_s > 0.0) ++work_.units[Effect::kHertzPulse];
+  }
+  if (is_refused) ++work_.refused;
+  return is_taken;
+}
+
+/// The place for what contacts that last do to a body with roughness, rolling or contact damping.
+bool Body::take(const stream::Contact&, std::int64_t) noexcept { return false; }
+
+bool Body::take(const stream::Motion& motion) noexcept {
+  if (!track_.push({motion.time_s, motion.position_m, motion.velocity_m_s})) return false;
+  turned_s_ = motion.time_s;
+  rotation_ = motion.rotation;
+  if (kCompiledEffects.has(Effect::kAccelerationNoise) && clicker_) clicker_->attitude.push(motion.time_s, motion.rotation);
+  return true;
+}
+
+/// Modes and click to all histories.
+void Body::make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept {
+  std::uint64_t started = ticks != nullptr ? ticks() : 0;
+  const auto end_part = [&](Effect effect) {
+    if (ticks == nullptr) return;
+    const std::uint64_t now = ticks();
+    work_.ticks[effect] += static_cast<std::int64_t>(now - std::exchange(started, now));
+  };
+  const std::array<Air*, 2> airs{air_.get(), next_air_.get()};
+  if (kCompiledEffects.has(Effect::kModal) && voice_) {
+    const std::span<float> mono = std::span(scratch.mono).first(count);
+    const bool is_idle = voice_->is_idle();
+    if (is_idle) {
+      voice_->skip(static_cast<std::int64_t>(count));
+    } else {
+      std::fill(mono.begin(), mono.end(), 0.0F);
+      const VoiceCounters before = voice_->get_counters();
+      voice_->process(mono);
+      const VoiceCounters& after = voice_->get_counters();
+      work_.resets += after.resets - before.resets;
+      work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
+      for (const float p : mono) work_.peak_pa = std::max(work_.peak_pa, std::abs(p));
+    }
+    for (Air* air : airs) {
+      if (air == nullptr || !air->monopole) continue;
+      if (is_idle)
+        air->monopole->push_silence(static_cast<std::int64_t>(count));
+      else
+        air->monopole->push(mono);
+    }
+    end_part(Effect::kModal);
+  }
+  if (kCompiledEffects.has(Effect::kAccelerationNoise) && clicker_) {
+    const bool is_idle = clicker_->click.is_idle();
+    std::array<std::span<float>, 3> dipole;
+    for (std::size_t k = 0; k < 3; ++k) dipole[k] = std::span(scratch.dipole[k]).first(count);
+    if (is_idle) {
+      clicker_->click.skip(static_cast<std::int64_t>(count));
+    } else {
+      clicker_->click.process(dipole);
+      work_.units[Effect::kAccelerationNoise] += static_cast<std::int64_t>(count);
+    }
+    for (Air* air : airs) {
+      for (std::size_t k = 0; k < 3 && air != nullptr && air->dipole[k]; ++k) {
+        if (is_idle)
+          air->dipole[k]->push_silence(static_cast<std::int64_t>(count));
+        else
+          air->dipole[k]->push(dipole[k]);
+      }
+    }
+    end_part(Effect::kAccelerationNoise);
+  }
+}
+
+/// `fade`: 0 none, 1 in, -1 out.
+void Body::hear(Air& air, std::int64_t sample, std::size_t count, const Track& listener, int fade, BodyScratch& scratch, Mix& mix,
+                TickFunction ticks) noexcept {
+  if (air.is_silent()) return;
+  std::uint64_t started = ticks != nullptr ? ticks() : 0;
+  const bool apart = has(air.effects, Effect::kTwoEars);
+  const std::span<double> heard = std::span(scratch.heard).first(count);
+  for (std::size_t m = 0; m < air.ears.size(); ++m) {
+    int moved = 0;
+    if (apart && fade == 0) {
+      moved = air.ears[m].process(air.source, listener, sample, std::span(mix[m]).first(count));
+    } else {
+      std::fill(heard.begin(), heard.end(), 0.0);
+      moved = air.ears[m].process(air.source, listener, sample, heard);
+      const auto begin = static_cast<int>(sample % kPeriod);
+      for (std::size_t n = 0; n < count && fade != 0; ++n) {
+        const double u = (begin + static_cast<int>(n)) / static_cast<double>(kPeriod);
+        heard[n] *= fade > 0 ? u : 1.0 - u;
+      }
+      for (std::size_t c = apart ? m : 0; c < (apart ? m + 1 : mix.size()); ++c)
+        for (std::size_t n = 0; n < count; ++n) mix[c][n] += heard[n];
+    }
+    if (has(air.effects, Effect::kAirDelay)) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
+    if (has(air.effects, Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
+    if (m > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
+    if (ticks == nullptr) continue;
+    const std::uint64_t now = ticks();
+    const Effect sends = air.monopole ? Effect::kModal : Effect::kAccelerationNoise;
+    const Effect carries = moved > 0 ? Effect::kDoppler : has(air.effects, Effect::kAirDelay) ? Effect::kAirDelay : sends;
+    work_.ticks[m > 0 ? Effect::kTwoEars : carries] += static_cast<std::int64_t>(now - std::exchange(started, now));
+  }
+}
+
+void Body::render(std::int64_t sample, std::size_t count, const Track& listener, BodyScratch& scratch, Mix& mix,
+                  TickFunction ticks) noexcept {
+  wake(sample);
+  make_sound(count, scratch, ticks);
+  if (air_) hear(*air_, sample, count, listener, fading_ ? -1 : 0, scratch, mix, ticks);
+  if (next_air_ && fading_) hear(*next_air_, sample, count, listener, 1, scratch, mix, ticks);
+  rendered_ = sample + static_cast<std::int64_t>(count);
+}
+
+}  // namespace carillon::synth
