@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -159,6 +160,18 @@ BodyChange* Body::finish_change(const Track& listener, std::int64_t sample) noex
   if (!has(effects_, Effect::kModal)) change_->voice = std::move(voice_);
   if (!has(effects_, Effect::kAccelerationNoise)) change_->clicker = std::move(clicker_);
   return std::exchange(change_, nullptr);
+}
+
+float Body::calc_nearness(const Track& listener, std::int64_t sample) const noexcept {
+  const double time_s = static_cast<double>(sample) / frame_.rate_hz;
+  const Vec3 here = track_.find(time_s).position_m, there = listener.find(time_s).position_m;
+  double nearest = std::numeric_limits<double>::infinity();  // squared
+  for (const Vec3& place : frame_.microphones_m) {
+    double square = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) square += (there[k] + place[k] - here[k]) * (there[k] + place[k] - here[k]);
+    nearest = std::min(nearest, square);
+  }
+  return static_cast<float>(1.0 / std::max(std::sqrt(nearest), kNearestM));
 }
 
 bool Body::is_asleep() const noexcept {

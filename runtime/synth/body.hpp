@@ -110,6 +110,10 @@ class Body {
   /// Nothing sounds, nothing is under way, nothing is to come: until the next event render() would add nothing.
   bool is_asleep() const noexcept;
   const BodyWork& get_work() const { return work_; }
+  /// Its modes; nullptr without.
+  Voice* get_voice() noexcept { return voice_.get(); }
+  /// How many pascals 1 Pa at 1 m is at the nearest microphone, at a sample.
+  float calc_nearness(const Track& listener, std::int64_t sample) const noexcept;
 
  private:
   void wake(std::int64_t sample) noexcept;

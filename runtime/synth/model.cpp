@@ -93,6 +93,7 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   for (const Sorted& sorted : ringing) model->add_ringing_mode(sorted.mode);
   model->add_damped_modes(std::move(damped));
   model->copy_shapes(bank);
+  model->find_bounds();
   return model;
 }
 
@@ -193,6 +194,33 @@ void Model::copy_shapes(const bank::Bank& bank) {
   }
 }
 
+void Model::find_bounds() {
+  weight_.resize(sound_.size());
+  reach_.resize(sound_.size());
+  float largest = 0.0F;
+  for (std::size_t g = sound_.size(); g-- > 0;) {
+    std::array<float, kGroup> size{};  // squared, in integer steps
+    for (std::size_t vertex = 0; vertex < shape_.size() / (3 * columns_); ++vertex) {
+      const std::int16_t* row = &shape_[vertex * 3 * columns_ + g * kGroup];
+      for (std::size_t lane = 0; lane < kGroup; ++lane) {
+        float sum = 0.0F;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const auto x = static_cast<float>(row[axis * columns_ + lane]);
+          sum += x * x;
+        }
+        size[lane] = std::max(size[lane], sum);
+      }
+    }
+    float reach = 0.0F;
+    for (std::size_t lane = 0; lane < kGroup; ++lane) {
+      weight_[g][lane] = std::hypot(strike_[g].out_re[lane], strike_[g].out_im[lane]);
+      reach += weight_[g][lane] * strike_[g].scale[lane] * std::sqrt(size[lane]);
+    }
+    largest = std::max(largest, reach);
+    reach_[g] = largest;
+  }
+}
+
 double Model::calc_projection(int mode, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction) const {
   if (triangle < 0 || static_cast<std::size_t>(triangle) >= triangles_.size()) throw InputError("the bank has no such triangle");
   const int column = mode < ringing_ ? mode : static_cast<int>(sound_.size()) * kGroup + mode - ringing_;
@@ -207,8 +235,9 @@ double Model::calc_projection(int mode, std::int32_t triangle, const bank::Vec3&
 }
 
 std::size_t Model::calc_bytes() const {
-  return sound_.size() * (sizeof(SoundTable) + sizeof(TurnTable) + sizeof(StrikeTable)) + damped_.size() * sizeof(DampedMode) +
-         modes_.size() * sizeof(Mode) + triangles_.size() * sizeof(triangles_[0]) + shape_.size() * sizeof(shape_[0]);
+  return sound_.size() * (sizeof(SoundTable) + sizeof(TurnTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
+         damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + triangles_.size() * sizeof(triangles_[0]) +
+         shape_.size() * sizeof(shape_[0]);
 }
 
 }  // namespace carillon::synth

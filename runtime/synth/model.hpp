@@ -70,6 +70,7 @@ class Model {
   void add_ringing_mode(const Mode& mode);
   void add_damped_modes(std::vector<Mode> modes);
   void copy_shapes(const bank::Bank& bank);
+  void find_bounds();
   const std::int16_t* get_row(std::int32_t vertex, int axis) const {
     return shape_.data() + (static_cast<std::size_t>(vertex) * 3 + static_cast<std::size_t>(axis)) * columns_;
   }
@@ -81,7 +82,9 @@ class Model {
   std::vector<SoundTable> sound_;
   std::vector<TurnTable> turn_;
   std::vector<StrikeTable> strike_;
-  std::vector<DampedMode> damped_;  // ascending in substeps
+  std::vector<std::array<float, kGroup>> weight_;  // bound on the pressure of a mode is weight times the size of its state
+  std::vector<float> reach_;                       // Pa at 1 m per N s: what a strike can make of a group, or of a later one
+  std::vector<DampedMode> damped_;                 // ascending in substeps
   std::vector<std::array<std::int32_t, 3>> triangles_;
   std::size_t columns_ = 0;          // groups x kGroup, then the damped modes
   std::vector<std::int16_t> shape_;  // (V, 3, columns_)

@@ -68,7 +68,8 @@ class Synthesiser::Pipe {
 Synthesiser::Synthesiser(SynthesiserOptions options)
     : options_(check(std::move(options))),
       ring_(static_cast<std::size_t>(options_.ring_events)),
-      listener_(static_cast<std::size_t>(options_.max_waypoints)) {
+      listener_(static_cast<std::size_t>(options_.max_waypoints)),
+      allowed_(options_.budget) {
   const auto bodies = static_cast<std::size_t>(options_.max_bodies);
   // A number comes, changes and goes in at most three commands, and two come back.
   commands_ = std::make_unique<Pipe<Command>>(3 * bodies);
@@ -246,14 +247,18 @@ void Synthesiser::take(const stream::Impulse& impulse) noexcept {
   Body* body = find_body(impulse.body);
   if (body == nullptr) return;
   count(*body, [&] {
-    if (body->take(impulse, sample_)) set_awake(impulse.body);
+    if (!body->take(impulse, sample_)) return;
+    set_awake(impulse.body);
+    give_floor(*body);
   });
   publish(impulse.body);
 }
 
 void Synthesiser::take(const stream::Contact& contact) noexcept {
   Body* body = find_body(contact.body);
-  if (body != nullptr && body->take(contact, sample_)) set_awake(contact.body);
+  if (body == nullptr || !body->take(contact, sample_)) return;
+  set_awake(contact.body);
+  give_floor(*body);
 }
 
 void Synthesiser::take(const stream::Motion& motion) noexcept {
@@ -283,12 +288,66 @@ void Synthesiser::finish_changes() noexcept {
   });
 }
 
+/// The floor for strikes in this period, whether the body is awake since its beginning or not.
+void Synthesiser::give_floor(Body& body) noexcept {
+  Voice* voice = body.get_voice();
+  if (!limited_ || voice == nullptr) return;
+  const std::int64_t begin = sample_ / kPeriod * kPeriod;
+  voice->set_floor(budget_.get_floor_pa() / body.calc_nearness(listener_, begin));
+}
+
+/// At the start of a period: lets modes go that the budget has no room for.
+void Synthesiser::keep_budget() noexcept {
+  const double per_s = allowed_.load(std::memory_order_relaxed);
+  const std::int64_t spent = work_.mode_samples - spent_before_;
+  spent_before_ = work_.mode_samples;
+  if (per_s == std::numeric_limits<double>::infinity()) {
+    if (!limited_) return;
+    limited_ = false;
+    budget_ = Budget();
+    for (Body* body : playing_)
+      if (body != nullptr && body->get_voice() != nullptr) body->get_voice()->set_floor(0.0F);
+    return;
+  }
+  limited_ = true;
+  std::int64_t groups = 0;
+  int awake = 0;
+  for_awake([&](int, Body& body) {
+    const Voice* voice = body.get_voice();
+    const int live = voice == nullptr ? 0 : voice->get_live_group_count();
+    groups += live;
+    awake += static_cast<int>(live > 0);
+    return true;
+  });
+  const double allowed = per_s > 0.0 ? per_s * kPeriod / options_.rate_hz : 0.0;
+  const bool is_too_much = budget_.begin(allowed, static_cast<double>(spent), groups, awake);
+  if (is_too_much) {
+    for_awake([&](int, Body& body) {
+      if (Voice* voice = body.get_voice()) budget_.tell(voice->measure(body.calc_nearness(listener_, sample_)));
+      return true;
+    });
+    budget_.decide();
+  }
+  for_awake([&](int, Body& body) {
+    Voice* voice = body.get_voice();
+    give_floor(body);
+    if (!is_too_much || voice == nullptr || voice->get_live_group_count() == 0) return true;
+    const int stay = budget_.find_limit(voice->get_measured());
+    work_.faded += voice->get_live_group_count() - stay;
+    voice->cut(stay);
+    return true;
+  });
+}
+
 /// Fills mix_ with the next samples: whole quanta, all of one period.
 void Synthesiser::render(int samples) noexcept {
   const bool begins = sample_ % kPeriod == 0;
   if (begins) apply_commands();
   take_events();
-  if (begins) finish_changes();
+  if (begins) {
+    finish_changes();
+    keep_budget();
+  }
   for (auto& mix : mix_) std::fill_n(mix.begin(), samples, 0.0);
   for_awake([&](int number, Body& body) {
     if (body.is_asleep()) return false;
@@ -358,7 +417,7 @@ double Synthesiser::get_peak_pa(int body) const noexcept {
 }
 
 void Synthesiser::publish_counters() noexcept {
-  const std::array<std::int64_t, 5> values{work_.strikes, work_.refused, work_.late, work_.resets, work_.mode_samples};
+  const std::array<std::int64_t, 6> values{work_.strikes, work_.refused, work_.late, work_.resets, work_.mode_samples, work_.faded};
   for (std::size_t i = 0; i < values.size(); ++i) published_[i].store(values[i], std::memory_order_relaxed);
 }
 
@@ -370,7 +429,8 @@ SynthesiserCounters Synthesiser::get_counters() const noexcept {
           .faults = ring_.get_faults(),
           .overflows = ring_.get_overflows(),
           .resets = get(3),
-          .mode_samples = get(4)};
+          .mode_samples = get(4),
+          .faded = get(5)};
 }
 
 }  // namespace carillon::synth

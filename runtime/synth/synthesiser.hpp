@@ -14,6 +14,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "runtime/stream/events.hpp"
 #include "runtime/stream/ring.hpp"
 #include "runtime/synth/body.hpp"
+#include "runtime/synth/budget.hpp"
 #include "runtime/synth/ears.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/model.hpp"
@@ -33,10 +35,11 @@ struct SynthesiserOptions {
   std::vector<Vec3> microphones_m{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}};
   Vec3 listener_m{};
   int max_bodies = 64;
-  int max_strikes = 64;     // that a body may have waiting or acting at once
-  int max_waypoints = 64;   // of a body's way that are remembered
-  int ring_events = 4096;   // that may wait between two calls of process()
-  double longest_m = 60.0;  // what is further away is not heard
+  int max_strikes = 64;                                     // that a body may have waiting or acting at once
+  int max_waypoints = 64;                                   // of a body's way that are remembered
+  int ring_events = 4096;                                   // that may wait between two calls of process()
+  double longest_m = 60.0;                                  // what is further away is not heard
+  double budget = std::numeric_limits<double>::infinity();  // set_budget()
   /// A counter of time, for what effects cost; nullptr: nothing is measured, and nothing paid for that.
   TickFunction ticks = nullptr;
 };
@@ -71,6 +74,7 @@ struct SynthesiserCounters {
   std::int64_t overflows = 0;     // events for which the ring had no room
   std::int64_t resets = 0;        // bodies silenced because their state was no number
   std::int64_t mode_samples = 0;  // work: modes times samples
+  std::int64_t faded = 0;         // groups of modes that had to go for the budget
 };
 
 class Synthesiser {
@@ -106,6 +110,13 @@ class Synthesiser {
 
   /// Full scale per pascal; 1 at first. [any-thread]
   void set_gain(double per_pa) noexcept { gain_.store(static_cast<float>(per_pa), std::memory_order_relaxed); }
+
+  /// Mode-samples that a second of sound may take (modes times samples, as the counters count them); infinity: as many as there are. When
+  /// there are more, the modes that are least audible at the microphones fade out over a period, over all bodies, though never the first
+  /// kGroup of one that rings; they come back with the next strike. Not a number counts as 0. A pure function of the events: no clock.
+  /// [any-thread]
+  void set_budget(double mode_samples_per_s) noexcept { allowed_.store(mode_samples_per_s, std::memory_order_relaxed); }
+  double get_budget() const noexcept { return allowed_.load(std::memory_order_relaxed); }
 
   /// Times of events are seconds since the first sample. False when the event is refused (counted). [any-thread]: no heap, no lock, no
   /// throw.
@@ -171,6 +182,8 @@ class Synthesiser {
   template <typename Work>
   void for_awake(Work&& work) noexcept;
   void publish(int number) noexcept;
+  void keep_budget() noexcept;
+  void give_floor(Body& body) noexcept;
   void publish_counters() noexcept;
 
   SynthesiserOptions options_;
@@ -184,14 +197,18 @@ class Synthesiser {
   Track listener_;
   Mix mix_;
   BodyScratch scratch_;
-  int rendered_ = 0;          // samples in mix_
-  int held_ = 0;              // of them not yet handed out: the last
-  std::int64_t sample_ = 0;   // rendered so far
+  int rendered_ = 0;         // samples in mix_
+  int held_ = 0;             // of them not yet handed out: the last
+  std::int64_t sample_ = 0;  // rendered so far
+  Budget budget_;
+  bool limited_ = false;           // voices have floors
+  std::int64_t spent_before_ = 0;  // mode-samples up to the last period
+  std::atomic<double> allowed_;
   SynthesiserCounters work_;  // the audio thread's
   std::atomic<float> gain_{1.0F};
   std::atomic<std::int64_t> position_{0};
   std::atomic<std::int64_t> horizon_{0};
-  std::array<std::atomic<std::int64_t>, 5> published_{};
+  std::array<std::atomic<std::int64_t>, 6> published_{};
 };
 
 }  // namespace carillon::synth

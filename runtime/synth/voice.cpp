@@ -26,10 +26,11 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
     : model_(std::move(model)), kernels_(&get_kernels(options.isa)), silence_pa_(options.silence_pa) {
   if (!(silence_pa_ > 0.0) || !std::isfinite(silence_pa_)) throw InputError("the pressure of silence must be a positive number of Pa");
   groups_ = static_cast<int>(model_->sound_.size());
-  limit_ = groups_;
+  limit_ = cut_ = groups_;
   state_.resize(model_->sound_.size());
   starts_.resize(model_->sound_.size());
   damped_.resize(model_->damped_.size());
+  bounds_.resize(model_->sound_.size());
   damped_amplitude_.resize(model_->damped_.size());
   pulses_.reserve(static_cast<std::size_t>(std::max(1, options.max_strikes)));
 }
@@ -52,6 +53,7 @@ bool Voice::strike(const stream::Impulse& impulse) noexcept {
     pulse.begin = std::nextafter(earliest, earliest + 1.0);
     ++counters_.late;
   }
+  pulse.strength_n_s = static_cast<float>(std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]));
   const auto& triangle = model_->triangles_[static_cast<std::size_t>(impulse.triangle)];
   for (int corner = 0; corner < 3; ++corner) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -89,10 +91,9 @@ void Voice::render(int quanta) noexcept {
   horizon_ += quanta * kQuantum;
   rendered_ = held_ = quanta * kQuantum;
   if (first == 0) {
-    if (limit_ < live_)
-      fade_to_limit();
-    else
-      fading_ = false;
+    fading_ = false;
+    if (const int stay = std::min(limit_, cut_); stay < live_) fade_out(stay);
+    cut_ = groups_;
     if (start / kPeriod % kCullEvery == 0 && is_awake()) cull();
   }
   silent_ = !is_awake() && !fading_ && pulses_.empty();
@@ -106,7 +107,6 @@ void Voice::render(int quanta) noexcept {
   } else if (live_ > 0 && first == 0) {
     kernels_->advance(model_->turn_.data(), state_.data(), starts_.data(), live_);
   }
-  counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * rendered_;
   for (int q = 0, made = whole ? quanta : 0; q < quanta; ++q) {
     float* out = block_.data() + q * kQuantum;
     const std::int64_t sample = start + q * kQuantum;
@@ -117,6 +117,7 @@ void Voice::render(int quanta) noexcept {
       if (live_ > 0) kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
     }
     if (struck) strike_quantum(sample, first + q, out);
+    counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
     if (struck || damped_live_) add_damped(sample, struck, out);
     if (fading_) {
       for (int n = 0; n < kQuantum; ++n) out[n] += fade_[(first + q) * kQuantum + n];
@@ -143,16 +144,28 @@ bool Voice::is_struck(std::int64_t sample) const noexcept {
   return false;
 }
 
-/// Makes all modes live that the limit allows; the starts of those that were not are out of date.
-void Voice::wake() noexcept {
-  for (; live_ < limit_; ++live_) starts_[static_cast<std::size_t>(live_)] = Starts{};
+/// Makes as many groups live as the limit allows; the starts of those that were not are out of date.
+void Voice::wake(int groups) noexcept {
+  for (const int last = std::min(groups, limit_); live_ < last; ++live_) starts_[static_cast<std::size_t>(live_)] = Starts{};
+}
+
+/// Up to which group a strike can be heard above the floor.
+int Voice::find_reach(float strength_n_s) const noexcept {
+  if (!(floor_pa_ > 0.0F)) return groups_;
+  const auto& reach = model_->reach_;
+  const auto last = std::partition_point(reach.begin(), reach.end(), [&](float pa) { return pa * strength_n_s >= floor_pa_; });
+  return std::max(1, static_cast<int>(last - reach.begin()));
 }
 
 void Voice::strike_quantum(std::int64_t sample, int quantum, float* out) noexcept {
-  wake();
+  const auto find_begin = [sample](const Pulse& pulse) { return pulse.begin - static_cast<double>(sample - 1); };
+  const auto acts = [&](const Pulse& pulse) { return find_begin(pulse) <= kQuantum && find_begin(pulse) + pulse.length > 0.0; };
   for (const Pulse& pulse : pulses_) {
-    const double begin = pulse.begin - static_cast<double>(sample - 1);
-    if (begin > kQuantum || begin + pulse.length <= 0.0) continue;
+    if (acts(pulse)) wake(find_reach(pulse.strength_n_s));
+  }
+  for (const Pulse& pulse : pulses_) {
+    if (!acts(pulse)) continue;
+    const double begin = find_begin(pulse);
     touch_.first = std::clamp(static_cast<int>(std::ceil(begin)) - 1, 0, kQuantum);
     touch_.last = std::clamp(static_cast<int>(std::ceil(begin + pulse.length)), touch_.first, kQuantum);
     for (int n = touch_.first; n < touch_.last; ++n) {
@@ -234,15 +247,33 @@ void Voice::cull() noexcept {
   if (!damped_live_) std::fill(damped_.begin(), damped_.end(), DampedState{});
 }
 
-/// Renders the groups beyond the limit once more, on their way out, for the period that begins.
-void Voice::fade_to_limit() noexcept {
-  const int gone = live_ - limit_;
+std::span<const float> Voice::measure(float nearness) noexcept {
+  float largest = 0.0F;
+  for (int g = live_ - 1; g >= 0; --g) {
+    const ModeState& state = state_[static_cast<std::size_t>(g)];
+    const auto& weight = model_->weight_[static_cast<std::size_t>(g)];
+    std::array<float, kGroup> size;
+    for (int lane = 0; lane < kGroup; ++lane) {
+      const auto re = static_cast<float>(state.re[lane]), im = static_cast<float>(state.im[lane]);
+      size[lane] = weight[lane] * std::sqrt(re * re + im * im);
+    }
+    float sum = 0.0F;
+    for (const float part : size) sum += part;
+    largest = std::max(largest, nearness * sum);
+    bounds_[static_cast<std::size_t>(g)] = largest;
+  }
+  return get_measured();
+}
+
+/// Renders the groups from `groups` on once more, on their way out, for the period that begins.
+void Voice::fade_out(int groups) noexcept {
+  const int gone = live_ - groups;
   fade_.fill(0.0F);
-  kernels_->ring(model_->sound_.data() + limit_, model_->turn_.data() + limit_, state_.data() + limit_, gone, fade_.data());
+  kernels_->ring(model_->sound_.data() + groups, model_->turn_.data() + groups, state_.data() + groups, gone, fade_.data());
   counters_.mode_samples += static_cast<std::int64_t>(gone) * kGroup * kPeriod;
   for (int n = 0; n < kPeriod; ++n) fade_[n] *= 1.0F - static_cast<float>(n) / kPeriod;
-  std::fill(state_.begin() + limit_, state_.begin() + live_, ModeState{});
-  live_ = limit_;
+  std::fill(state_.begin() + groups, state_.begin() + live_, ModeState{});
+  live_ = groups;
   fading_ = true;
 }
 

@@ -5,6 +5,7 @@
 //   voice.process(block);  // adds pascals
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -54,6 +55,20 @@ class Voice {
   /// kPeriod samples on. Those that it takes away fade out over kPeriod samples. [audio-thread]
   void set_limit(int modes) noexcept;
 
+  /// How much there is to hear of each live group at this moment: a bound on the pressure [Pa] at the distance where 1 Pa at 1 m is
+  /// `nearness` pascals, of this group or of a later one, whichever is larger, so that they never grow along the list. At a multiple of
+  /// kPeriod samples only; good until the next call. [audio-thread]
+  std::span<const float> measure(float nearness) noexcept;
+  std::span<const float> get_measured() const noexcept { return std::span(bounds_).first(static_cast<std::size_t>(live_)); }
+
+  /// Lets the live groups from `groups` on fade out over the period that begins; strikes may wake them again. At least one stays. At a
+  /// multiple of kPeriod samples only. [audio-thread]
+  void cut(int groups) noexcept { cut_ = std::max(1, groups); }
+
+  /// From now on a strike wakes only groups that it could lift to this pressure at 1 m [Pa], those before them in the list, and the first;
+  /// 0, as at first: all. [audio-thread]
+  void set_floor(float pressure_pa) noexcept { floor_pa_ = pressure_pa; }
+
   /// Samples processed so far: the number of the next sample.
   std::int64_t get_position() const { return horizon_ - held_; }
   /// The first sample that a new strike can still reach: less than kQuantum samples ahead of the position unless blocks are whole quanta.
@@ -61,6 +76,7 @@ class Voice {
   const Model& get_model() const { return *model_; }
   /// Modes that are advanced at this moment, in whole groups.
   int get_live_mode_count() const;
+  int get_live_group_count() const { return live_; }
   bool is_awake() const { return live_ > 0 || damped_live_; }
   /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
   bool is_idle() const { return !is_awake() && !fading_ && pulses_.empty() && held_ == 0; }
@@ -79,6 +95,7 @@ class Voice {
     stream::PulseShape shape = stream::PulseShape::kHertz;
     const std::int16_t* row[kStrikeRows];
     float weight[kStrikeRows];
+    float strength_n_s = 0.0F;  // size of the impulse
   };
   struct DampedState {
     double q = 0.0, v = 0.0;
@@ -86,12 +103,13 @@ class Voice {
 
   void render(int quanta) noexcept;
   bool is_struck(std::int64_t sample) const noexcept;
-  void wake() noexcept;
+  void wake(int groups) noexcept;
+  int find_reach(float strength_n_s) const noexcept;
   void strike_quantum(std::int64_t sample, int quantum, float* out) noexcept;
   void add_damped(std::int64_t sample, bool struck, float* out) noexcept;
   void begin_period() noexcept;
   void cull() noexcept;
-  void fade_to_limit() noexcept;
+  void fade_out(int groups) noexcept;
   void reset() noexcept;
 
   std::shared_ptr<const Model> model_;
@@ -100,6 +118,8 @@ class Voice {
   int groups_ = 0;  // of the model
   int limit_ = 0;   // groups that may be played
   int live_ = 0;    // groups that are; those behind have no energy
+  int cut_ = 0;     // groups that stay when the next period begins
+  float floor_pa_ = 0.0F;
   bool damped_live_ = false;
   bool fading_ = false;       // fade_ holds what the limit took away in this period
   std::int64_t horizon_ = 0;  // samples rendered
@@ -112,6 +132,7 @@ class Voice {
   std::vector<Starts> starts_;    // out of date beyond live_, and once a whole period was rendered
   std::vector<DampedState> damped_;
   std::vector<double> damped_amplitude_;
+  std::vector<float> bounds_;  // of measure()
   std::vector<Pulse> pulses_;  // capacity max_strikes, never grown
   Touch touch_;
   alignas(64) std::array<float, kPeriod> block_{}, fade_{};

@@ -108,18 +108,20 @@ TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
       synthesiser.push(stream::Impulse{.time_s = synthesiser.get_horizon_s() + 1e-4 * k, .body = k % 5, .impulse_n_s = {0.0, 0.0, 1.0}});
       synthesiser.push(stream::Motion{synthesiser.get_horizon_s(), k % 4, {1.0, 2.0, 0.001 * i}, {}});
     }
+    synthesiser.set_budget(i % 60 < 30 ? 20.0 * 48000.0 : 1e12);
     synthesiser.process(out.data(), 2, 1 + i);
     (void)synthesiser.get_counters();
   }
   EXPECT_EQ(g_allocations - before, 0);
   EXPECT_GT(synthesiser.get_counters().strikes, 0);
+  EXPECT_GT(synthesiser.get_counters().faded, 0);
 }
 
 // In a child that the kernel kills at the first system call but read, write and exit.
 TEST(NoHeap, AWholeSceneMakesNoSystemCallWhileItPlays) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 30; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 9 == 0 ? 1e5 : 0.0)});
-  Synthesiser synthesiser({.max_bodies = 4});
+  Synthesiser synthesiser({.max_bodies = 4, .budget = 50.0 * 48000.0});
   for (int b = 0; b < 4; ++b) synthesiser.add_body(Model::make(testing::make_cube_bank(modes)), {.position_m = {1.0, 2.0, 0.0}});
   std::array<float, 256> left{}, right{};
   const std::array<float*, 2> out{left.data(), right.data()};

@@ -1,0 +1,80 @@
+// Method:     a histogram of all groups by the logarithm of their bound, filled from the loud end until the room is used up: one pass, no
+//             sorting. Modes that go do not come back, so a single strike must not cost any: work on top of what rings (strikes, what they
+//             wake, what fades) runs up a debt. Room is what is allowed for a period, less the running mean of that work in proportion to
+//             the debt, wholly at four periods' worth; beyond these, less an eighth of the rest as well. The floor for strikes is the
+//             threshold of the last choice, raised by a tenth a period while work on top takes more than half of what the first groups
+//             leave, and let down by half an octave a period when a tenth of the room is free.
+// Source:     none: the list is sorted by audibility, and its prefixes are cut as docs/decisions/budget.md tells.
+// Deviations: none.
+#include "runtime/synth/budget.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "runtime/synth/kernels.hpp"
+
+namespace carillon::synth {
+namespace {
+
+constexpr double kGroupCost = kGroup * kPeriod;    // mode-samples of a live group in a period
+constexpr double kSmoothing = 0.125;               // of the running mean: eight periods
+constexpr double kRepayment = 0.125;               // of the debt, a period
+constexpr double kMostDebt = 16.0, kCredit = 4.0;  // periods
+constexpr double kExtraShare = 0.5;
+constexpr float kStricter = 1.1F, kMostStrict = 1e6F;
+constexpr double kReleaseBelow = 0.9;  // of the room
+constexpr float kRelease = 0.7F;
+constexpr float kInaudible = 1e-12F;  // Pa
+
+}  // namespace
+
+/// Exponent and first bits of the fraction: monotone, as the pressure is not negative.
+int Budget::find_bin(float pressure_pa) noexcept {
+  constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
+  return std::clamp(std::bit_cast<std::int32_t>(pressure_pa) >> kShift, 0, kBins - 1);
+}
+
+bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int awake_bodies) noexcept {
+  extra_ += kSmoothing * (std::max(0.0, spent - planned_) - extra_);
+  debt_ = std::clamp(debt_ + spent - allowed_, 0.0, (kCredit + kMostDebt) * allowed);
+  allowed_ = allowed;
+  const double overdrawn = std::max(0.0, debt_ - kCredit * allowed);
+  const double least = awake_bodies * kGroupCost;
+  const bool strikes_take_too_much = extra_ > kExtraShare * std::max(0.0, allowed - least) || overdrawn > 0.0;
+  strictness_ = strikes_take_too_much ? std::min(strictness_ * kStricter, kMostStrict) : std::max(1.0F, strictness_ / kStricter);
+  const double foreseen = allowed > 0.0 ? extra_ * std::min(1.0, debt_ / (kCredit * allowed)) : 0.0;
+  const double room = std::max(0.0, allowed - foreseen - kRepayment * overdrawn);
+  planned_ = static_cast<double>(live_groups) * kGroupCost;  // what fades out takes as much for one period more
+  if (planned_ <= room) {
+    if (planned_ < kReleaseBelow * room) threshold_pa_ *= kRelease;
+    if (threshold_pa_ < kInaudible) threshold_pa_ = 0.0F;
+    return false;
+  }
+  room_ = std::max<std::int64_t>(static_cast<std::int64_t>(room / kGroupCost) - awake_bodies, 0);
+  count_.fill(0);
+  return true;
+}
+
+void Budget::tell(std::span<const float> bounds_pa) noexcept {
+  for (std::size_t g = 1; g < bounds_pa.size(); ++g) ++count_[static_cast<std::size_t>(find_bin(bounds_pa[g]))];
+}
+
+void Budget::decide() noexcept {
+  last_room_ = room_;
+  for (last_bin_ = kBins - 1; last_bin_ > 0 && count_[static_cast<std::size_t>(last_bin_)] <= last_room_; --last_bin_)
+    last_room_ -= count_[static_cast<std::size_t>(last_bin_)];
+  constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
+  threshold_pa_ = std::bit_cast<float>(last_bin_ << kShift);
+}
+
+int Budget::find_limit(std::span<const float> bounds_pa) noexcept {
+  std::size_t stay = std::min<std::size_t>(1, bounds_pa.size());
+  for (; stay < bounds_pa.size(); ++stay) {
+    const int bin = find_bin(bounds_pa[stay]);
+    if (bin < last_bin_ || (bin == last_bin_ && last_room_-- <= 0)) break;
+  }
+  return static_cast<int>(stay);
+}
+
+}  // namespace carillon::synth
