@@ -15,4 +15,19 @@ Microphones make_microphones(const Scene& scene) {
   return microphones;
 }
 
+std::vector<stream::Listener> list_walk(const Microphones& microphones) {
+  std::vector<stream::Listener> walk;
+  if (microphones.centre.is_still()) return walk;
+  const auto add = [&walk](const synth::Waypoint& at) {
+    walk.push_back({.time_s = at.time_s, .position_m = at.position_m, .velocity_m_s = at.velocity_m_s});
+  };
+  for (std::size_t i = 0; i < microphones.centre.get_count(); ++i) {
+    const synth::Waypoint& at = microphones.centre.get_waypoint(i);
+    if (at.time_s < 0.0) continue;
+    if (walk.empty()) add(microphones.centre.find(at.time_s));  // at rest until it sets out; or in the middle of its way
+    add(at);
+  }
+  return walk;
+}
+
 }  // namespace carillon::host

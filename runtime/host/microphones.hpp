@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "runtime/host/scene.hpp"
+#include "runtime/stream/events.hpp"
 #include "runtime/synth/track.hpp"
 
 namespace carillon::host {
@@ -15,5 +16,8 @@ struct Microphones {
 };
 
 Microphones make_microphones(const Scene& scene);
+
+/// The way of the centre from time 0 on, as events in order of time; none when it stays where it is.
+std::vector<stream::Listener> list_walk(const Microphones& microphones);
 
 }  // namespace carillon::host

@@ -143,7 +143,8 @@ void run(const ProgramOptions& options) {
   contact::Simulation simulation = contact::collect(course.recording.events, centres_m);
   simulation.steps = course.steps;
   started = Clock::now();
-  const Sound sound = calc_sound(scene, body_banks, simulation, scene.sample_rate_hz, Progress("sound", options.quiet));
+  const Sound sound = calc_sound(scene, body_banks, course.recording.events,
+                                 {.rate_hz = scene.sample_rate_hz, .progress = Progress("sound", options.quiet)});
   figures.sound_s = get_seconds_since(started);
   figures.real_time_factor = (figures.physics_s + figures.sound_s) / scene.duration_s;
   figures.modes = sound.modes;

@@ -1,183 +1,175 @@
-// Method:     each impulse of the simulation strikes the modes of its body; each body is heard at every microphone from its centre of mass.
-// Source:     OSG02 (contact pulses to modes), OCE01 (two receivers 20 cm apart or a list of them, delay and 1 / r).
+// Method:     the bodies of the scene in a synthesiser, which is fed with what happens period by period; what it gives first, while the
+//             sound is still in its ears' filters, is cut off.
+// Source:     OCE01 (two receivers 20 cm apart or a list of them).
 // Deviations: heads do not shade; the ground does not reflect.
 #include "runtime/host/render.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <ctime>
 #include <map>
 #include <memory>
 
+#include "runtime/host/feed.hpp"
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/radiation/gains.hpp"
-#include "runtime/synth/click.hpp"
-#include "runtime/synth/ears.hpp"
-#include "runtime/synth/voice.hpp"
 
 namespace carillon::host {
 namespace {
 
 using synth::Effect;
 
-constexpr std::size_t kBlock = 512;
+constexpr std::size_t kBlock = synth::kPeriod;
 constexpr double kReferencePa = 20e-6;
 constexpr double kFastS = 0.125;
 constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away is not heard (84 dB down, and memory has an end)
+constexpr int kMostStrikes = 256;         // of a body, waiting or acting at once
 
 double get_cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-synth::Track make_path(const std::vector<contact::Pose>& poses, const bank::Bank& bank, const contact::BodySpec& spec) {
-  std::vector<synth::Place> places;
-  const auto add = [&](const contact::Pose& pose) { places.push_back({pose.time_s, calc_world_point(pose, bank.rigid.centre_m)}); };
-  if (spec.fixed || poses.empty()) {
-    add(poses.empty() ? spec.initial : poses.front());
-  } else {
-    for (const contact::Pose& pose : poses) add(pose);
-  }
-  return synth::make_track(places);
+std::uint64_t get_ticks() noexcept {
+#if defined(__x86_64__)
+  return __builtin_ia32_rdtsc();
+#else
+  return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+#endif
 }
 
-/// The acceleration noise of one body: three dipoles, along x, y and z of the world.
-struct Clicks {
-  synth::Click click;
-  std::array<synth::History, 3> sent;
-  std::array<std::array<float, kBlock>, 3> block{};
-  std::size_t next = 0;
+double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
-  Clicks(const bank::Bank& bank, int rate_hz, double longest_m)
-      : click(radiation::calc_sphere_radius_m(bank), bank.rigid.mass_kg, rate_hz),
-        sent{synth::History(longest_m, rate_hz, kBlock), synth::History(longest_m, rate_hz, kBlock),
-             synth::History(longest_m, rate_hz, kBlock)} {}
+/// What the events say about one body.
+struct BodyCourse {
+  bool is_played = false;  // something happens to it
+  stream::Motion first;    // where it is at the beginning
+  double reach_m = 0.0;    // how far from the first microphone's place it ever gets
 };
 
-/// One body with its way to every microphone, and the impulses still to come.
-struct Source {
-  synth::Voice voice;
-  synth::Track path;
-  synth::History sent;
-  std::unique_ptr<Clicks> clicks;  // none when the effect is off or nothing can move the body
-  std::vector<synth::Ear> ears;
-  std::span<const contact::Pose> poses;
-  std::vector<stream::Impulse> strikes;  // in order of their beginning
-  std::size_t next = 0;
-
-  Source(std::shared_ptr<const synth::Model> model, int rate_hz, synth::Track way, double longest_m)
-      : voice(std::move(model)), path(std::move(way)), sent(longest_m, rate_hz, kBlock) {}
-};
-
-double get_begin_s(const stream::Impulse& impulse) {
-  return impulse.time_s - 0.5 * synth::calc_pulse_length(impulse.shape, impulse.duration_s);
-}
-
-/// No less than the longest way from a body to a microphone: both as far as they ever get from where the first microphone starts.
-double calc_longest_m(const std::vector<contact::Pose>& poses, const contact::BodySpec& spec, const bank::Bank& bank, const Scene& scene,
-                      const Microphones& microphones) {
-  const Vec3 base = microphones.centre.find(0.0).position_m;
-  const auto calc_distance = [&base](const Vec3& x) { return std::hypot(x[0] - base[0], x[1] - base[1], x[2] - base[2]); };
-  double body = calc_distance(calc_world_point(spec.initial, bank.rigid.centre_m)), walk = 0.0, reach = 0.0;
-  for (const contact::Pose& pose : poses) body = std::max(body, calc_distance(calc_world_point(pose, bank.rigid.centre_m)));
-  for (const synth::Place& place : scene.listener.path) walk = std::max(walk, calc_distance(place.position_m));
-  for (const Vec3& offset : microphones.offset_m) reach = std::max(reach, std::hypot(offset[0], offset[1], offset[2]));
-  return std::min(body + walk + reach + 1.0, kFarthestHeardM);
-}
-
-/// Plays the clicks that begin before `end` [samples] and pushes the next `count` samples.
-void process_clicks(Source& source, const contact::Pose& initial, double rate_hz, double end, std::size_t count) {
-  Clicks& clicks = *source.clicks;
-  while (clicks.next < source.strikes.size()) {
-    const stream::Impulse& strike = source.strikes[clicks.next];
-    if ((get_begin_s(strike) - clicks.click.get_lead_s()) * rate_hz >= end) break;
-    clicks.click.strike(strike, source.poses.empty() ? initial.rotation : find_pose(source.poses, strike.time_s).rotation);
-    ++clicks.next;
-  }
-  std::array<std::span<float>, 3> dipole;
-  for (std::size_t k = 0; k < 3; ++k) dipole[k] = std::span(clicks.block[k]).first(count);
-  clicks.click.process(dipole);
-  for (std::size_t k = 0; k < 3; ++k) clicks.sent[k].push(dipole[k]);
-}
-
-std::vector<std::unique_ptr<Source>> make_sources(const Scene& scene, const std::vector<const bank::Bank*>& banks,
-                                                  const contact::Simulation& simulation, const Microphones& microphones, int rate_hz) {
-  std::vector<std::unique_ptr<Source>> sources;
-  std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;  // bodies of the same bank share its tables
-  const std::vector<contact::Pose> none;
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    const contact::BodySpec& spec = scene.bodies[i].spec;
-    const std::vector<contact::Pose>& poses = i < simulation.poses.size() ? simulation.poses[i] : none;
-    std::shared_ptr<const synth::Model>& model = models[banks[i]];
-    if (!model) model = synth::Model::make(*banks[i], {.rate_hz = static_cast<double>(rate_hz)});
-    const double longest = calc_longest_m(poses, spec, *banks[i], scene, microphones);
-    sources.push_back(std::make_unique<Source>(model, rate_hz, make_path(poses, *banks[i], spec), longest));
-    if (scene.effects.has(Effect::kAccelerationNoise) && !spec.fixed) {
-      sources.back()->poses = poses;
-      sources.back()->clicks = std::make_unique<Clicks>(*banks[i], rate_hz, longest);
+std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
+                               const Vec3& base) {
+  std::vector<BodyCourse> courses(scene.bodies.size());
+  std::vector<bool> is_placed(scene.bodies.size());
+  const auto find = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < courses.size(); };
+  for (const stream::Event& event : events) {
+    if (const auto* motion = std::get_if<stream::Motion>(&event); motion != nullptr && find(motion->body)) {
+      const auto i = static_cast<std::size_t>(motion->body);
+      if (!is_placed[i]) courses[i].first = *motion;
+      if (!is_placed[i] || !scene.bodies[i].spec.fixed)
+        courses[i].reach_m = std::max(courses[i].reach_m, calc_distance(motion->position_m, base));
+      is_placed[i] = true;
     }
-    for (const Vec3& offset : microphones.offset_m) sources.back()->ears.emplace_back(offset, rate_hz, scene.effects);
+    if (const auto* impulse = std::get_if<stream::Impulse>(&event); impulse != nullptr && find(impulse->body))
+      courses[static_cast<std::size_t>(impulse->body)].is_played = true;
+    if (const auto* contact = std::get_if<stream::Contact>(&event); contact != nullptr && find(contact->body))
+      courses[static_cast<std::size_t>(contact->body)].is_played = true;
   }
-  for (const contact::Impulse& impulse : simulation.impulses) {
-    if (impulse.body < 0 || static_cast<std::size_t>(impulse.body) >= sources.size()) continue;
-    std::vector<stream::Impulse>& strikes = sources[static_cast<std::size_t>(impulse.body)]->strikes;
-    strikes.push_back(impulse);
-    if (!scene.effects.has(Effect::kHertzPulse)) strikes.back().duration_s = 0.0;
+  for (std::size_t i = 0; i < courses.size(); ++i) {
+    if (is_placed[i]) continue;
+    const contact::Pose& initial = scene.bodies[i].spec.initial;
+    courses[i].first.position_m = calc_world_point(initial, banks[i]->rigid.centre_m);
+    courses[i].first.rotation = initial.rotation;
+    courses[i].reach_m = calc_distance(courses[i].first.position_m, base);
   }
-  for (auto& source : sources) {
-    std::stable_sort(source->strikes.begin(), source->strikes.end(),
-                     [](const stream::Impulse& a, const stream::Impulse& b) { return get_begin_s(a) < get_begin_s(b); });
-  }
-  return sources;
+  return courses;
+}
+
+/// What of the scene's effects a body has: nothing pushes one that is fixed, and microphones stay where they are put.
+synth::EffectSet find_effects(const Scene& scene, std::size_t body, bool is_played) {
+  if (!is_played) return {};
+  synth::EffectSet effects = scene.effects;
+  if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
+  if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
+  return effects;
+}
+
+/// How far the microphones ever get from where the first of them starts.
+double calc_reach_m(const Scene& scene, const Microphones& microphones, const Vec3& base) {
+  double walk = 0.0, offset = 0.0;
+  for (const synth::Place& place : scene.listener.path) walk = std::max(walk, calc_distance(place.position_m, base));
+  for (const Vec3& x : microphones.offset_m) offset = std::max(offset, std::hypot(x[0], x[1], x[2]));
+  return walk + offset + 1.0;
 }
 
 }  // namespace
 
-Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const contact::Simulation& simulation, int rate_hz,
-                 const std::function<void(double)>& progress) {
+Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
+                 const RenderOptions& options) {
   const double started = get_cpu_seconds();
   const Microphones microphones = make_microphones(scene);
-  std::vector<std::unique_ptr<Source>> sources = make_sources(scene, banks, simulation, microphones, rate_hz);
-  const auto samples = static_cast<std::size_t>(std::llround(scene.duration_s * rate_hz));
-  constexpr std::size_t kLatency = synth::Ear::kLatency;
+  const std::vector<stream::Listener> walk = list_walk(microphones);
+  const Vec3 base = microphones.centre.find(0.0).position_m;
+  const double ears_reach_m = calc_reach_m(scene, microphones, base);
+  const std::vector<BodyCourse> courses = survey(scene, banks, events, base);
+  const auto rate_hz = static_cast<double>(options.rate_hz);
 
   Sound sound;
-  sound.rate_hz = rate_hz;
-  sound.body_peak_pa.assign(sources.size(), 0.0);
-  sound.pressure_pa.assign(microphones.offset_m.size(), std::vector<double>(samples + kLatency, 0.0));
-  std::array<float, kBlock> block{};
-  for (std::size_t start = 0; start < samples + kLatency; start += kBlock) {
-    const std::size_t count = std::min(kBlock, samples + kLatency - start);
-    const std::span<float> pressure = std::span(block).first(count);
-    for (std::size_t i = 0; i < sources.size(); ++i) {
-      Source& source = *sources[i];
-      while (source.next < source.strikes.size() &&
-             get_begin_s(source.strikes[source.next]) * rate_hz < static_cast<double>(start + count)) {
-        if (scene.effects.has(Effect::kModal)) source.voice.strike(source.strikes[source.next]);
-        ++source.next;
-      }
-      block.fill(0.0F);
-      source.voice.process(pressure);
-      for (const float p : pressure) sound.body_peak_pa[i] = std::max(sound.body_peak_pa[i], static_cast<double>(std::abs(p)));
-      source.sent.push(pressure);
-      synth::Source heard{.track = &source.path, .monopole = &source.sent};
-      if (source.clicks) {
-        process_clicks(source, scene.bodies[i].spec.initial, rate_hz, static_cast<double>(start + count), count);
-        for (std::size_t k = 0; k < 3; ++k) heard.dipole[k] = &source.clicks->sent[k];
-      }
-      for (std::size_t ear = 0; ear < source.ears.size(); ++ear) {
-        source.ears[ear].process(heard, microphones.centre, static_cast<std::int64_t>(start),
-                                 std::span(sound.pressure_pa[ear]).subspan(start, count));
-      }
+  sound.rate_hz = options.rate_hz;
+  std::vector<FedBody> fed(scene.bodies.size());
+  std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;  // bodies of the same bank share its tables
+  std::vector<std::shared_ptr<const synth::Model>> body_models;
+  for (std::size_t i = 0; i < fed.size(); ++i) {
+    const synth::EffectSet effects = find_effects(scene, i, courses[i].is_played);
+    sound.body_effects.push_back(effects);
+    std::shared_ptr<const synth::Model>& model = models[banks[i]];
+    if (!model) {
+      const bool clicks = scene.effects.has(Effect::kAccelerationNoise);
+      model =
+          synth::Model::make(*banks[i], {.rate_hz = rate_hz, .sphere_radius_m = clicks ? radiation::calc_sphere_radius_m(*banks[i]) : 0.0});
     }
-    if (progress) progress(static_cast<double>(start + count) / static_cast<double>(samples + kLatency));
+    body_models.push_back(model);
+    sound.body_modes.push_back(model->get_mode_count());
+    sound.modes += model->get_mode_count();
+    const double lead_s = effects.has(Effect::kAccelerationNoise) ? model->get_sphere_radius_m() / synth::kSoundSpeedMs : 0.0;
+    fed[i] = {.number = static_cast<int>(i), .moves = !effects.is_empty() && !scene.bodies[i].spec.fixed, .lead_s = lead_s};
   }
-  for (auto& ear : sound.pressure_pa) ear.erase(ear.begin(), ear.begin() + static_cast<std::ptrdiff_t>(kLatency));
-  for (const auto& source : sources) {
-    const synth::VoiceCounters& counters = source->voice.get_counters();
-    sound.modes += source->voice.get_model().get_mode_count();
-    sound.body_modes.push_back(source->voice.get_model().get_mode_count());
-    sound.strikes += counters.accepted;
-    sound.refused += counters.refused + (source->clicks ? source->clicks->click.get_refused() : 0);
-    sound.resets += counters.resets;
+  Feed feed(events, fed, walk);
+  synth::Synthesiser synthesiser({.rate_hz = rate_hz,
+                                  .microphones_m = microphones.offset_m,
+                                  .listener_m = base,
+                                  .max_bodies = std::max(1, static_cast<int>(fed.size())),
+                                  .max_strikes = kMostStrikes,
+                                  .max_waypoints = feed.count_waypoints(-1, 0.0),
+                                  .ticks = options.measures ? &get_ticks : nullptr});
+  for (std::size_t i = 0; i < fed.size(); ++i) {
+    const double longest_m = std::min(courses[i].reach_m + ears_reach_m, kFarthestHeardM);
+    synthesiser.add_body(body_models[i], {.position_m = courses[i].first.position_m,
+                                          .rotation = courses[i].first.rotation,
+                                          .effects = sound.body_effects[i],
+                                          .longest_m = longest_m,
+                                          .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs)});
+  }
+
+  constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
+  const std::size_t samples = static_cast<std::size_t>(std::llround(scene.duration_s * rate_hz)) + kLatency;
+  const std::size_t channels = microphones.offset_m.size();
+  sound.pressure_pa.assign(channels, std::vector<double>(samples - kLatency));
+  std::vector<std::array<float, kBlock>> blocks(channels);
+  std::vector<float*> out;
+  for (auto& block : blocks) out.push_back(block.data());
+  const auto first_tick = get_ticks();
+  const auto first_time = std::chrono::steady_clock::now();
+  for (std::size_t start = 0; start < samples; start += kBlock) {
+    const std::size_t count = std::min(kBlock, samples - start);
+    feed.hand_on(static_cast<double>(start + kBlock) / rate_hz, synthesiser);
+    synthesiser.process(out.data(), static_cast<int>(channels), static_cast<int>(count));
+    for (std::size_t c = 0; c < channels; ++c) {
+      for (std::size_t n = start < kLatency ? kLatency - start : 0; n < count; ++n)
+        sound.pressure_pa[c][start + n - kLatency] = static_cast<double>(blocks[c][n]);
+    }
+    if (options.progress) options.progress(static_cast<double>(start + count) / static_cast<double>(samples));
+  }
+  if (options.measures) {
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - first_time;
+    sound.seconds_per_tick = seconds.count() / std::max(1.0, static_cast<double>(get_ticks() - first_tick));
+  }
+  const synth::SynthesiserCounters counters = synthesiser.get_counters();
+  sound.strikes = counters.strikes;
+  sound.refused = counters.refused + counters.faults + counters.overflows;
+  sound.resets = counters.resets;
+  for (std::size_t i = 0; i < fed.size(); ++i) {
+    sound.body_peak_pa.push_back(synthesiser.get_peak_pa(static_cast<int>(i)));
+    sound.effect_counters.push_back(synthesiser.get_effect_counters(static_cast<int>(i)));
   }
   sound.seconds_cpu = get_cpu_seconds() - started;
   return sound;

@@ -3,11 +3,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/contact/events.hpp"
 #include "runtime/host/scene.hpp"
+#include "runtime/stream/events.hpp"
+#include "runtime/synth/effects.hpp"
+#include "runtime/synth/synthesiser.hpp"
 
 namespace carillon::host {
 
@@ -16,19 +19,28 @@ struct Sound {
   int rate_hz = 0;
   // Per channel (left and right ear, or microphones), all of the same length.
   std::vector<std::vector<double>> pressure_pa = std::vector<std::vector<double>>(2);
-  int modes = 0;                     // of all bodies, below Nyquist
-  std::vector<int> body_modes;       // per body
-  std::vector<double> body_peak_pa;  // per body, at 1 m
-  std::int64_t strikes = 0;          // impulses that were played
-  std::int64_t refused = 0;          // impulses that could not be (too many at once, not finite)
-  std::int64_t resets = 0;           // bodies cleared because their state was no number
+  int modes = 0;                                       // of all bodies, below Nyquist
+  std::vector<int> body_modes;                         // per body
+  std::vector<double> body_peak_pa;                    // per body, at 1 m
+  std::int64_t strikes = 0;                            // impulses that were played
+  std::int64_t refused = 0;                            // impulses that could not be (too many at once, not finite)
+  std::int64_t resets = 0;                             // bodies cleared because their state was no number
+  std::vector<synth::EffectSet> body_effects;          // per body, what it was given
+  std::vector<synth::EffectCounters> effect_counters;  // per body, at the end
+  double seconds_per_tick = 0.0;                       // of the counters' ticks; 0 where they were not asked for
   double seconds_cpu = 0.0;
 };
 
-/// Renders round(duration * rate) samples. banks[i] belongs to scene.bodies[i]; the simulation to the same bodies in the same order.
-/// `progress` (may be empty) is called with the finished fraction.
-Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const contact::Simulation& simulation, int rate_hz,
-                 const std::function<void(double)>& progress = {});
+struct RenderOptions {
+  int rate_hz = 48000;
+  bool measures = false;                   // what each effect of each body costs
+  std::function<void(double)> progress{};  // may be empty; called with the finished fraction
+};
+
+/// Renders round(duration * rate) samples. banks[i] belongs to scene.bodies[i]; body i of the events, which are in order of time, is the
+/// same. A body to which nothing happens gets no effects.
+Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
+                 const RenderOptions& options);
 
 /// Largest absolute pressure of all channels [Pa].
 double calc_peak_pa(const Sound& sound);

@@ -129,6 +129,8 @@ class Synthesiser {
   void process(float* const* out, int channels, int frames) noexcept;
 
   static constexpr int kLatency = Ear::kLatency;
+  /// Events that fit into the ring between two calls of process(). [any-thread]
+  std::size_t get_ring_room() const noexcept { return ring_.get_room(); }
   int get_microphone_count() const { return static_cast<int>(options_.microphones_m.size()); }
   /// Of the next frame. [any-thread]
   double get_time_s() const noexcept { return static_cast<double>(position_.load(std::memory_order_relaxed)) / options_.rate_hz; }

@@ -35,6 +35,10 @@ class Track {
 
   bool is_still() const { return count_ < 2; }
 
+  /// How many waypoints it remembers, and one of them: 0 is the oldest.
+  std::size_t get_count() const { return count_; }
+  const Waypoint& get_waypoint(std::size_t i) const { return get(i); }
+
   /// [audio-thread] Whether it stays where it is from this time on, as far as is known.
   bool is_still_from(double time_s) const noexcept { return rest_begin_s_ <= time_s; }
 

@@ -38,7 +38,20 @@ struct Case {
     simulation.poses[0].push_back(at);
     simulation.impulses.push_back({.time_s = time_s, .body = 0, .triangle = 0, .barycentric = {1, 0, 0}, .impulse_n_s = {0, 0, 1}});
   }
-  Sound render(int rate_hz = 48000) const { return calc_sound(scene, {&bank}, simulation, rate_hz); }
+  /// The path with its velocities and the impulses as events.
+  std::vector<stream::Event> list_events() const {
+    std::vector<synth::Place> places;
+    for (const contact::Pose& pose : simulation.poses[0]) places.push_back({pose.time_s, pose.position_m});
+    const synth::Track track = synth::make_track(places);
+    std::vector<stream::Event> events;
+    for (std::size_t i = 0; i < track.get_count(); ++i) {
+      const synth::Waypoint& at = track.get_waypoint(i);
+      events.emplace_back(stream::Motion{at.time_s, 0, at.position_m, at.velocity_m_s, simulation.poses[0][i].rotation});
+    }
+    for (const contact::Impulse& impulse : simulation.impulses) events.emplace_back(impulse);
+    return events;
+  }
+  Sound render(int rate_hz = 48000) const { return calc_sound(scene, {&bank}, list_events(), {.rate_hz = rate_hz}); }
 };
 
 TEST(Render, PressureAtTheEarsIsTheClosedForm) {
