@@ -4,16 +4,18 @@
 // of its own, so nothing here may be an inline function.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 namespace carillon::synth {
 
-inline constexpr int kGroup = 16;      // modes that are stored and culled together
-inline constexpr int kQuantum = 32;    // samples of one table: the grid on which anything may change
-inline constexpr int kPeriod = 128;    // samples between two steps of the double-precision state
-inline constexpr int kQuanta = 4;      // in a period
-inline constexpr int kTerms = 10;      // Chebyshev terms of a strike: -169 dB at the Nyquist frequency
-inline constexpr int kStrikeRows = 9;  // three corners times three directions
+inline constexpr int kGroup = 16;        // modes that are stored and culled together
+inline constexpr int kQuantum = 32;      // samples of one table: the grid on which anything may change
+inline constexpr int kPeriod = 128;      // samples between two steps of the double-precision state
+inline constexpr int kQuanta = 4;        // in a period
+inline constexpr int kTerms = 10;        // Chebyshev terms of a strike: -169 dB at the Nyquist frequency
+inline constexpr int kStrikeRows = 9;    // three corners times three directions
+inline constexpr int kMostContacts = 8;  // that drive a body at once
 
 /// Instruction sets, least first. kBest stands for the last one that the processor has.
 enum class Isa : std::uint8_t { kPlain, kSse2, kAvx2, kAvx512, kBest };
@@ -33,7 +35,8 @@ struct alignas(64) TurnTable {
 struct alignas(64) StrikeTable {
   float turn_re[kGroup], turn_im[kGroup];                    // over one sample
   float out_re[kGroup], out_im[kGroup];                      // pressure = out_re re + out_im im
-  float scale[kGroup];                                       // of the rows of a Touch
+  float scale[kGroup];                                       // of the rows of a Touch or a Push
+  float angle[kGroup];                                       // omega over one sample [rad]
   float force_re[kTerms][kGroup], force_im[kTerms][kGroup];  // Chebyshev coefficients of the answer within a sample
 };
 
@@ -55,6 +58,24 @@ struct Touch {
   float moment[kQuantum][kTerms];
 };
 
+/// One end of what a contact does in a quantum: where and how it pushes at its first sample or at the first one after it.
+struct Push {
+  const std::int16_t* row[kStrikeRows];  // [mode]
+  float force[kStrikeRows];              // times row and signal: the force on a mode
+  float brake[kStrikeRows];              // times row, squared: the damping of a mode by this contact, over a sample
+  float signal[kQuantum + 1];            // N, at each sample of the quantum and the first one after it; linear between them
+  bool forces;                           // signal is not all zero
+};
+
+/// What acts on a body in one quantum. A contact's force is that of both its ends together; its damping goes from the first to the second.
+struct Drive {
+  std::array<Push, 2> push[kMostContacts];
+  int contacts;
+  bool forces, damps;     // whether anything has a force, or a brake
+  float strength_n_s;     // no more than this impulse reaches the body in the quantum
+  float ramp[2][kTerms];  // moments of 1 - u and of u, times the length of a sample [s]
+};
+
 /// A group of modes as filters of one input: y[n] = a1 y[n-1] + a2 y[n-2] + x[n], pressure = sum of gain y[n].
 template <typename Number>
 struct alignas(64) FilterGroup {
@@ -74,6 +95,12 @@ struct Kernels {
   /// Adds what a pulse makes in one quantum to out, kQuantum samples, and what it leaves to the starts and the state after it.
   void (*strike)(const StrikeTable* strike, const TurnTable* turn, const Touch& touch, int quantum, ModeState* state, Starts* starts,
                  int groups, float* out) noexcept;
+  /// Adds what a drive makes in one quantum to out, kQuantum samples, and what it leaves to the starts and the state after it. When it
+  /// damps, that is all the sound of the quantum (no emit), and every mode's amplitude is multiplied by a factor of at most 1 at each
+  /// sample: 1 - e, where e = p / (1 + p), p = x + x^2 / 2 + x^3 / 6, which is 1 - exp(-x) to x^4 / 24, for x the sum over the contacts of
+  /// their brakes, kept below the mode's angle; e is linear between both ends.
+  void (*drive)(const StrikeTable* strike, const TurnTable* turn, const Drive& drive, int quantum, ModeState* state, Starts* starts,
+                int groups, float* out) noexcept;
   /// Adds the pressure that an input makes, 1 to kPeriod samples of both.
   void (*filter)(FilterGroup<float>* modes, int groups, const float* input, int samples, float* out) noexcept;
   void (*filter_double)(FilterGroup<double>* modes, int groups, const double* input, int samples, double* out) noexcept;

@@ -20,6 +20,7 @@ struct F {
   void store(float* at) const { _mm256_storeu_ps(at, v); }
   friend F operator+(F a, F b) { return {_mm256_add_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm256_mul_ps(a.v, b.v)}; }
+  friend F operator/(F a, F b) { return {_mm256_div_ps(a.v, b.v)}; }
 };
 inline F fma(F a, F b, F c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
 inline F less(F c, F a, F b) { return {_mm256_fnmadd_ps(a.v, b.v, c.v)}; }  // c - a b
@@ -48,6 +49,6 @@ constexpr int kVectors = 2, kColumns = 2, kFloatChains = 2, kDoubleChains = 1, k
 
 }  // namespace
 
-const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, filter, filter_double};
+const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, filter, filter_double};
 
 }  // namespace carillon::synth

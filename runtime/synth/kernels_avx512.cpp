@@ -20,6 +20,7 @@ struct F {
   void store(float* at) const { _mm512_storeu_ps(at, v); }
   friend F operator+(F a, F b) { return {_mm512_add_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm512_mul_ps(a.v, b.v)}; }
+  friend F operator/(F a, F b) { return {_mm512_div_ps(a.v, b.v)}; }
 };
 inline F fma(F a, F b, F c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
 inline F less(F c, F a, F b) { return {_mm512_fnmadd_ps(a.v, b.v, c.v)}; }  // c - a b
@@ -48,6 +49,6 @@ constexpr int kVectors = 2, kColumns = 4, kFloatChains = 6, kDoubleChains = 3, k
 
 }  // namespace
 
-const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, filter, filter_double};
+const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, filter, filter_double};
 
 }  // namespace carillon::synth

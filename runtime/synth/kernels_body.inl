@@ -1,7 +1,9 @@
 // Method:     emit is a small matrix product: a mode's sound over a quantum is its table (32 x 2, single precision) times its state at the
 //             start of the quantum (2 x 1), so 1 to 4 starts are columns that share the table. Two sets of sums, of even and odd modes,
 //             hide the latency of the FMA. advance restarts the columns every period from a state in double precision. strike is the exact
-//             answer of a mode at rest to the pulse, sample by sample, with modes in the lanes; the answer's end is added to what rings.
+//             answer of a mode at rest to the pulse, sample by sample, with modes in the lanes; the answer's end is added to what rings. drive does
+//             the same with forces that are linear between samples; when it damps, it steps what rings through the quantum too, for its
+//             sound only: the state in double precision is multiplied by the product of the factors.
 // Source:     docs/decisions/resonator-kernel.md.
 // Deviations: none.
 //
@@ -191,6 +193,132 @@ void strike(const StrikeTable* strike, const TurnTable* turn, const Touch& touch
     }
   }
   for (int n = 0; n < kQuantum; ++n) out[n] += add_lanes<F::kWidth>(sum + n * F::kWidth);
+}
+
+/// A mode's damping over a sample by one end of all contacts, as the contract of Kernels::drive has it.
+inline F calc_brake(const Drive& drive, int end, int mode, F scale, F angle) noexcept {
+  F x = F::zero();
+  for (int c = 0; c < drive.contacts; ++c) {
+    const Push& push = drive.push[c][end];
+    F along = F::zero();
+    for (int i = 0; i < kStrikeRows; ++i) along = fma(F::all(push.brake[i]), F::convert(push.row[i] + mode), along);
+    along = along * scale;
+    x = fma(along, along, x);
+  }
+  x = x * angle / (angle + x + F::all(1e-30F));
+  const F p = fma(fma(x, F::all(1.0F / 6.0F), F::all(0.5F)), x * x, x);
+  return p / (F::all(1.0F) + p);
+}
+
+template <bool kForces, bool kDamps>
+inline void drive_modes(const StrikeTable* strike, const TurnTable* turn, const Drive& drive, int quantum, ModeState* state, Starts* starts,
+                        int groups, float* out) noexcept {
+  alignas(64) float sum[kQuantum * F::kWidth] = {};
+  for (int m = 0; m < groups * kGroup; m += F::kWidth) {
+    const int lane = m % kGroup;
+    const StrikeTable& table = strike[m / kGroup];
+    const TurnTable& later = turn[m / kGroup];
+    ModeState& ringing = state[m / kGroup];
+    Starts& start = starts[m / kGroup];
+    const F scale = F::load(table.scale + lane);
+    const F turn_re = F::load(table.turn_re + lane), turn_im = F::load(table.turn_im + lane);
+    const F out_re = F::load(table.out_re + lane), out_im = F::load(table.out_im + lane);
+    F force[kQuantum + 1];
+    F first_re = F::zero(), first_im = F::zero(), second_re = F::zero(), second_im = F::zero();  // answers to 1 - u and u
+    if constexpr (kForces) {
+      for (int n = 0; n <= kQuantum; ++n) force[n] = F::zero();
+      for (int c = 0; c < drive.contacts; ++c) {
+        for (int end = 0; end < 2; ++end) {
+          const Push& push = drive.push[c][end];
+          if (!push.forces) continue;
+          F amplitude = F::zero();
+          for (int i = 0; i < kStrikeRows; ++i) amplitude = fma(F::all(push.force[i]), F::convert(push.row[i] + m), amplitude);
+          amplitude = amplitude * scale;
+          for (int n = 0; n <= kQuantum; ++n) force[n] = fma(F::all(push.signal[n]), amplitude, force[n]);
+        }
+      }
+      for (int j = 0; j < kTerms; ++j) {
+        const F re = F::load(table.force_re[j] + lane), im = F::load(table.force_im[j] + lane);
+        first_re = fma(F::all(drive.ramp[0][j]), re, first_re);
+        first_im = fma(F::all(drive.ramp[0][j]), im, first_im);
+        second_re = fma(F::all(drive.ramp[1][j]), re, second_re);
+        second_im = fma(F::all(drive.ramp[1][j]), im, second_im);
+      }
+    }
+    F brake = F::zero(), last_brake = F::zero();
+    F ring_re = F::zero(), ring_im = F::zero();  // what rings already, while it is damped
+    D kept = D::all(1.0);                        // of its amplitude
+    if constexpr (kDamps) {
+      const F angle = F::load(table.angle + lane);
+      brake = calc_brake(drive, 0, m, scale, angle);
+      last_brake = calc_brake(drive, 1, m, scale, angle);
+      ring_re = F::load(start.re[quantum] + lane);
+      ring_im = F::load(start.im[quantum] + lane);
+      fma(out_re, ring_re, fma(out_im, ring_im, F::load(sum))).store(sum);
+    }
+    F x = F::zero(), y = F::zero();  // what the force makes
+    for (int n = 1; n <= kQuantum; ++n) {
+      F keep = F::zero();
+      if constexpr (kDamps) {
+        const float share = (static_cast<float>(n) - 0.5F) / kQuantum;
+        const F lost = fma(F::all(share), last_brake, F::all(1.0F - share) * brake);
+        keep = less(F::all(1.0F), F::all(1.0F), lost);
+        const F re = less(ring_re * turn_re, ring_im, turn_im) * keep, im = fma(ring_re, turn_im, ring_im * turn_re) * keep;
+        ring_re = re;
+        ring_im = im;
+        kept = less(kept, kept, D::widen(lost));
+      }
+      if constexpr (kForces) {
+        F re = less(x * turn_re, y, turn_im), im = fma(x, turn_im, y * turn_re);
+        if constexpr (kDamps) {
+          re = re * keep;
+          im = im * keep;
+        }
+        x = fma(first_re, force[n - 1], fma(second_re, force[n], re));
+        y = fma(first_im, force[n - 1], fma(second_im, force[n], im));
+      }
+      if (n < kQuantum) {
+        float* at = sum + n * F::kWidth;
+        fma(out_re, x + ring_re, fma(out_im, y + ring_im, F::load(at))).store(at);
+      }
+    }
+    for (int q = quantum + 1; q <= kQuanta; ++q) {
+      F later_re = x, later_im = y;
+      if (const int ahead = q - quantum - 1; ahead > 0) {
+        const F c = F::load(later.quanta_re[ahead - 1] + lane), s = F::load(later.quanta_im[ahead - 1] + lane);
+        later_re = less(x * c, y, s);
+        later_im = fma(x, s, y * c);
+      }
+      if (q < kQuanta) {
+        F re = F::load(start.re[q] + lane), im = F::load(start.im[q] + lane);
+        if constexpr (kDamps) {
+          re = re * kept.narrow();
+          im = im * kept.narrow();
+        }
+        (re + later_re).store(start.re[q] + lane);
+        (im + later_im).store(start.im[q] + lane);
+      } else {
+        D re = D::load(ringing.re + lane), im = D::load(ringing.im + lane);
+        if constexpr (kDamps) {
+          re = re * kept;
+          im = im * kept;
+        }
+        (re + D::widen(later_re)).store(ringing.re + lane);
+        (im + D::widen(later_im)).store(ringing.im + lane);
+      }
+    }
+  }
+  for (int n = 0; n < kQuantum; ++n) out[n] += add_lanes<F::kWidth>(sum + n * F::kWidth);
+}
+
+void drive(const StrikeTable* strike, const TurnTable* turn, const Drive& what, int quantum, ModeState* state, Starts* starts, int groups,
+           float* out) noexcept {
+  if (what.forces && what.damps)
+    drive_modes<true, true>(strike, turn, what, quantum, state, starts, groups, out);
+  else if (what.forces)
+    drive_modes<true, false>(strike, turn, what, quantum, state, starts, groups, out);
+  else if (what.damps)
+    drive_modes<false, true>(strike, turn, what, quantum, state, starts, groups, out);
 }
 
 /// kHeld vectors of modes, from lane `lane` of the first group on; kHeld divides the vectors of a group or is a multiple of them.

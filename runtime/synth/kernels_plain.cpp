@@ -16,6 +16,7 @@ struct F {
   void store(float* at) const { *at = v; }
   friend F operator+(F a, F b) { return {a.v + b.v}; }
   friend F operator*(F a, F b) { return {a.v * b.v}; }
+  friend F operator/(F a, F b) { return {a.v / b.v}; }
 };
 inline F fma(F a, F b, F c) { return {a.v * b.v + c.v}; }
 inline F less(F c, F a, F b) { return {c.v - a.v * b.v}; }  // c - a b
@@ -41,6 +42,6 @@ constexpr int kVectors = 8, kColumns = 1, kFloatChains = 1, kDoubleChains = 1, k
 
 }  // namespace
 
-const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, filter, filter_double};
+const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, drive, filter, filter_double};
 
 }  // namespace carillon::synth

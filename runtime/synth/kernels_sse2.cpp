@@ -21,6 +21,7 @@ struct F {
   void store(float* at) const { _mm_storeu_ps(at, v); }
   friend F operator+(F a, F b) { return {_mm_add_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm_mul_ps(a.v, b.v)}; }
+  friend F operator/(F a, F b) { return {_mm_div_ps(a.v, b.v)}; }
 };
 inline F fma(F a, F b, F c) { return {_mm_add_ps(_mm_mul_ps(a.v, b.v), c.v)}; }
 inline F less(F c, F a, F b) { return {_mm_sub_ps(c.v, _mm_mul_ps(a.v, b.v))}; }  // c - a b
@@ -49,6 +50,6 @@ constexpr int kVectors = 4, kColumns = 1, kFloatChains = 2, kDoubleChains = 1, k
 
 }  // namespace
 
-const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, filter, filter_double};
+const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, filter, filter_double};
 
 }  // namespace carillon::synth

@@ -89,6 +89,8 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   model->mass_kg_ = bank.rigid.mass_kg;
   model->sphere_radius_m_ = options.sphere_radius_m > 0.0 ? options.sphere_radius_m
                                                           : std::cbrt(std::max(0.0, bank.rigid.volume_m3) * 3.0 / (4.0 * std::numbers::pi));
+  const bank::Material& material = bank.material;
+  model->plane_strain_modulus_pa_ = material.young_modulus_pa / (1.0 - material.poisson_ratio * material.poisson_ratio);
   model->triangles_ = bank.triangles;
   for (const Sorted& sorted : ringing) model->add_ringing_mode(sorted.mode);
   model->add_damped_modes(std::move(damped));
@@ -130,6 +132,7 @@ void Model::add_ringing_mode(const Mode& mode) {
   strike.out_re[lane] = static_cast<float>(out.real());
   strike.out_im[lane] = static_cast<float>(-out.imag());
   strike.scale[lane] = static_cast<float>(mode.scale);
+  strike.angle[lane] = static_cast<float>(omega * h);
   const auto points = get_chebyshev_points();
   std::array<double, kMoments> re{}, im{};
   for (int k = 0; k < kMoments; ++k) {

@@ -48,10 +48,13 @@ class Model {
   /// Of the rigid body, for acceleration noise: its mass, and the sphere that stands for it. 0 where the bank does not say.
   double get_mass_kg() const { return mass_kg_; }
   double get_sphere_radius_m() const { return sphere_radius_m_; }
+  /// E / (1 - nu^2) of the bank's material [Pa].
+  double get_plane_strain_modulus_pa() const { return plane_strain_modulus_pa_; }
   /// Memory of the tables, which all voices share.
   std::size_t calc_bytes() const;
 
  private:
+  friend class ContactForces;
   friend class Voice;
 
   struct Mode {
@@ -77,6 +80,7 @@ class Model {
 
   double rate_hz_ = 0.0;
   double mass_kg_ = 0.0, sphere_radius_m_ = 0.0;
+  double plane_strain_modulus_pa_ = 0.0;
   std::vector<Mode> modes_;
   int ringing_ = 0;  // modes in groups, the first of modes_; the rest is damped_
   std::vector<SoundTable> sound_;

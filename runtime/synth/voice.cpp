@@ -96,12 +96,13 @@ void Voice::render(int quanta) noexcept {
     cut_ = groups_;
     if (start / kPeriod % kCullEvery == 0 && is_awake()) cull();
   }
-  silent_ = !is_awake() && !fading_ && pulses_.empty();
+  silent_ = !is_awake() && !fading_ && pulses_.empty() && (contacts_ == nullptr || contacts_->is_resting());
   if (silent_) return;
+  const bool touched = contacts_ != nullptr && !contacts_->is_idle();
   std::fill(block_.begin(), block_.begin() + rendered_, 0.0F);
   bool struck_at_all = false;
   for (int q = 0; q < quanta; ++q) struck_at_all = struck_at_all || is_struck(start + q * kQuantum);
-  const bool whole = quanta == kQuanta && !struck_at_all;
+  const bool whole = quanta == kQuanta && !struck_at_all && !touched;
   if (live_ > 0 && whole) {
     kernels_->ring(model_->sound_.data(), model_->turn_.data(), state_.data(), live_, block_.data());
   } else if (live_ > 0 && first == 0) {
@@ -111,14 +112,21 @@ void Voice::render(int quanta) noexcept {
     float* out = block_.data() + q * kQuantum;
     const std::int64_t sample = start + q * kQuantum;
     const bool struck = struck_at_all && is_struck(sample);
-    if (q == made) {  // what rings, up to the next quantum that is struck: a strike changes the starts after it
+    const Drive* drive = touched ? contacts_->begin_quantum(sample) : nullptr;
+    const bool driven = drive != nullptr && drive->forces, damped = drive != nullptr && drive->damps;
+    if (driven) wake(find_reach(drive->strength_n_s));
+    if (q == made) {  // what rings, up to the next quantum that is struck or touched: that changes the starts after it
       do ++made;
-      while (made < quanta && !struck && !is_struck(start + made * kQuantum));
-      if (live_ > 0) kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
+      while (made < quanta && !touched && !struck && !is_struck(start + made * kQuantum));
+      if (live_ > 0 && !damped) kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
+    }
+    if (drive != nullptr && live_ > 0) {
+      kernels_->drive(model_->strike_.data(), model_->turn_.data(), *drive, first + q, state_.data(), starts_.data(), live_, out);
+      counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
     }
     if (struck) strike_quantum(sample, first + q, out);
     counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
-    if (struck || damped_live_) add_damped(sample, struck, out);
+    if (struck || driven || damped_live_) add_damped(sample, struck, driven, out);
     if (fading_) {
       for (int n = 0; n < kQuantum; ++n) out[n] += fade_[(first + q) * kQuantum + n];
     }
@@ -179,19 +187,33 @@ void Voice::strike_quantum(std::int64_t sample, int quantum, float* out) noexcep
   }
 }
 
-void Voice::add_damped(std::int64_t sample, bool struck, float* out) noexcept {
+void Voice::add_damped(std::int64_t sample, bool struck, bool driven, float* out) noexcept {
+  const bool forced = struck || driven;
   const auto& modes = model_->damped_;
   damped_live_ = !modes.empty();
   for (std::size_t first = 0; first < modes.size();) {
-    const int substeps = struck ? modes[first].substeps : 1;
+    const int substeps = forced ? modes[first].substeps : 1;
     std::size_t last = first + 1;
-    while (last < modes.size() && (!struck || modes[last].substeps == substeps)) ++last;
+    while (last < modes.size() && (!forced || modes[last].substeps == substeps)) ++last;
     for (int n = 0; n < kQuantum; ++n) {
-      for (int step = 0; struck && step < substeps; ++step) {
+      for (int step = 0; forced && step < substeps; ++step) {
         for (std::size_t i = first; i < last; ++i) {
           const auto& m = modes[i];
           DampedState& s = damped_[i];
           s = {m.sub_qq * s.q + m.sub_qv * s.v, m.sub_vq * s.q + m.sub_vv * s.v};
+        }
+        for (std::size_t i = first; driven && i < last; ++i) {
+          // From the sample before to this one, the force goes in a line.
+          const auto& m = modes[i];
+          const float* force = contacts_->get_damped_force(i) + n;
+          const auto& ramp = contacts_->get_ramp();
+          const double slope = (static_cast<double>(force[1]) - static_cast<double>(force[0])) / substeps;
+          const double begin = static_cast<double>(force[0]) + slope * step;
+          for (int j = 0; j < kMoments; ++j) {
+            const double impulse = (begin * ramp[0][j] + (begin + slope) * ramp[1][j]) / substeps;
+            damped_[i].q += impulse * m.force_q[j];
+            damped_[i].v += impulse * m.force_v[j];
+          }
         }
         for (const Pulse& pulse : pulses_) {
           const double begin = pulse.begin - static_cast<double>(sample - 1 + n);
@@ -215,7 +237,7 @@ void Voice::add_damped(std::int64_t sample, bool struck, float* out) noexcept {
       for (std::size_t i = first; i < last; ++i) {
         const auto& m = modes[i];
         DampedState& s = damped_[i];
-        if (!struck) s = {m.qq * s.q + m.qv * s.v, m.vq * s.q + m.vv * s.v};
+        if (!forced) s = {m.qq * s.q + m.qv * s.v, m.vq * s.q + m.vv * s.v};
         pressure += m.gain * s.v;
       }
       out[n] += static_cast<float>(pressure);

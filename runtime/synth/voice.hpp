@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "runtime/stream/events.hpp"
+#include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/pulse.hpp"
@@ -45,6 +46,10 @@ class Voice {
   /// Registers a pulse. Times are since the first sample of this voice; `body` and `other` of the impulse are not looked at. False when it
   /// was refused. [audio-thread]: no heap, no lock, no throw.
   bool strike(const stream::Impulse& impulse) noexcept;
+
+  /// Contacts that last act from the next quantum on, or no more (nullptr). They must be of this voice's model and outlive their use. What
+  /// is attached first hears of its first sample; release() before it is taken away, or a force is cut off. [audio-thread]
+  void attach(ContactForces* contacts) noexcept { contacts_ = contacts; }
 
   /// Adds the pressure at 1 m [Pa] of the next pressure_pa.size() samples. A body without energy costs nothing.
   /// Denormal numbers are flushed to zero inside; the caller's setting is put back.
@@ -79,7 +84,9 @@ class Voice {
   int get_live_group_count() const { return live_; }
   bool is_awake() const { return live_ > 0 || damped_live_; }
   /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
-  bool is_idle() const { return !is_awake() && !fading_ && pulses_.empty() && held_ == 0; }
+  bool is_idle() const {
+    return !is_awake() && !fading_ && pulses_.empty() && held_ == 0 && (contacts_ == nullptr || contacts_->is_resting());
+  }
   /// As process() for a multiple of kQuantum samples of a voice that is idle, whose zeros nobody wants. [audio-thread]
   void skip(std::int64_t samples) noexcept { horizon_ += samples; }
   /// Memory that this voice has taken, without that of the model.
@@ -106,7 +113,7 @@ class Voice {
   void wake(int groups) noexcept;
   int find_reach(float strength_n_s) const noexcept;
   void strike_quantum(std::int64_t sample, int quantum, float* out) noexcept;
-  void add_damped(std::int64_t sample, bool struck, float* out) noexcept;
+  void add_damped(std::int64_t sample, bool struck, bool driven, float* out) noexcept;
   void begin_period() noexcept;
   void cull() noexcept;
   void fade_out(int groups) noexcept;
@@ -126,6 +133,7 @@ class Voice {
   int held_ = 0;              // of them not yet handed out: the last of block_
   int rendered_ = 0;          // samples in block_
   bool silent_ = true;        // block_ is all zero
+  ContactForces* contacts_ = nullptr;
   VoiceCounters counters_;
 
   std::vector<ModeState> state_;  // zero beyond live_

@@ -199,5 +199,103 @@ TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
   }
 }
 
+TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      for (const bool forces : {false, true}) {
+        for (const bool damps : {false, true}) {
+          Invented now(count);
+          for (auto& table : now.strike) std::fill(std::begin(table.angle), std::end(table.angle), 0.0F);
+          for (int m = 0; m < count; ++m) now.strike[static_cast<std::size_t>(m / kGroup)].angle[m % kGroup] = 1.0F + 0.5F * number(random);
+          get_kernels(isa).advance(now.turn.data(), now.state.data(), now.starts.data(), now.groups);
+          Drive drive{};
+          drive.contacts = 3;
+          drive.forces = forces;
+          drive.damps = damps;
+          for (auto& ramp : drive.ramp) std::generate(std::begin(ramp), std::end(ramp), [&] { return number(random); });
+          for (int c = 0; c < drive.contacts; ++c) {
+            for (Push& push : drive.push[c]) {
+              push.forces = forces && c != 1;  // one of them brakes only
+              for (int r = 0; r < kStrikeRows; ++r) {
+                push.row[r] = now.rows.data() + now.row((r + c) % kStrikeRows);
+                push.force[r] = number(random);
+                push.brake[r] = damps ? 0.3F * number(random) : 0.0F;
+              }
+              for (float& x : push.signal) x = push.forces ? number(random) : 0.0F;
+            }
+          }
+          const int quantum = count % kQuanta;
+          const std::vector<ModeState> state = now.state;
+          const std::vector<Starts> starts = now.starts;
+          std::vector<float> out(kQuantum, 0.25F);
+          get_kernels(isa).drive(now.strike.data(), now.turn.data(), drive, quantum, now.state.data(), now.starts.data(), now.groups,
+                                 out.data());
+          std::vector<double> expected(kQuantum, 0.25);
+          double size = 1.0;
+          for (int m = 0; m < count; ++m) {
+            const std::size_t g = static_cast<std::size_t>(m / kGroup);
+            const int l = m % kGroup;
+            const StrikeTable& table = now.strike[g];
+            const auto calc_along = [&](const Push& push, const float* weight) {
+              double along = 0.0;
+              for (int r = 0; r < kStrikeRows; ++r) along += static_cast<double>(weight[r]) * push.row[r][m];
+              return along * static_cast<double>(table.scale[l]);
+            };
+            std::array<double, kQuantum + 1> force{};
+            std::array<double, 2> loss{};
+            for (int end = 0; end < 2; ++end) {
+              double x = 0.0;
+              for (int c = 0; c < drive.contacts; ++c) {
+                const Push& push = drive.push[c][static_cast<std::size_t>(end)];
+                x += std::pow(calc_along(push, push.brake), 2.0);
+                for (int n = 0; n <= kQuantum && push.forces; ++n) force[n] += calc_along(push, push.force) * push.signal[n];
+              }
+              x /= 1.0 + x / static_cast<double>(table.angle[l]);
+              loss[end] = 1.0 - 1.0 / (1.0 + x + x * x / 2.0 + x * x * x / 6.0);
+            }
+            const Complex turn(table.turn_re[l], table.turn_im[l]);
+            Complex first = 0.0, second = 0.0;
+            for (int j = 0; j < kTerms; ++j) {
+              first += static_cast<double>(drive.ramp[0][j]) * Complex(table.force_re[j][l], table.force_im[j][l]);
+              second += static_cast<double>(drive.ramp[1][j]) * Complex(table.force_re[j][l], table.force_im[j][l]);
+            }
+            Complex ringing = damps ? Complex(starts[g].re[quantum][l], starts[g].im[quantum][l]) : 0.0, made = 0.0;
+            double kept = 1.0;
+            for (int n = 0; n <= kQuantum; ++n) {
+              if (n > 0) {
+                const double keep = 1.0 - (loss[0] + (n - 0.5) / kQuantum * (loss[1] - loss[0]));
+                kept *= keep;
+                ringing *= turn * keep;
+                made = made * turn * keep + (forces ? force[n - 1] * first + force[n] * second : Complex(0.0));
+              }
+              const Complex z = ringing + made;
+              if (n < kQuantum)
+                expected[n] += static_cast<double>(table.out_re[l]) * z.real() + static_cast<double>(table.out_im[l]) * z.imag();
+              size += std::abs(z);
+            }
+            for (int q = quantum + 1; q <= kQuanta; ++q) {
+              const int ahead = q - quantum - 1;
+              const Complex later =
+                  ahead == 0 ? made : made * Complex(now.turn[g].quanta_re[ahead - 1][l], now.turn[g].quanta_im[ahead - 1][l]);
+              const Complex had = q < kQuanta ? Complex(starts[g].re[q][l], starts[g].im[q][l]) : Complex(state[g].re[l], state[g].im[l]);
+              const Complex has =
+                  q < kQuanta ? Complex(now.starts[g].re[q][l], now.starts[g].im[q][l]) : Complex(now.state[g].re[l], now.state[g].im[l]);
+              ASSERT_LT(std::abs(has - (kept * had + later)), (forces        ? 2e-5
+                                                               : q < kQuanta ? 3e-7
+                                                                             : 1e-6) *
+                                                                  (1.0 + std::abs(made)))
+                  << get_name(isa) << ", " << count << " modes" << forces << damps;
+            }
+            for (int q = 0; q <= quantum; ++q) ASSERT_EQ(now.starts[g].re[q][l], starts[g].re[q][l]);
+          }
+          for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace carillon::synth

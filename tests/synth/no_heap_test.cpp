@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "runtime/synth/click.hpp"
+#include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/driven_bank.hpp"
 #include "runtime/synth/ears.hpp"
 #include "runtime/synth/synthesiser.hpp"
@@ -71,6 +72,9 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
   std::vector<double> out(128);
   std::vector<float> sent(128), x(128), y(128), z(128);
   Click click(0.06, 1.0, 48000.0, 8);
+  ContactForces contacts(Model::make(bank), {.max_contacts = 2, .max_records = 8});
+  Voice touched(Model::make(bank));
+  touched.attach(&contacts);
   const long before = g_allocations;
   for (int i = 0; i < 300; ++i) {
     for (int k = 0; k < (i % 10 == 0 ? 20 : 0); ++k) {  // more than there is room for
@@ -86,11 +90,26 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
     history.push(sent);
     click.strike({.time_s = 1e-3 * i, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-3}, {1.0, 0.0, 0.0, 0.0});
     click.process({x, y, z});
+    for (std::uint64_t k = 0; k < 5; ++k) {  // more than there is room for
+      contacts.take({.time_s = static_cast<double>(touched.get_position()) / 48000.0 + 1e-3,
+                     .id = k + static_cast<std::uint64_t>(i / 50),
+                     .state = i % 50 == 49 ? stream::ContactState::kEnd : stream::ContactState::kHold,
+                     .normal = {0.0, 0.0, 1.0},
+                     .force_n = 1.0,
+                     .sweep_m_s = 0.1,
+                     .other_sweep_m_s = 0.2,
+                     .patch_radius_m = 1e-5,
+                     .impedance_n_s_m = 1.0});
+    }
+    contacts.reach(static_cast<double>(touched.get_position()) / 48000.0);
+    touched.process(sent);
     ear.process({.track = &path, .monopole = &history}, listener, 128 * i, out);
   }
   EXPECT_EQ(g_allocations - before, 0);
   EXPECT_GT(body.get_counters().accepted, 0);
   EXPECT_GT(body.get_counters().refused, 0);
+  EXPECT_GT(contacts.get_counters().samples, 0);
+  EXPECT_GT(contacts.get_counters().dropped, 0);
 }
 
 TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {

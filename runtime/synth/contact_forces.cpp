@@ -1,0 +1,369 @@
+// Method:     every border of two quanta, each contact's values are found on the line between its records; from them its direction, gains
+//             and damping. In between, the force is worked out sample by sample and handed to the modes through the contact's rows at
+//             both borders, blended, so that nothing steps when the place or the direction changes.
+// Source:     K. Johnson, Contact Mechanics (1985), 4.2: k = dF/d delta = 2 E* a. Stiffness that falls to load over height where
+//             roughness carries: B. Persson, Phys. Rev. Lett. 99 (2007) 125502 (there F / (0.4 h_rms); here the largest height takes the
+//             place of 0.4 h_rms, which makes it a bound). Coulomb 1785.
+// Deviations: the bodies do not give way to the roughness as wholes (rolling noise theory divides by the sum of their receptances).
+#include "runtime/synth/contact_forces.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/config/error.hpp"
+
+namespace carillon::synth {
+namespace {
+
+constexpr double kRiseS = 5e-3;
+constexpr double kPatienceS = 20e-3;
+constexpr double kLongestS = 50e-3;
+constexpr double kAtRest = 0.2e-3, kMoving = 10e-3;  // m/s
+constexpr double kSticking = 1e-3;                   // m/s; below, the direction of friction fades
+constexpr double kStronger = 2.0;                    // a new contact takes the place of one that presses less than half as much
+
+double calc_smooth_step(double x) noexcept {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m_s - kAtRest) / (kMoving - kAtRest)); }
+
+double calc_norm(const stream::Vec3& v) noexcept { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+/// Of the surface of a body along the path of a contact: the same for whoever looks at it.
+std::uint64_t make_seed(std::uint64_t contact, std::int32_t body) noexcept {
+  return contact * 0x9e3779b97f4a7c15U ^ (static_cast<std::uint64_t>(static_cast<std::uint32_t>(body)) + 1U) * 0xc2b2ae3d27d4eb4fU;
+}
+
+double blend(double a, double b, double share) noexcept { return a + share * (b - a); }
+
+bool is_amount(double x) { return std::isfinite(x) && x >= 0.0; }
+
+}  // namespace
+
+ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOptions options)
+    : model_(std::move(model)), surface_(options.surface), effects_(options.effects) {
+  if (model_ == nullptr) throw InputError("contacts need a model");
+  if (!is_amount(surface_.roughness_m) || !is_amount(surface_.friction) || !is_amount(surface_.modulus_pa))
+    throw InputError("roughness, friction and modulus of a surface must be numbers of at least 0");
+  if (options.max_contacts < 1 || options.max_contacts > kMostContacts)
+    throw InputError("a body needs room for 1 to " + std::to_string(kMostContacts) + " contacts");
+  if (options.max_records < 2 || options.max_records > 1 << 20)
+    throw InputError("a body needs room for 2 to 1,048,576 records of contacts");
+  if (surface_.modulus_pa == 0.0) surface_.modulus_pa = model_->get_plane_strain_modulus_pa();
+  Texture::make_tables();
+  rate_hz_ = model_->get_rate_hz();
+  slots_.resize(static_cast<std::size_t>(options.max_contacts));
+  records_.resize(static_cast<std::size_t>(options.max_records));
+  for (std::size_t i = 0; i < records_.size(); ++i) records_[i].next = i + 1 < records_.size() ? static_cast<std::int32_t>(i + 1) : -1;
+  free_ = 0;
+  damped_force_.resize(model_->damped_.size() * (kQuantum + 2));
+  // Integrals of 1 - u and u times T_j(2 u - 1) over 0..1, times the length of a sample.
+  const auto area = [](int j) { return j % 2 == 0 ? 1.0 / (1.0 - static_cast<double>(j) * j) : 0.0; };
+  for (int j = 0; j < kMoments; ++j) {
+    const double slope = 0.5 * (area(j + 1) + area(std::abs(j - 1)));
+    ramp_[0][static_cast<std::size_t>(j)] = 0.5 * (area(j) - slope) / rate_hz_;
+    ramp_[1][static_cast<std::size_t>(j)] = 0.5 * (area(j) + slope) / rate_hz_;
+  }
+  for (std::size_t end = 0; end < 2; ++end) {
+    for (std::size_t j = 0; j < kTerms; ++j) drive_.ramp[end][j] = static_cast<float>(ramp_[end][j]);
+  }
+}
+
+std::size_t ContactForces::calc_bytes() const noexcept {
+  return sizeof(*this) + slots_.size() * sizeof(Slot) + records_.size() * sizeof(Record) + damped_force_.size() * sizeof(float);
+}
+
+/// The contact's own slot, or one that it may have.
+ContactForces::Slot* ContactForces::find_place(const stream::Contact& contact) noexcept {
+  Slot* empty = nullptr;
+  Slot* weakest = nullptr;
+  double least = 0.0;
+  for (Slot& slot : slots_) {
+    if (slot.used && slot.id == contact.id && !(slot.ended && contact.state == stream::ContactState::kBegin)) return &slot;
+    if (!slot.used) empty = &slot;
+    if (!slot.used || slot.ended) continue;
+    const double force = slot.tail >= 0 ? records_[static_cast<std::size_t>(slot.tail)].force_n : slot.from.force_n;
+    if (weakest == nullptr || force < least) {
+      weakest = &slot;
+      least = force;
+    }
+  }
+  if (contact.state == stream::ContactState::kEnd) return nullptr;  // of one that was dropped
+  if (empty == nullptr && weakest != nullptr && contact.force_n > kStronger * least) weakest->ended = true;
+  return empty;
+}
+
+/// A record at the end of the slot's queue: a new one, or the last one when there is no room.
+std::int32_t ContactForces::take_free(Slot& slot) noexcept {
+  const std::int32_t taken = free_;
+  if (taken < 0) {
+    ++counters_.thinned;
+    return slot.tail;
+  }
+  free_ = records_[static_cast<std::size_t>(taken)].next;
+  records_[static_cast<std::size_t>(taken)].next = -1;
+  if (slot.tail >= 0)
+    records_[static_cast<std::size_t>(slot.tail)].next = taken;
+  else
+    slot.head = taken;
+  slot.tail = taken;
+  return taken;
+}
+
+bool ContactForces::take(const stream::Contact& contact, const Surface& other) noexcept {
+  if (stream::find_fault(stream::Event(contact)) != nullptr || static_cast<std::size_t>(contact.triangle) >= model_->triangles_.size() ||
+      !is_amount(other.roughness_m) || !is_amount(other.friction) || !is_amount(other.modulus_pa)) {
+    ++counters_.refused;
+    return false;
+  }
+  Slot* slot = find_place(contact);
+  if (slot == nullptr) {
+    ++counters_.dropped;
+    return false;
+  }
+  if (!slot->used) {
+    *slot = Slot{};
+    slot->id = contact.id;
+    slot->friction = std::sqrt(surface_.friction * other.friction);
+    const double compliance = 1.0 / surface_.modulus_pa + 1.0 / other.modulus_pa;
+    slot->modulus_pa = surface_.modulus_pa > 0.0 && other.modulus_pa > 0.0 ? 1.0 / compliance : 0.0;
+    slot->texture.start(surface_.roughness_m, make_seed(contact.id, contact.body));
+    slot->other_texture.start(other.roughness_m, make_seed(contact.id, contact.other));
+    slot->used = true;
+    ++live_;
+  }
+  const std::int32_t place = take_free(*slot);
+  if (place < 0) {  // no room, and none of its own that waits
+    if (!slot->acts && slot->head < 0) free(*slot);
+    ++counters_.dropped;
+    return false;
+  }
+  Record& record = records_[static_cast<std::size_t>(place)];
+  record.time = contact.time_s * rate_hz_;
+  record.force_n = contact.force_n;
+  record.sweep_m_s = contact.sweep_m_s;
+  record.other_sweep_m_s = contact.other_sweep_m_s;
+  record.patch_m = contact.patch_radius_m;
+  record.impedance = contact.impedance_n_s_m;
+  record.normal = contact.normal;
+  record.slip_m_s = contact.slip_m_s;
+  record.barycentric = contact.barycentric;
+  record.triangle = contact.triangle;
+  record.ends = contact.state == stream::ContactState::kEnd;
+  ++counters_.accepted;
+  return true;
+}
+
+void ContactForces::reach(double time_s) noexcept {
+  if (std::isfinite(time_s)) reached_ = std::max(reached_, time_s * rate_hz_);
+}
+
+void ContactForces::release() noexcept {
+  for (Slot& slot : slots_) {
+    if (slot.used && !slot.acts)
+      free(slot);
+    else
+      slot.ended = slot.ended || slot.used;
+  }
+}
+
+bool ContactForces::is_resting() const noexcept {
+  for (const Slot& slot : slots_) {
+    if (slot.used && (!slot.acts || !slot.holds || slot.head >= 0 || slot.ended || slot.level < 1.0 || slot.node.motion > 0.0 ||
+                      slot.node.other_motion > 0.0))
+      return false;
+  }
+  return true;
+}
+
+void ContactForces::free(Slot& slot) noexcept {
+  while (slot.head >= 0) {
+    const std::int32_t next = records_[static_cast<std::size_t>(slot.head)].next;
+    records_[static_cast<std::size_t>(slot.head)].next = free_;
+    free_ = slot.head;
+    slot.head = next;
+  }
+  slot = Slot{};
+  --live_;
+}
+
+/// The contact's values at a time [samples]. False when it has not begun.
+bool ContactForces::find_values(Slot& slot, double time, Record& values) noexcept {
+  const auto pop = [&] {
+    const std::int32_t place = slot.head;
+    Record record = records_[static_cast<std::size_t>(place)];
+    slot.head = record.next;
+    if (slot.head < 0) slot.tail = -1;
+    records_[static_cast<std::size_t>(place)].next = free_;
+    free_ = place;
+    return record;
+  };
+  if (!slot.acts) {
+    if (slot.head < 0 || records_[static_cast<std::size_t>(slot.head)].time > time) return false;
+    slot.from = pop();
+    slot.acts = true;
+  }
+  while (true) {
+    if (!slot.has_to && slot.head >= 0 && !slot.from.ends) {
+      slot.to = pop();
+      slot.has_to = true;
+      // What has been held until now goes on from now.
+      if (slot.holds) slot.from.time = std::max(slot.from.time, looked_);
+      slot.to.time = std::max(slot.to.time, slot.from.time);
+      slot.from.time = std::max(slot.from.time, slot.to.time - kLongestS * rate_hz_);
+    }
+    if (!slot.has_to || slot.to.time > time) break;
+    slot.from = slot.to;
+    slot.has_to = false;
+  }
+  slot.holds = !slot.has_to;
+  if (slot.from.ends) slot.ended = true;
+  values = slot.from;
+  if (slot.has_to && time > slot.from.time) {
+    const double share = (time - slot.from.time) / (slot.to.time - slot.from.time);
+    const Record &a = slot.from, &b = slot.to;
+    values.force_n = blend(a.force_n, b.force_n, share);
+    values.sweep_m_s = blend(a.sweep_m_s, b.sweep_m_s, share);
+    values.other_sweep_m_s = blend(a.other_sweep_m_s, b.other_sweep_m_s, share);
+    values.patch_m = blend(a.patch_m, b.patch_m, share);
+    values.impedance = blend(a.impedance, b.impedance, share);
+    const bool same = a.triangle == b.triangle;
+    for (std::size_t k = 0; k < 3; ++k) {
+      values.normal[k] = blend(a.normal[k], b.normal[k], share);
+      values.slip_m_s[k] = blend(a.slip_m_s[k], b.slip_m_s[k], share);
+      values.barycentric[k] = same ? blend(a.barycentric[k], b.barycentric[k], share) : (share < 0.5 ? a : b).barycentric[k];
+    }
+    if (!same && share >= 0.5) values.triangle = b.triangle;
+  }
+  return true;
+}
+
+ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& values) const noexcept {
+  Node node;
+  node.values = values;
+  node.level = slot.level;
+  const double slip = calc_norm(values.slip_m_s), sweep = std::max(values.sweep_m_s, values.other_sweep_m_s);
+  const double sliding = slip <= 0.0 ? 0.0 : std::min(1.0, slip / std::max(sweep, slip));
+  const double rough = effects_.has(Effect::kRoughness) ? sliding : 0.0;
+  const double along = rough + (effects_.has(Effect::kRolling) ? 1.0 - sliding : 0.0);
+  if (along > 0.0) {
+    // A body that slides without being swept, as a spinning top, still moves against the other.
+    node.motion = calc_motion(values.sweep_m_s);
+    node.other_motion = calc_motion(values.other_sweep_m_s);
+    node.stiffness_n_m = 2.0 * slot.modulus_pa * values.patch_m;
+    node.gains = slot.texture.calc_gains(values.sweep_m_s, values.patch_m, rate_hz_);
+    node.other_gains = slot.other_texture.calc_gains(values.other_sweep_m_s, values.patch_m, rate_hz_);
+    // The heights of a surface that is not swept do not count, and count in full before they are heard.
+    node.peak_m = calc_smooth_step(values.sweep_m_s / kAtRest) * node.gains.peak_m +
+                  calc_smooth_step(values.other_sweep_m_s / kAtRest) * node.other_gains.peak_m;
+  }
+  const double drag = rough * slot.friction / (slip + kSticking);
+  const double brake = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
+  const auto& triangle = model_->triangles_[static_cast<std::size_t>(values.triangle)];
+  for (int corner = 0; corner < 3; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<std::size_t>(corner * 3 + axis), c = static_cast<std::size_t>(corner), k = static_cast<std::size_t>(axis);
+      node.row[i] = model_->get_row(triangle[c], axis);
+      node.force[i] = static_cast<float>(values.barycentric[c] * (along * values.normal[k] - drag * values.slip_m_s[k]));
+      node.brake[i] = static_cast<float>(values.barycentric[c] * brake * values.normal[k]);
+    }
+  }
+  return node;
+}
+
+/// Adds what a contact does between two nodes to the drive.
+void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexcept {
+  std::array<Push, 2>& push = drive_.push[drive_.contacts];
+  ++drive_.contacts;
+  const std::array<const Node*, 2> nodes{&from, &to};
+  for (std::size_t end = 0; end < 2; ++end) {
+    std::copy(nodes[end]->row.begin(), nodes[end]->row.end(), push[end].row);
+    std::copy(nodes[end]->force.begin(), nodes[end]->force.end(), push[end].force);
+    std::copy(nodes[end]->brake.begin(), nodes[end]->brake.end(), push[end].brake);
+    for (const float x : push[end].brake) drive_.damps = drive_.damps || x != 0.0F;
+    std::fill(std::begin(push[end].signal), std::end(push[end].signal), 0.0F);
+  }
+  push[0].forces = push[1].forces = false;
+  const bool moves = from.motion > 0.0 || to.motion > 0.0, other_moves = from.other_motion > 0.0 || to.other_motion > 0.0;
+  if (!(moves || other_moves) || !(from.values.force_n > 0.0 || to.values.force_n > 0.0)) return;
+  std::array<float, kQuantum + 1> height{}, other_height{};
+  if (moves) slot.texture.render(from.values.sweep_m_s, to.values.sweep_m_s, rate_hz_, from.gains, to.gains, height);
+  if (other_moves) {
+    slot.other_texture.render(from.values.other_sweep_m_s, to.values.other_sweep_m_s, rate_hz_, from.other_gains, to.other_gains,
+                              other_height);
+  }
+  counters_.samples += kQuantum;
+  double largest = 0.0;
+  for (std::size_t n = 0; n <= kQuantum; ++n) {
+    const double share = static_cast<double>(n) / kQuantum;
+    const double load = blend(from.values.force_n, to.values.force_n, share);
+    const double stiffness = blend(from.stiffness_n_m, to.stiffness_n_m, share);
+    const double peak = blend(from.peak_m, to.peak_m, share);
+    const double moved = blend(from.motion, to.motion, share) * static_cast<double>(height[n]) +
+                         blend(from.other_motion, to.other_motion, share) * static_cast<double>(other_height[n]);
+    const double sum = load + stiffness * peak;
+    const double force = sum > 0.0 ? blend(from.level, to.level, share) * stiffness * load / sum * moved : 0.0;
+    push[0].signal[n] = static_cast<float>(force * (1.0 - share));
+    push[1].signal[n] = static_cast<float>(force * share);
+    largest = std::max(largest, std::abs(force));
+  }
+  push[0].forces = push[1].forces = largest > 0.0;
+  // The direction's length is 1 with friction: sqrt(1 + mu^2).
+  drive_.strength_n_s += static_cast<float>(largest * std::hypot(1.0, slot.friction) * kQuantum / rate_hz_);
+  drive_.forces = drive_.forces || push[0].forces;
+}
+
+const Drive* ContactForces::begin_quantum(std::int64_t sample) noexcept {
+  if (live_ == 0) return nullptr;
+  drive_.contacts = 0;
+  drive_.forces = drive_.damps = false;
+  drive_.strength_n_s = 0.0F;
+  const double start = static_cast<double>(sample), end = start + kQuantum, rise = kQuantum / (kRiseS * rate_hz_);
+  looked_ = start;
+  for (Slot& slot : slots_) {
+    if (!slot.used) continue;
+    const bool is_new = !slot.acts;
+    Record values;
+    if (!find_values(slot, end, values)) {
+      if (slot.ended) free(slot);
+      continue;
+    }
+    const bool starves = slot.holds && !slot.ended && end > std::max(reached_, slot.from.time) + kPatienceS * rate_hz_;
+    slot.level = std::clamp(slot.level + (slot.ended || starves ? -rise : rise), 0.0, 1.0);
+    const Node to = make_node(slot, values);
+    if (is_new) {
+      slot.node = to;
+      slot.node.level = 0.0;
+      slot.node.brake = {};
+    }
+    add_push(slot, slot.node, to);
+    slot.node = to;
+    if (slot.level == 0.0 && (slot.ended || starves)) {
+      counters_.underruns += starves ? 1 : 0;
+      free(slot);
+    }
+  }
+  if (drive_.forces) calc_damped_force();
+  return drive_.forces || drive_.damps ? &drive_ : nullptr;
+}
+
+void ContactForces::calc_damped_force() noexcept {
+  for (std::size_t i = 0; i < model_->damped_.size(); ++i) {
+    float* force = &damped_force_[i * (kQuantum + 2)];
+    force[0] = force[kQuantum];  // the last sample of the quantum before
+    std::fill(force + 1, force + kQuantum + 2, 0.0F);
+    const std::size_t column = model_->sound_.size() * kGroup + i;
+    for (int c = 0; c < drive_.contacts; ++c) {
+      for (const Push& push : drive_.push[c]) {
+        double amplitude = 0.0;
+        for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(push.force[r]) * push.row[r][column];
+        amplitude *= model_->damped_[i].scale;
+        for (int n = 0; n <= kQuantum; ++n) force[n + 1] += static_cast<float>(amplitude) * push.signal[n];
+      }
+    }
+  }
+}
+
+}  // namespace carillon::synth

@@ -1,0 +1,155 @@
+// What contacts that last do to one body: forces by the roughness of both surfaces, and the damping by the other body.
+//
+//   synth::ContactForces contacts(model, {.surface = {.roughness_m = 5e-6}});
+//   voice.attach(&contacts);
+//   contacts.take(record, ground);  // as many as come, ahead of the sound
+//   voice.process(block);
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "runtime/stream/events.hpp"
+#include "runtime/synth/effects.hpp"
+#include "runtime/synth/kernels.hpp"
+#include "runtime/synth/model.hpp"
+#include "runtime/synth/texture.hpp"
+
+namespace carillon::synth {
+
+/// What a surface is like to those who touch it.
+struct Surface {
+  double roughness_m = 2e-6;  // rms height: fine machined metal, N7 of ISO 1302 (Ra 1.6 um)
+  double friction = 0.4;      // Coulomb; a contact of two takes the geometric mean
+  double modulus_pa = 0.0;    // E / (1 - nu^2); 0: that of the model's bank
+};
+
+/// The ground of scenes: concrete, smoothly trowelled.
+inline constexpr Surface kGroundSurface{.roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2)};
+
+struct ContactForcesOptions {
+  Surface surface{};
+  EffectSet effects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};  // others are not looked at
+  int max_contacts = 8;                                                              // that act at once, 1 to kMostContacts
+  int max_records = 512;                                                             // that wait for their time
+};
+
+struct ContactCounters {
+  std::int64_t accepted = 0;   // records taken
+  std::int64_t refused = 0;    // records that cannot be played (stream::find_fault, or no such triangle)
+  std::int64_t dropped = 0;    // records of contacts for which there was no place, being weaker than those there
+  std::int64_t thinned = 0;    // records that took the place of the one before, for want of room
+  std::int64_t underruns = 0;  // contacts that ended because nothing more came
+  std::int64_t samples = 0;    // of force worked out, contact by contact
+};
+
+/// The lasting contacts of one body. Between two records of a contact its values change linearly; they are looked at every kQuantum
+/// samples and go linearly between. A gap of more than 50 ms is held and changed in its last 50 ms. A contact rises and falls within 5 ms
+/// beside what its records say. When its last record, and the last mark (reach), are 20 ms old it falls as if it had ended: an underrun.
+///
+/// Force: both surfaces' heights h, read along the way of the contact over each, press the contact's spring: f = k F / (F + k p) h, with
+/// the stiffness k = 2 E* a, the load F and the largest height p that h can have, so that |f| < F: the contact never pulls. The load itself
+/// changes slowly and is left out. While one surface slides on the other (its share is slip over the larger sweep) friction follows,
+/// -mu f along the slip. What moves at less than 0.2 mm/s is at rest and gives no force at all.
+/// Damping: the impedance Z of the other body at the point takes Z (phi.n)^2 / 2 [1/s] of each mode (docs/decisions/contact-sound.md).
+///
+/// Memory is taken in the constructor only. One thread at a time.
+class ContactForces {
+ public:
+  /// Throws InputError for options out of range. [main-thread]
+  explicit ContactForces(std::shared_ptr<const Model> model, ContactForcesOptions options = {});
+
+  /// A record, with what the other body's surface is like. Times are since the first sample of the voice; `body` is not looked at beyond
+  /// its part in the seed. False when it is not played (counted). [audio-thread]: no heap, no lock, no throw.
+  bool take(const stream::Contact& contact, const Surface& other = kGroundSurface) noexcept;
+
+  /// Nothing earlier than this will come: contacts without newer records stay as they are until then. [audio-thread]
+  void reach(double time_s) noexcept;
+
+  /// From the next quantum on, without a step. [audio-thread]
+  void set_effects(EffectSet effects) noexcept { effects_ = effects; }
+
+  /// Ends all contacts, within 5 ms. [audio-thread]
+  void release() noexcept;
+
+  /// Whether nothing acts and nothing waits.
+  bool is_idle() const noexcept { return live_ == 0; }
+
+  /// Whether all that acts is at rest and nothing waits: a body without energy hears nothing of it, and may leave out begin_quantum().
+  bool is_resting() const noexcept;
+
+  /// What acts from this sample on for a quantum; nullptr: nothing. Called once a quantum, in order. [audio-thread]
+  const Drive* begin_quantum(std::int64_t sample) noexcept;
+
+  /// Sum over the mode and the contacts of phi . f [N kg^-1/2] for mode `i` of those that do not ring, at the sample before the quantum
+  /// and its kQuantum + 1 samples. After begin_quantum() gave a drive with forces.
+  const float* get_damped_force(std::size_t i) const noexcept { return &damped_force_[i * (kQuantum + 2)]; }
+
+  /// Moments of 1 - u and of u over a sample against the Chebyshev polynomials, times its length [s].
+  const std::array<Moments, 2>& get_ramp() const noexcept { return ramp_; }
+
+  const ContactCounters& get_counters() const noexcept { return counters_; }
+  std::size_t calc_bytes() const noexcept;
+
+ private:
+  /// A record as it waits; times in samples.
+  struct Record {
+    double time = 0.0;
+    double force_n = 0.0, sweep_m_s = 0.0, other_sweep_m_s = 0.0, patch_m = 1.0, impedance = 0.0;
+    stream::Vec3 normal{}, slip_m_s{}, barycentric{};
+    std::int32_t triangle = 0;
+    bool ends = false;
+    std::int32_t next = -1;
+  };
+  /// A contact at the border of two quanta.
+  struct Node {
+    Record values;
+    double level = 0.0;  // 0..1: its rise and its fall
+    double stiffness_n_m = 0.0;
+    double motion = 0.0, other_motion = 0.0;  // 0..1: whether it moves over each surface
+    double peak_m = 0.0;                      // no height is beyond it
+    Texture::Gains gains, other_gains;
+    std::array<float, kStrikeRows> force{}, brake{};
+    std::array<const std::int16_t*, kStrikeRows> row{};
+  };
+  struct Slot {
+    std::uint64_t id = 0;
+    bool used = false, acts = false, ended = false, holds = false;
+    std::int32_t head = -1, tail = -1;  // records that wait
+    Record from;
+    Record to;
+    bool has_to = false;
+    double level = 0.0;
+    double friction = 0.0, modulus_pa = 0.0;
+    Texture texture, other_texture;
+    Node node;  // at the start of the next quantum
+  };
+
+  Slot* find_place(const stream::Contact& contact) noexcept;
+  std::int32_t take_free(Slot& slot) noexcept;
+  void free(Slot& slot) noexcept;
+  bool find_values(Slot& slot, double time, Record& values) noexcept;
+  Node make_node(const Slot& slot, const Record& values) const noexcept;
+  void add_push(Slot& slot, const Node& from, const Node& to) noexcept;
+  void calc_damped_force() noexcept;
+
+  std::shared_ptr<const Model> model_;
+  Surface surface_;
+  EffectSet effects_;
+  double rate_hz_ = 0.0;
+  double reached_ = -1e300;  // sample
+  double looked_ = 0.0;      // the last border of quanta that was looked at
+  int live_ = 0;             // slots in use
+  std::vector<Slot> slots_;
+  std::vector<Record> records_;
+  std::int32_t free_ = -1;  // first record without use
+  std::vector<float> damped_force_;
+  std::array<Moments, 2> ramp_{};
+  Drive drive_{};
+  ContactCounters counters_;
+};
+
+}  // namespace carillon::synth

@@ -1,0 +1,165 @@
+// Method:     the profile is a sum of octaves. All octaves read one table at their own scale and from a random place: a sum of cosines with
+//             random phases and wavelengths in 1/2 .. 1, so that an octave has nothing outside its band. The table holds the coefficients
+//             of the cubic B-spline through that sum, with 8 points or more a wavelength (images below -67 dB), so that a height is four
+//             products and never beyond the largest coefficient. Where the contact is on the table is a fixed-point number of 64 bits:
+//             that of the next octave is the same, shifted by one.
+//             An octave that would reach beyond the Nyquist frequency fades out before.
+// Source:     B. Persson, O. Albohr, U. Tartaglino, A. Volokitin and E. Tosatti, J. Phys.: Condens. Matter 17 (2005) R1: most surfaces are
+//             self-affine with a Hurst exponent near 0.8 below a roll-off wavelength; the spectrum of a line over such a surface falls as
+//             q^-(1 + 2 H). The roll-off is the cut-off of ISO 4288:1996. A patch of radius a lets heights of wave number q through as
+//             1 / sqrt(1 + pi/4 (q a)^3): P. Remington, J. Sound Vib. 46 (1976) 419, for wheels on rails.
+// Deviations: between two cut-offs of the standard the roll-off jumps. The filter of the patch is taken at the middle of each octave.
+#include "runtime/synth/texture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+namespace carillon::synth {
+namespace {
+
+using std::numbers::pi;
+
+constexpr int kBits = 15;
+constexpr int kPoints = 1 << kBits;
+constexpr int kWaves = 2048;                      // of the longest wavelength in the table
+constexpr double kFadeFrom = 0.4, kFadeTo = 0.5;  // of the rate: where the shortest wavelength of an octave fades out
+constexpr float kLeast = 1e-4F;                   // of an octave: below, it is left out
+constexpr float kFraction = 1.0F / static_cast<float>(1U << 24);
+
+std::uint64_t scramble(std::uint64_t& state) noexcept {  // splitmix64 (Steele, Lea and Flood 2014)
+  std::uint64_t z = state += 0x9e3779b97f4a7c15U;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
+  return z ^ (z >> 31);
+}
+
+/// x[n] = sum over k of X[k] e^{2 pi i k n / N}, in place; N a power of two (Cooley and Tukey 1965).
+void transform(std::vector<std::complex<double>>& x) {
+  const std::size_t n = x.size();
+  for (std::size_t i = 1, j = 0; i < n; ++i) {
+    std::size_t bit = n >> 1;
+    for (; (j & bit) != 0; bit >>= 1) j ^= bit;
+    j ^= bit;
+    if (i < j) std::swap(x[i], x[j]);
+  }
+  for (std::size_t length = 2; length <= n; length *= 2) {
+    for (std::size_t k = 0; k < length / 2; ++k) {
+      const std::complex<double> turn = std::polar(1.0, 2.0 * pi * static_cast<double>(k) / static_cast<double>(length));
+      for (std::size_t i = k; i < n; i += length) {
+        const std::complex<double> even = x[i], odd = x[i + length / 2] * turn;
+        x[i] = even + odd;
+        x[i + length / 2] = even - odd;
+      }
+    }
+  }
+}
+
+struct Tables {
+  std::array<float, kPoints + 3> coefficient;  // the first three again at the end
+  double peak = 0.0;
+
+  Tables() {
+    std::vector<std::complex<double>> x(kPoints);
+    std::uint64_t seed = 0x0ca4111075;
+    double power = 0.0;
+    for (int k = kWaves; k < 2 * kWaves; ++k) {
+      const double amplitude = std::pow(static_cast<double>(k) / kWaves, -0.5 * (1.0 + 2.0 * Texture::kHurst));
+      const double spline = (2.0 + std::cos(2.0 * pi * k / kPoints)) / 3.0;
+      power += 0.5 * amplitude * amplitude;
+      x[static_cast<std::size_t>(k)] = std::polar(amplitude / spline, 2.0 * pi * static_cast<double>(scramble(seed) >> 11) * 0x1p-53);
+    }
+    transform(x);
+    for (int n = 0; n < kPoints + 3; ++n) {
+      const double value = x[static_cast<std::size_t>(n % kPoints)].real() / std::sqrt(power);
+      coefficient[static_cast<std::size_t>(n)] = static_cast<float>(value);
+      peak = std::max(peak, std::abs(value));
+    }
+    peak *= 1.0 + 1e-5;  // what is rounded in a height
+  }
+};
+
+const Tables& get_tables() {
+  static const Tables tables;
+  return tables;
+}
+
+/// 0 below 0, 1 above 1.
+double calc_smooth_step(double x) noexcept {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+/// Turns of the table of the longest octave, to 2^-64 of a turn.
+std::uint64_t to_place(double turns) noexcept { return static_cast<std::uint64_t>((turns - std::floor(turns)) * 0x1p64); }
+
+}  // namespace
+
+void Texture::make_tables() { get_tables(); }
+
+double Texture::get_crest() noexcept { return get_tables().peak; }
+
+double Texture::calc_cutoff_m(double roughness_m) noexcept {
+  // The standard goes by the mean deviation, sqrt(2 / pi) of the rms height where heights are normally distributed.
+  const double mean_m = std::sqrt(2.0 / pi) * roughness_m;
+  return mean_m <= 0.02e-6 ? 0.08e-3 : mean_m <= 0.1e-6 ? 0.25e-3 : mean_m <= 2e-6 ? 0.8e-3 : mean_m <= 10e-6 ? 2.5e-3 : 8e-3;
+}
+
+void Texture::start(double roughness_m, std::uint64_t seed) noexcept {
+  roughness_m_ = std::max(0.0, roughness_m);
+  cutoff_m_ = calc_cutoff_m(roughness_m_);
+  place_ = 0;
+  for (std::uint64_t& offset : offset_) offset = scramble(seed);
+}
+
+Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, double rate_hz) const noexcept {
+  static const double kShare = std::sqrt(1.0 - std::pow(2.0, -2.0 * kHurst));  // so that the squares of all octaves sum to 1
+  static const double kStep = std::pow(2.0, -kHurst);
+  Gains gains;
+  if (!(roughness_m_ > 0.0)) return gains;
+  double amplitude = kShare, longest_m = cutoff_m_, sum = 0.0;
+  for (float& height : gains.height_m) {
+    const double highest = 2.0 * std::abs(speed_m_s) / (longest_m * rate_hz);  // frequency, of the rate
+    if (highest >= kFadeTo) break;                                             // and so are all shorter ones
+    const double qa = 2.0 * pi * std::numbers::sqrt2 / longest_m * patch_radius_m;
+    double gain = 1.0 / std::sqrt(1.0 + 0.25 * pi * qa * qa * qa);
+    gain *= 1.0 - calc_smooth_step((highest - kFadeFrom) / (kFadeTo - kFadeFrom));
+    gain = std::max(0.0, (gain * amplitude - kLeast) / (1.0 - kLeast));
+    height = static_cast<float>(roughness_m_ * gain);
+    sum += static_cast<double>(height);
+    amplitude *= kStep;
+    longest_m *= 0.5;
+  }
+  gains.peak_m = sum * get_crest();
+  return gains;
+}
+
+void Texture::render(double from_m_s, double to_m_s, double rate_hz, const Gains& from, const Gains& to,
+                     std::array<float, kQuantum + 1>& height_m) noexcept {
+  const Tables& tables = get_tables();
+  height_m.fill(0.0F);
+  std::array<std::uint64_t, kQuantum + 1> place;
+  const double turns_per_m = 1.0 / (cutoff_m_ * kWaves);
+  for (int n = 0; n <= kQuantum; ++n) {
+    const double t = n, way_m = (from_m_s * t + (to_m_s - from_m_s) * t * t / (2.0 * kQuantum)) / rate_hz;
+    place[static_cast<std::size_t>(n)] = place_ + to_place(way_m * turns_per_m);
+  }
+  place_ = place.back();
+  for (std::size_t octave = 0; octave < kOctaves; ++octave) {
+    const float first = from.height_m[octave], step = (to.height_m[octave] - first) / kQuantum;
+    if (first == 0.0F && to.height_m[octave] == 0.0F) continue;
+    for (std::size_t n = 0; n <= kQuantum; ++n) {
+      const std::uint64_t at = (place[n] << octave) + offset_[octave];
+      const float* c = tables.coefficient.data() + (at >> (64 - kBits));
+      const float t = static_cast<float>(static_cast<std::int32_t>((at >> (40 - kBits)) & 0xffffff)) * kFraction;
+      const float s = 1.0F - t;
+      const float spline = c[0] * (s * s * s) + c[1] * (4.0F - 6.0F * t * t + 3.0F * t * t * t) +
+                           c[2] * (4.0F - 6.0F * s * s + 3.0F * s * s * s) + c[3] * (t * t * t);
+      height_m[n] += (first + step * static_cast<float>(n)) * spline * (1.0F / 6.0F);
+    }
+  }
+}
+
+}  // namespace carillon::synth

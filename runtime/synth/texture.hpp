@@ -1,0 +1,58 @@
+// The height of a rough surface along the path of a contact.
+//
+//   Texture texture;
+//   texture.start(2e-6, seed);
+//   const auto gains = texture.calc_gains(0.3, 40e-6, 48000.0);
+//   texture.render(0.3, 0.3, gains, gains, height);
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "runtime/synth/kernels.hpp"
+
+namespace carillon::synth {
+
+/// A self-affine profile, octave of wavelength by octave, read at the distance that the contact has gone. Nothing of it moves faster than
+/// the Nyquist frequency. Deterministic: the same roughness and seed give the same surface.
+/// make_tables() takes memory and time, once; all the rest is [audio-thread]: no heap, no lock, no throw.
+class Texture {
+ public:
+  static constexpr int kOctaves = 16;
+  static constexpr double kHurst = 0.8;
+
+  /// How much of each octave counts at one instant.
+  struct Gains {
+    std::array<float, kOctaves> height_m{};  // rms
+    double peak_m = 0.0;                     // no height is beyond it
+  };
+
+  /// Makes what all surfaces share, when it is not there yet: 128 KiB. [main-thread]
+  static void make_tables();
+  /// No height of a texture with these gains is beyond their sum times this.
+  static double get_crest() noexcept;
+
+  /// At the start of a path. roughness_m: rms height [m] of the profile as it is measured, without wavelengths beyond get_cutoff_m(); 0 or
+  /// less: smooth.
+  void start(double roughness_m, std::uint64_t seed) noexcept;
+
+  /// For a contact that goes over the surface with speed_m_s and touches it with a patch of this radius.
+  Gains calc_gains(double speed_m_s, double patch_radius_m, double rate_hz) const noexcept;
+
+  /// Heights [m] at the samples 0 to kQuantum, while speed and gains change linearly from the first to the last; the path goes on by
+  /// kQuantum samples.
+  void render(double from_m_s, double to_m_s, double rate_hz, const Gains& from, const Gains& to,
+              std::array<float, kQuantum + 1>& height_m) noexcept;
+
+  /// The longest wavelength [m] of a profile of this roughness: the cut-off with which it is measured (ISO 4288:1996, Table 1).
+  static double calc_cutoff_m(double roughness_m) noexcept;
+  double get_cutoff_m() const noexcept { return cutoff_m_; }
+
+ private:
+  double roughness_m_ = 0.0;
+  double cutoff_m_ = 1.0;
+  std::uint64_t place_ = 0;  // where on the longest octave, in 2^-64 of its table
+  std::array<std::uint64_t, kOctaves> offset_{};
+};
+
+}  // namespace carillon::synth

@@ -1,0 +1,583 @@
+// Bodies under contacts that last: against quadrature, against the dense equation of motion, and what they promise.
+#include "runtime/synth/contact_forces.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "runtime/synth/voice.hpp"
+#include "tests/synth/cube_bank.hpp"
+#include "tests/synth/quadrature.hpp"
+#include "tests/synth/reference.hpp"
+
+namespace carillon::synth {
+namespace {
+
+using std::numbers::pi;
+using stream::Contact;
+using stream::ContactState;
+using testing::InventedMode;
+using testing::make_cube_bank;
+constexpr double kRate = 48000.0;
+const Surface kOther{.roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 70e9};
+const EffectSet kNoise{Effect::kRoughness, Effect::kRolling};
+const EffectSet kBrake{Effect::kContactDamping};
+
+/// Slides flat at a speed: the other's surface only is swept.
+Contact make_sliding(double time_s, double speed_m_s, double force_n = 1.0) {
+  Contact c;
+  c.time_s = time_s;
+  c.id = 77;
+  c.barycentric = {0.2, 0.3, 0.5};
+  c.normal = {0.0, 0.0, 1.0};
+  c.slip_m_s = {speed_m_s, 0.0, 0.0};
+  c.force_n = force_n;
+  c.other_sweep_m_s = speed_m_s;
+  c.patch_radius_m = 20e-6;
+  return c;
+}
+
+/// One record every 2 ms from 0 on, the first and the last marked as such.
+std::vector<Contact> make_records(double end_s, const std::function<Contact(double)>& make) {
+  std::vector<Contact> records;
+  for (int i = 0; 2e-3 * i <= end_s; ++i) records.push_back(make(2e-3 * i));
+  records.front().state = ContactState::kBegin;
+  records.back().state = ContactState::kEnd;
+  return records;
+}
+
+/// Plays with the records given as they come due, 100 ms ahead.
+std::vector<float> play(Voice& voice, ContactForces& contacts, std::vector<Contact> records, double seconds, std::size_t block = 480,
+                        const Surface& other = kOther) {
+  std::vector<float> out(static_cast<std::size_t>(seconds * kRate), 0.0F);
+  voice.attach(&contacts);
+  std::size_t next = 0;
+  for (std::size_t n = 0; n < out.size(); n += block) {
+    while (next < records.size() && records[next].time_s < static_cast<double>(n) / kRate + 0.1) contacts.take(records[next++], other);
+    contacts.reach(static_cast<double>(n) / kRate + 0.1);
+    voice.process(std::span(out).subspan(n, std::min(block, out.size() - n)));
+  }
+  return out;
+}
+
+double calc_rms(const std::vector<float>& x, double from_s, double to_s) {
+  double sum = 0.0;
+  const auto first = static_cast<std::size_t>(from_s * kRate), last = static_cast<std::size_t>(to_s * kRate);
+  for (std::size_t n = first; n < last; ++n) sum += static_cast<double>(x[n]) * x[n];
+  return std::sqrt(sum / static_cast<double>(last - first));
+}
+
+float calc_peak(const std::vector<float>& x) {
+  float peak = 0.0F;
+  for (const float p : x) peak = std::max(peak, std::abs(p));
+  return peak;
+}
+
+/// The noise forces themselves, sample by sample, along the contact's direction.
+std::vector<double> trace(ContactForces& contacts, const std::vector<Contact>& records, double seconds, const Surface& other = kOther) {
+  std::vector<double> force;
+  std::size_t next = 0;
+  for (std::int64_t sample = 0; static_cast<double>(sample) < seconds * kRate; sample += kQuantum) {
+    while (next < records.size() && records[next].time_s < static_cast<double>(sample) / kRate + 0.1) contacts.take(records[next++], other);
+    contacts.reach(static_cast<double>(sample) / kRate + 0.1);
+    const Drive* drive = contacts.begin_quantum(sample);
+    for (int n = 0; n < kQuantum; ++n) {
+      double sum = 0.0;
+      for (int c = 0; drive != nullptr && drive->forces && c < drive->contacts; ++c) {
+        for (const Push& push : drive->push[c]) sum += static_cast<double>(push.signal[n]);
+      }
+      force.push_back(sum);
+    }
+  }
+  return force;
+}
+
+std::vector<InventedMode> make_modes() {
+  return {{120.0, 4.0, 0.7, {0.0, 0.0, 1.0}},
+          {700.0, 9.0, -0.4, {0.5, 0.0, 0.8}},
+          {5100.0, 60.0, 0.2, {0.1, 0.3, 0.6}, 0.1},
+          {17000.0, 300.0, 0.1, {0.0, 0.2, -0.7}}};
+}
+
+TEST(ContactForces, DriveTheModesAsQuadratureSays) {
+  // Force along e = n - mu s; the shape is the same at all corners but for the third mode's slope.
+  std::vector<InventedMode> modes = make_modes();
+  modes.push_back({300.0, 3000.0, 0.5, {0.2, 0.0, 1.0}});  // over-damped, too
+  const bank::Bank bank = make_cube_bank(modes);
+  const auto model = Model::make(bank);
+  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+    const auto make = [](double t) { return make_sliding(t, 0.3 + 2.0 * t); };
+    ContactForces traced(model, {.effects = kNoise}), contacts(model, {.effects = kNoise});
+    Voice voice(model, {.isa = isa});
+    const std::vector<Contact> records = make_records(0.06, make);
+    const std::vector<double> force = trace(traced, records, 0.06);
+    const std::vector<float> heard = play(voice, contacts, records, 0.06);
+    const double mu = std::sqrt(0.4 * 0.5);
+    std::vector<double> expected(heard.size());
+    for (int m = 0; m < model->get_mode_count(); ++m) {
+      const double lambda = model->get_eigenvalue_rad2_s2(m), d = model->get_decay_per_s(m);
+      // Of a force that goes linearly from 1 to 0 or from 0 to 1 within a sample, by double-exponential quadrature; then the exact step.
+      const double h = 1.0 / kRate, s2 = d * d - lambda;
+      const auto velocity = [&](double t) {
+        if (s2 < 0.0) return testing::calc_velocity(std::sqrt(lambda) / (2.0 * pi), d, t);
+        const double s = std::sqrt(s2);
+        return std::exp(-d * t) * (std::cosh(s * t) - d / s * std::sinh(s * t));
+      };
+      const auto place = [&](double t) {
+        const double w = std::sqrt(std::abs(s2));
+        return std::exp(-d * t) * (s2 < 0.0 ? std::sin(w * t) : std::sinh(w * t)) / w;
+      };
+      double q = 0.0, v = 0.0;
+      std::array<double, 2> to_q{}, to_v{};
+      for (int end = 0; end < 2; ++end) {
+        const auto share = [&](double u) { return end == 0 ? 1.0 - u : u; };
+        to_q[end] = h * testing::integrate([&](double u) { return share(u) * place((1.0 - u) * h); }, 0.0, 1.0);
+        to_v[end] = h * testing::integrate([&](double u) { return share(u) * velocity((1.0 - u) * h); }, 0.0, 1.0);
+      }
+      const bank::Vec3 along{0.2, 0.3, 0.5};
+      for (std::size_t n = 1; n < force.size(); ++n) {
+        const auto amplitude = [&](std::size_t k) {
+          const double speed = 0.3 + 2.0 * static_cast<double>(k) / kRate;
+          return force[k] * model->calc_projection(m, 0, along, {-mu * speed / (speed + 1e-3), 0.0, 1.0});
+        };
+        const double a = amplitude(n - 1), b = amplitude(n), q0 = q, v0 = v;
+        const double vq = -lambda * place(h), vv = velocity(h), qq = velocity(h) + 2.0 * d * place(h), qv = place(h);
+        q = qq * q0 + qv * v0 + a * to_q[0] + b * to_q[1];
+        v = vq * q0 + vv * v0 + a * to_v[0] + b * to_v[1];
+        expected[n] += model->get_gain(m) * v;
+      }
+    }
+    double peak = 0.0;
+    for (const double x : expected) peak = std::max(peak, std::abs(x));
+    ASSERT_GT(peak, 0.0);
+    for (std::size_t n = 0; n < heard.size(); ++n) ASSERT_NEAR(heard[n], expected[n], 2e-5 * peak) << n << ", " << get_name(isa);
+  }
+}
+
+TEST(ContactForces, NeverPullAndLeaveTheLoadItselfOut) {
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  for (const double load : {1e-4, 0.1, 10.0, 1e4}) {
+    for (const double roughness : {1e-8, 1e-6, 1e-4}) {
+      ContactForces contacts(model, {.surface = {.roughness_m = roughness, .modulus_pa = 200e9}});
+      std::vector<Contact> records = make_records(1.0, [&](double t) {
+        Contact c = make_sliding(t, 0.5 * std::abs(std::sin(20.0 * t)), load * (1.0 + 0.9 * std::cos(170.0 * t)));
+        c.sweep_m_s = 0.2;
+        c.patch_radius_m = 1e-5 * (1.2 + std::sin(300.0 * t));
+        return c;
+      });
+      double sum = 0.0, square = 0.0;
+      const std::vector<double> force = trace(contacts, records, 1.0, {.roughness_m = roughness, .friction = 0.5, .modulus_pa = 200e9});
+      for (std::size_t n = 0; n < force.size(); ++n) {
+        const double t = static_cast<double>(n) / kRate;
+        // Values at the border of two quanta are on the line between records 2 ms apart; in between, on the line between borders.
+        const double slack = load * 0.9 * 170.0 * 170.0 * (2e-3 * 2e-3 + 1e-3 * 1e-3) / 8.0;
+        ASSERT_LT(std::abs(force[n]), load * (1.0 + 0.9 * std::cos(170.0 * t)) + slack) << t;
+        sum += force[n], square += force[n] * force[n];
+      }
+      EXPECT_LT(std::abs(sum) / static_cast<double>(force.size()), 0.05 * load);
+      EXPECT_GT(square, 0.0);
+    }
+  }
+}
+
+TEST(ContactForces, OfARestingBodyAreBitExactSilence) {
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  for (const double slow : {0.0, 1.9e-4}) {
+    ContactForces contacts(model);
+    Voice voice(model);
+    const std::vector<float> heard = play(voice, contacts,
+                                          make_records(1.0,
+                                                       [&](double t) {
+                                                         Contact c = make_sliding(t, slow, 1.0 + 0.5 * std::sin(900.0 * t));
+                                                         c.sweep_m_s = slow;
+                                                         c.impedance_n_s_m = 3.0;
+                                                         return c;
+                                                       }),
+                                          1.2);
+    for (const float p : heard) ASSERT_EQ(std::signbit(p) ? 1.0F : p, 0.0F);
+    EXPECT_FALSE(voice.is_awake());
+    EXPECT_GT(contacts.get_counters().accepted, 400);
+    EXPECT_TRUE(voice.is_idle());
+    EXPECT_EQ(contacts.get_counters().samples, 0) << "no noise is worked out";
+  }
+}
+
+TEST(ContactForces, OfABoxThatSlidesFlatAreTheFloorsTexture) {
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  const std::vector<Contact> records = make_records(0.3, [](double t) { return make_sliding(t, 0.4); });
+  const auto hear = [&](double own_m, double other_m) {
+    ContactForces contacts(model, {.surface = {.roughness_m = own_m, .modulus_pa = 70e9}});
+    Voice voice(model);
+    return play(voice, contacts, records, 0.3, 480, {.roughness_m = other_m, .friction = 0.5, .modulus_pa = 70e9});
+  };
+  const std::vector<float> heard = hear(1e-6, 3e-6);
+  EXPECT_GT(calc_peak(heard), 0.0F);
+  EXPECT_EQ(hear(50e-6, 3e-6), heard) << "its own surface is not swept";
+  EXPECT_EQ(calc_peak(hear(1e-6, 0.0)), 0.0F) << "a smooth floor makes no sound";
+  EXPECT_NE(hear(1e-6, 4e-6), heard);
+}
+
+TEST(ContactForces, AreSwitchedByTheirEffects) {
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  const auto hear = [&](EffectSet effects, bool rolls) {
+    ContactForces contacts(model, {.effects = effects});
+    Voice voice(model);
+    return calc_peak(play(voice, contacts,
+                          make_records(0.2,
+                                       [&](double t) {
+                                         Contact c = make_sliding(t, 0.4);
+                                         c.sweep_m_s = 0.4;
+                                         if (rolls) c.slip_m_s = {};
+                                         return c;
+                                       }),
+                          0.2));
+  };
+  EXPECT_GT(hear({Effect::kRoughness}, false), 0.0F);
+  EXPECT_EQ(hear({Effect::kRoughness}, true), 0.0F);
+  EXPECT_EQ(hear({Effect::kRolling}, false), 0.0F);
+  EXPECT_GT(hear({Effect::kRolling}, true), 0.0F);
+  EXPECT_EQ(hear(kBrake, false), 0.0F);
+  // Half way: switched off while it plays, within a quantum and without a step that can be heard.
+  ContactForces contacts(model, {.effects = kNoise});
+  const std::vector<Contact> records = make_records(0.4, [](double t) { return make_sliding(t, 0.4); });
+  for (const Contact& record : records) contacts.take(record, kOther);
+  contacts.begin_quantum(0);
+  EXPECT_NE(contacts.begin_quantum(32), nullptr);
+  contacts.set_effects({});
+  contacts.begin_quantum(64);
+  EXPECT_EQ(contacts.begin_quantum(96), nullptr);
+}
+
+/// Output of the modes on a force of this spectrum: power at each mode by its bandwidth.
+TEST(ContactForces, SoundInABandThatFollowsTheSpeed) {
+  // Many modes of equal shape; each hears the force's spectrum at its own frequency: power ~ S(f) gain^2 / (2 d) for a narrow mode.
+  std::vector<InventedMode> modes;
+  for (int m = 0; m < 12; ++m) modes.push_back({250.0 * std::pow(2.0, 0.5 * m), 60.0, 1.0});
+  const auto spectrum = [](double freq_hz, double speed_m_s) {  // of the heights, m^2 / Hz; cut-off 0.8 mm
+    const double low = speed_m_s / 0.8e-3;
+    return freq_hz < low ? 0.0 : 1.6 / low * std::pow(freq_hz / low, -2.6);
+  };
+  for (const double speed : {0.15, 0.3, 0.6}) {
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      const double freq = modes[m].freq_hz, low = speed / 0.8e-3;
+      if (freq < 1.5 * low || freq > 0.19 * kRate) continue;
+      const auto model = Model::make(make_cube_bank({modes[m]}));
+      ContactForces contacts(model, {.effects = {Effect::kRolling}});
+      Voice voice(model);
+      const std::vector<float> heard = play(voice, contacts,
+                                            make_records(2.0,
+                                                         [&](double t) {
+                                                           Contact c = make_sliding(t, speed);
+                                                           c.slip_m_s = {};
+                                                           c.patch_radius_m = 1e-7;  // blunts nothing
+                                                           c.force_n = 1e3;          // the spring, not the load, is what limits
+                                                           return c;
+                                                         }),
+                                            2.0);
+      // E[q'^2] = pi S_omega / (2 d) two-sided = S_f / (8 d) with S_f one-sided (Crandall and Mark 1963, 2.2).
+      const double modulus = 1.0 / (1.0 / 70e9 + 1.0 / model->get_plane_strain_modulus_pa());
+      const double stiffness = 2.0 * modulus * 1e-7;
+      const double expected = stiffness * 2e-6 * std::sqrt(spectrum(freq, speed) / (8.0 * 60.0));
+      EXPECT_NEAR(20.0 * std::log10(calc_rms(heard, 0.2, 1.9) / expected), 0.0, 2.0) << freq << " Hz, " << speed << " m/s";
+    }
+  }
+}
+
+/// q'' + 2 D q' + Lambda q + Z(t) phi phi^T q' = 0, by Runge and Kutta's fourth order.
+double calc_dense_energy(const std::vector<InventedMode>& modes, const std::vector<double>& phi, double impulse,
+                         const std::function<double(double)>& impedance, double seconds) {
+  const std::size_t n = modes.size();
+  std::vector<double> state(2 * n);
+  for (std::size_t m = 0; m < n; ++m) state[n + m] = impulse * phi[m];
+  const auto slope = [&](const std::vector<double>& s, double t) {
+    std::vector<double> out(2 * n);
+    double along = 0.0;
+    for (std::size_t m = 0; m < n; ++m) along += phi[m] * s[n + m];
+    for (std::size_t m = 0; m < n; ++m) {
+      const double omega = 2.0 * pi * modes[m].freq_hz;
+      out[m] = s[n + m];
+      out[n + m] = -omega * omega * s[m] - 2.0 * modes[m].decay_per_s * s[n + m] - impedance(t) * phi[m] * along;
+    }
+    return out;
+  };
+  const int steps = static_cast<int>(seconds * 400000.0);
+  const double h = seconds / steps;
+  std::vector<double> other(2 * n);
+  for (int i = 0; i < steps; ++i) {
+    const double t = i * h;
+    const auto go = [&](const std::vector<double>& k, double share) {
+      for (std::size_t j = 0; j < state.size(); ++j) other[j] = state[j] + share * h * k[j];
+      return other;
+    };
+    const auto k1 = slope(state, t), k2 = slope(go(k1, 0.5), t + 0.5 * h), k3 = slope(go(k2, 0.5), t + 0.5 * h),
+               k4 = slope(go(k3, 1.0), t + h);
+    for (std::size_t j = 0; j < state.size(); ++j) state[j] += h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]);
+  }
+  double energy = 0.0;
+  for (std::size_t m = 0; m < n; ++m) {
+    const double omega = 2.0 * pi * modes[m].freq_hz;
+    energy += 0.5 * (state[n + m] * state[n + m] + omega * omega * state[m] * state[m]);
+  }
+  return energy;
+}
+
+TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
+  const std::vector<InventedMode> modes{{310.0, 1.0, 1.0, {0.0, 0.0, 0.9}},
+                                        {870.0, 2.0, 1.0, {0.0, 0.0, -0.6}},
+                                        {2100.0, 3.0, 1.0, {0.0, 0.0, 1.1}},
+                                        {6300.0, 5.0, 1.0, {0.0, 0.0, 0.4}}};
+  const auto model = Model::make(make_cube_bank(modes));
+  for (const double impedance : {0.5, 5.0, 40.0}) {
+    ContactForces contacts(model, {.effects = kBrake});
+    Voice voice(model);
+    voice.strike({.time_s = 1e-9, .impulse_n_s = {0.0, 0.0, 1e-3}});
+    play(voice, contacts,
+         make_records(0.2,
+                      [&](double t) {
+                        Contact c = make_sliding(t, 0.0);
+                        c.impedance_n_s_m = impedance * (1.0 + 0.5 * std::sin(40.0 * t));
+                        return c;
+                      }),
+         0.064);
+    const double exact = calc_dense_energy(
+        modes, {0.9, -0.6, 1.1, 0.4}, 1e-3,
+        [&](double t) { return impedance * (1.0 + 0.5 * std::sin(40.0 * t)) * std::min(1.0, t / 5e-3); }, 0.064);
+    const double free = calc_dense_energy(
+        modes, {0.9, -0.6, 1.1, 0.4}, 1e-3, [](double) { return 0.0; }, 0.064);
+    EXPECT_LT(exact, 0.98 * free) << "it matters";
+    // The loss in nepers agrees to 2 %: modes far apart do not hear of each other.
+    EXPECT_NEAR(std::log(free / voice.calc_energy_j()), std::log(free / exact), 0.02 * std::log(free / exact)) << impedance;
+  }
+}
+
+TEST(ContactForces, NeverAddEnergyByDamping) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> any(0.0, 1.0);
+  for (int trial = 0; trial < 40; ++trial) {
+    std::vector<InventedMode> modes;
+    const int count = 1 + static_cast<int>(40.0 * any(random));
+    for (int m = 0; m < count; ++m) {
+      modes.push_back(
+          {30.0 * std::pow(780.0, any(random)), 0.1 + 3.0 * any(random), 1.0, {any(random) - 0.5, any(random) - 0.5, any(random)}, 0.3});
+    }
+    std::sort(modes.begin(), modes.end(), [](const auto& a, const auto& b) { return a.freq_hz < b.freq_hz; });
+    const auto model = Model::make(make_cube_bank(modes));
+    ContactForces contacts(model, {.effects = kBrake});
+    Voice voice(model, {.isa = trial % 2 == 0 ? Isa::kBest : Isa::kPlain});
+    voice.attach(&contacts);
+    voice.strike({.time_s = 1e-9, .triangle = trial % 12, .impulse_n_s = {0.3, 0.2, 1.0}});
+    const double size = std::pow(10.0, 8.0 * any(random) - 3.0);
+    for (std::uint64_t id = 0; id < 1 + static_cast<std::uint64_t>(trial % 4); ++id) {
+      const double begin = 0.1 * any(random), end = begin + 0.3 * any(random);
+      for (double t = begin; t <= end; t += 1e-3) {
+        Contact c = make_sliding(t, 0.0);
+        c.id = id;
+        c.triangle = static_cast<std::int32_t>(12.0 * any(random));
+        c.state = t == begin ? ContactState::kBegin : t + 1e-3 > end ? ContactState::kEnd : ContactState::kHold;
+        c.impedance_n_s_m = size * any(random);
+        const double angle = 6.28 * any(random);
+        c.normal = {std::cos(angle), 0.0, std::sin(angle)};
+        contacts.take(c, kOther);
+      }
+    }
+    std::vector<float> out(kPeriod, 0.0F);
+    voice.process(out);
+    double energy = voice.calc_energy_j();
+    for (int period = 1; period < 250; ++period) {
+      std::fill(out.begin(), out.end(), 0.0F);
+      voice.process(out);
+      const double now = voice.calc_energy_j();
+      ASSERT_LE(now, energy) << "trial " << trial << ", period " << period;
+      energy = now;
+    }
+    EXPECT_TRUE(contacts.is_idle());
+  }
+}
+
+TEST(ContactForces, LeaveTheRingingExactWhenTheyHaveGone) {
+  const double freq = 987.6, decay = 1.5, gain = 2.0;
+  const auto model = Model::make(make_cube_bank({{freq, decay, gain}}));
+  ContactForces contacts(model, {.effects = kBrake});
+  Voice voice(model);
+  voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1e-2}});
+  const std::vector<float> heard = play(voice, contacts,
+                                        make_records(0.5,
+                                                     [](double t) {
+                                                       Contact c = make_sliding(t, 0.0);
+                                                       c.impedance_n_s_m = 5.0 + 3.0 * std::sin(50.0 * t);
+                                                       return c;
+                                                     }),
+                                        4.0);
+  EXPECT_LT(calc_rms(heard, 0.55, 0.65), 0.6 * calc_rms(heard, 0.01, 0.02));
+  // a cos + b sin of the damped frequency, fitted in one place, holds in all others; pitch 1 and pitch while damped are the same.
+  const double omega = std::sqrt(std::pow(2.0 * pi * freq, 2.0) - decay * decay);
+  const auto fit = [&](double at_s) {
+    double cc = 0.0, cs = 0.0, ss = 0.0, yc = 0.0, ys = 0.0;
+    for (auto n = static_cast<std::size_t>(at_s * kRate); static_cast<double>(n) < (at_s + 0.05) * kRate; ++n) {
+      const double t = static_cast<double>(n) / kRate, e = std::exp(-decay * t), c = e * std::cos(omega * t), s = e * std::sin(omega * t);
+      cc += c * c, cs += c * s, ss += s * s, yc += c * static_cast<double>(heard[n]), ys += s * static_cast<double>(heard[n]);
+    }
+    const double det = cc * ss - cs * cs;
+    return std::array<double, 2>{(yc * ss - ys * cs) / det, (ys * cc - yc * cs) / det};
+  };
+  const auto first = fit(0.52), last = fit(3.9), before = fit(1e-3);
+  const double size = std::hypot(first[0], first[1]);
+  EXPECT_NEAR(last[0], first[0], 1e-5 * size);
+  EXPECT_NEAR(last[1], first[1], 1e-5 * size);
+  EXPECT_NEAR(std::remainder(std::atan2(first[1], first[0]) - std::atan2(before[1], before[0]), 2.0 * pi), 0.0, 2e-2)
+      << "the damping turns nothing";
+}
+
+TEST(ContactForces, DampWithoutZipperNoise) {
+  // A pure tone under a contact that comes, changes at every record, and goes: what is far from the tone stays far below it.
+  const auto model = Model::make(make_cube_bank({{500.0, 0.5, 1.0}}));
+  ContactForces contacts(model, {.effects = kBrake});
+  Voice voice(model);
+  voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1e-2}});
+  std::mt19937 random(3);
+  const std::vector<float> heard =
+      play(voice, contacts,
+           make_records(0.6,
+                        [&](double t) {
+                          Contact c = make_sliding(t, 0.0);
+                          c.impedance_n_s_m = 20.0 + 10.0 * std::sin(60.0 * t) + 4.0 * static_cast<double>(random()) / 4294967296.0;
+                          return c;
+                        }),
+           0.8);
+  // Second differences take the tone down by (omega / rate)^2 each; four of them leave a step of 1 at its full size.
+  double worst = 0.0, tone = 0.0;
+  for (std::size_t n = 2000; n + 4 < heard.size(); ++n) {
+    const double fourth = static_cast<double>(heard[n]) - 4.0 * heard[n + 1] + 6.0 * heard[n + 2] - 4.0 * heard[n + 3] + heard[n + 4];
+    worst = std::max(worst, std::abs(fourth) / calc_rms(heard, 0.04, 0.05));
+    tone = std::max(tone, std::abs(static_cast<double>(heard[n])) / calc_rms(heard, 0.04, 0.05));
+  }
+  const double smooth = std::pow(2.0 * std::sin(0.5 * 2.0 * pi * 500.0 / kRate), 4.0) * tone;
+  EXPECT_LT(worst, 1.5 * smooth + 1e-5) << "steps are below -100 dB of the tone";
+}
+
+TEST(ContactForces, GiveTheSameBitsWhateverTheBlocks) {
+  std::vector<InventedMode> modes = testing::make_many_modes(70);
+  modes.push_back({23500.0, 200000.0});
+  const auto model = Model::make(make_cube_bank(modes));
+  const std::vector<Contact> records = make_records(0.4, [](double t) {
+    Contact c = make_sliding(t, 1.0 - 2.4 * t > 0.0 ? 1.0 - 2.4 * t : 0.0);
+    c.sweep_m_s = 0.3 * c.other_sweep_m_s;
+    c.triangle = static_cast<std::int32_t>(30.0 * t);
+    c.impedance_n_s_m = 2.0;
+    return c;
+  });
+  std::vector<std::vector<float>> heard;
+  for (const std::size_t block : {1, 31, 32, 100, 128, 511, 4096}) {
+    ContactForces contacts(model);
+    Voice voice(model);
+    for (const Contact& record : records) contacts.take(record, kOther);
+    contacts.reach(1.0);
+    voice.strike({.time_s = 0.0501, .triangle = 3, .impulse_n_s = {0.0, 0.0, 1e-2}, .duration_s = 1e-3});
+    voice.attach(&contacts);
+    std::vector<float> out(24000, 0.0F);
+    for (std::size_t n = 0; n < out.size(); n += block) voice.process(std::span(out).subspan(n, std::min(block, out.size() - n)));
+    heard.push_back(out);
+  }
+  for (const std::vector<float>& out : heard) ASSERT_EQ(std::memcmp(out.data(), heard[0].data(), out.size() * sizeof(float)), 0);
+  EXPECT_GT(calc_peak(heard[0]), 0.0F);
+}
+
+TEST(ContactForces, FadeWhenTheStreamStopsAndComeBackWhenItGoesOn) {
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  ContactForces contacts(model, {.effects = kNoise});
+  const auto peak_of = [&](std::int64_t sample) {
+    const Drive* drive = contacts.begin_quantum(sample);
+    float peak = 0.0F;
+    for (int n = 0; drive != nullptr && n <= kQuantum; ++n) {
+      peak = std::max(peak, std::abs(drive->push[0][0].signal[n] + drive->push[0][1].signal[n]));
+    }
+    return peak;
+  };
+  Contact c = make_sliding(0.0, 0.4);
+  c.state = ContactState::kBegin;
+  contacts.take(c, kOther);
+  c.state = ContactState::kHold;
+  std::int64_t sample = 0;
+  contacts.reach(0.5);  // physics runs, and has nothing new to say
+  for (; sample < 0.5 * kRate; sample += kQuantum) peak_of(sample);
+  EXPECT_GT(peak_of(sample), 0.0F);
+  EXPECT_EQ(contacts.get_counters().underruns, 0);
+  for (sample += kQuantum; sample < 0.53 * kRate; sample += kQuantum) peak_of(sample);
+  EXPECT_EQ(contacts.get_counters().underruns, 1);
+  EXPECT_TRUE(contacts.is_idle());
+  c.time_s = 0.6;
+  contacts.take(c, kOther);
+  contacts.reach(0.7);
+  for (; sample < 0.65 * kRate; sample += kQuantum) peak_of(sample);
+  EXPECT_GT(peak_of(sample), 0.0F);
+  contacts.release();
+  for (sample += kQuantum; sample < 0.66 * kRate; sample += kQuantum) peak_of(sample);
+  EXPECT_TRUE(contacts.is_idle());
+}
+
+TEST(ContactForces, KeepTheStrongestWhenThereAreTooMany) {
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  ContactForces contacts(model, {.max_contacts = 2, .max_records = 4});
+  for (std::uint64_t id = 0; id < 3; ++id) {
+    Contact c = make_sliding(0.0, 0.3, 1.0 + static_cast<double>(id));
+    c.id = id;
+    EXPECT_EQ(contacts.take(c, kOther), id < 2);
+  }
+  EXPECT_EQ(contacts.get_counters().dropped, 1);
+  Contact strong = make_sliding(0.001, 0.3, 50.0);
+  strong.id = 9;
+  EXPECT_FALSE(contacts.take(strong, kOther)) << "the weakest has to go first";
+  std::int64_t sample = 0;
+  for (; sample < 480; sample += kQuantum) contacts.begin_quantum(sample);
+  strong.time_s = 0.011;
+  EXPECT_TRUE(contacts.take(strong, kOther));
+  // Four records at most wait; the newest takes the place of the one before.
+  for (int i = 0; i < 10; ++i) {
+    strong.time_s += 0.001;
+    EXPECT_TRUE(contacts.take(strong, kOther));
+  }
+  EXPECT_GT(contacts.get_counters().thinned, 3);
+  Contact bad = strong;
+  bad.triangle = 12;
+  EXPECT_FALSE(contacts.take(bad, kOther));
+  bad = strong;
+  bad.force_n = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(contacts.take(bad, kOther));
+  EXPECT_EQ(contacts.get_counters().refused, 2);
+  EXPECT_THROW(ContactForces(model, {.max_contacts = kMostContacts + 1}), InputError);
+  EXPECT_THROW(ContactForces(model, {.surface = {.roughness_m = -1.0}}), InputError);
+}
+
+TEST(ContactForces, OfBothBodiesReadTheSameTwoSurfaces) {
+  // Body 4 on body 6: each hears its own surface and the other's, and both are the same two.
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  const auto hear = [&](bool first) {
+    const Surface a{.roughness_m = 1e-6, .modulus_pa = 70e9}, b{.roughness_m = 3e-6, .modulus_pa = 200e9};
+    ContactForces contacts(model, {.surface = first ? a : b, .effects = {Effect::kRolling}});
+    return trace(contacts,
+                 make_records(0.1,
+                              [&](double t) {
+                                Contact c = make_sliding(t, 0.0);
+                                c.body = first ? 4 : 6;
+                                c.other = first ? 6 : 4;
+                                c.sweep_m_s = first ? 0.3 : 0.5;
+                                c.other_sweep_m_s = first ? 0.5 : 0.3;
+                                return c;
+                              }),
+                 0.1, first ? b : a);
+  };
+  const std::vector<double> x = hear(true), y = hear(false);
+  ASSERT_EQ(x.size(), y.size());
+  for (std::size_t n = 0; n < x.size(); ++n) ASSERT_NEAR(x[n], y[n], 1e-6) << "action is reaction";
+}
+
+}  // namespace
+}  // namespace carillon::synth
