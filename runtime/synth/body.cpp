@@ -84,28 +84,32 @@ Body::Body(std::shared_ptr<const Model> model, BodyFrame frame, const Vec3& posi
   track_.push({.position_m = position_m});
 }
 
-void Body::check(EffectSet effects) const {
+void Body::check(EffectSet effects, const Model& model) {
   check_compiled(effects);
   if (!effects.has(Effect::kAccelerationNoise)) return;
-  if (!(model_->get_sphere_radius_m() > 0.0 && model_->get_mass_kg() > 0.0))
+  if (!(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
     throw InputError("acceleration_noise needs a body with a mass and a volume; the bank of this one gives none");
 }
 
-std::unique_ptr<BodyChange> Body::make_change(EffectSet from, EffectSet to) const {
-  check(to);
+std::unique_ptr<BodyChange> Body::make_change(EffectSet from, EffectSet to, std::shared_ptr<const Model> model) {
+  check(to, *model);
   auto change = std::make_unique<BodyChange>();
   change->effects = to;
-  if (to.has(Effect::kModal) && !from.has(Effect::kModal)) {
-    change->voice = std::make_unique<Voice>(
-        model_, VoiceOptions{.max_strikes = frame_.max_strikes, .silence_pa = frame_.silence_pa, .isa = frame_.isa});
+  change->inherits = model != model_;
+  const auto lacks = [&](Effect effect) { return to.has(effect) && (change->inherits || !from.has(effect)); };
+  if (lacks(Effect::kModal)) {
+    change->voice =
+        std::make_unique<Voice>(model, VoiceOptions{.max_strikes = frame_.max_strikes, .silence_pa = frame_.silence_pa, .isa = frame_.isa});
+    if (change->inherits && from.has(Effect::kModal)) change->succession = std::make_unique<Succession>(*model_, *model);
   }
-  if (to.has(Effect::kAccelerationNoise) && !from.has(Effect::kAccelerationNoise)) {
+  if (lacks(Effect::kAccelerationNoise)) {
     change->clicker =
-        std::make_unique<Clicker>(Clicker{Click(model_->get_sphere_radius_m(), model_->get_mass_kg(), frame_.rate_hz, frame_.max_strikes),
+        std::make_unique<Clicker>(Clicker{Click(model->get_sphere_radius_m(), model->get_mass_kg(), frame_.rate_hz, frame_.max_strikes),
                                           Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
   }
   const bool sounds = to.has(Effect::kModal) || to.has(Effect::kAccelerationNoise);
   if (to.common(kOfTheAir) != from.common(kOfTheAir) && sounds) change->air = make_air(to, frame_);
+  model_ = std::move(model);
   return change;
 }
 
@@ -115,13 +119,23 @@ void Body::apply(BodyChange& change, const Track& listener, std::int64_t sample)
   change_ = &change;
   effects_ = change.effects;
   if (change.voice) {
+    if (voice_ && change.succession)
+      change.voice->take_over(*voice_, *change.succession);
+    else
+      first_ = sample;
     std::swap(voice_, change.voice);
-    first_ = sample;
   }
   if (change.clicker) {
-    std::swap(clicker_, change.clicker);
-    clicker_->first = sample;
-    clicker_->attitude.push(turned_s_, rotation_);
+    if (clicker_ && change.inherits) {
+      change.clicker->click.take_over(clicker_->click);
+      std::swap(change.clicker->attitude, clicker_->attitude);
+      change.clicker->first = clicker_->first;
+      std::swap(clicker_, change.clicker);
+    } else {
+      std::swap(clicker_, change.clicker);
+      clicker_->first = sample;
+      clicker_->attitude.push(turned_s_, rotation_);
+    }
   }
   if (!change.air) return;
   std::swap(next_air_, change.air);

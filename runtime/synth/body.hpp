@@ -59,6 +59,8 @@ struct BodyChange {
   std::unique_ptr<Voice> voice;
   std::unique_ptr<Clicker> clicker;
   std::unique_ptr<Air> air;
+  bool inherits = false;                   // voice and clicker go on in place of those there
+  std::unique_ptr<Succession> succession;  // for the voice
 
   EffectBytes calc_bytes() const;
 };
@@ -87,10 +89,13 @@ class Body {
   /// Without any effects: apply() brings them. Takes memory for its way. [main-thread]
   Body(std::shared_ptr<const Model> model, BodyFrame frame, const Vec3& position_m, const stream::Quaternion& rotation);
 
-  /// The modules that a body of effects `from` lacks for `to`. Throws as check() does. [main-thread]
-  std::unique_ptr<BodyChange> make_change(EffectSet from, EffectSet to) const;
-  /// Throws InputError for effects that this build or this body cannot have. [main-thread]
-  void check(EffectSet effects) const;
+  /// The modules that a body of effects `from` lacks for `to`, and with another model those that take the place of all that know the old
+  /// one; `model` is what the body has from then on. Throws as check() does. [main-thread]
+  std::unique_ptr<BodyChange> make_change(EffectSet from, EffectSet to, std::shared_ptr<const Model> model);
+  std::unique_ptr<BodyChange> make_change(EffectSet from, EffectSet to) { return make_change(from, to, model_); }
+  /// Throws InputError for effects that this build or a body of this model cannot have. [main-thread]
+  static void check(EffectSet effects, const Model& model);
+  void check(EffectSet effects) const { check(effects, *model_); }
 
   /// All that follows: [audio-thread], no heap, no lock, no throw.
 
@@ -122,7 +127,7 @@ class Body {
             TickFunction ticks) noexcept;
   bool is_filled(const Air& air, const Track& listener, std::int64_t sample) const noexcept;
 
-  std::shared_ptr<const Model> model_;
+  std::shared_ptr<const Model> model_;  // the main thread's
   BodyFrame frame_;
   Track track_;
   double turned_s_ = 0.0;  // of rotation_

@@ -68,6 +68,20 @@ bool Click::strike(const stream::Impulse& impulse, const stream::Quaternion& to_
   return true;
 }
 
+void Click::take_over(const Click& other) noexcept {
+  position_ = other.position_;
+  refused_ = other.refused_;
+  awake_ = other.awake_;
+  for (std::size_t axis = 0; axis < 3; ++axis) state_[axis] = other.state_[axis] * (other.gain_ / gain_);
+  pulses_.clear();
+  for (const Pulse& pulse : other.pulses_) {
+    if (pulses_.size() < pulses_.capacity())
+      pulses_.push_back(pulse);
+    else
+      ++refused_;
+  }
+}
+
 /// What one pulse of unit impulse adds to the state over the sample at position_.
 Click::Complex Click::calc_answer(const Pulse& pulse) const noexcept {
   const double begin = pulse.begin - static_cast<double>(position_ - 1);  // the interval of sample n is (n - 1, n]

@@ -84,11 +84,15 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
 
 Synthesiser::~Synthesiser() = default;
 
-int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings& settings) {
+void Synthesiser::check_model(const Model* model) const {
   if (model == nullptr) throw InputError("a body needs a model");
   if (model->get_rate_hz() != options_.rate_hz)
     throw InputError("the model is made for " + std::to_string(model->get_rate_hz()) + " Hz, the synthesiser runs at " +
                      std::to_string(options_.rate_hz) + " Hz");
+}
+
+int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings& settings) {
+  check_model(model.get());
   if (stream::find_fault(stream::Motion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
     throw InputError("a body must be at a finite place, turned by a unit quaternion");
   if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0)
@@ -117,6 +121,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   published.peak_pa.store(0.0F, std::memory_order_relaxed);
   *free = Owned{.body = std::move(body),
                 .change = std::move(change),
+                .wanted_model = nullptr,
                 .effects = settings.effects,
                 .wanted = settings.effects,
                 .bytes = {},
@@ -138,8 +143,20 @@ void Synthesiser::set_effects(int body, EffectSet effects) {
   collect();
   Owned& owned = find_owned(body);
   // Refused here, whether it has to wait or not.
-  owned.body->check(effects);
+  if (owned.wanted_model != nullptr)
+    Body::check(effects, *owned.wanted_model);
+  else
+    owned.body->check(effects);
   owned.wanted = effects;
+  send_change(body);
+}
+
+void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
+  check_model(model.get());
+  collect();
+  Owned& owned = find_owned(body);
+  Body::check(owned.wanted, *model);
+  owned.wanted_model = std::move(model);
   send_change(body);
 }
 
@@ -148,8 +165,10 @@ EffectSet Synthesiser::get_effects(int body) const { return const_cast<Synthesis
 /// Makes the change to what is wanted, unless an earlier one is on its way.
 void Synthesiser::send_change(int number) {
   Owned& owned = owned_[static_cast<std::size_t>(number)];
-  if (owned.change != nullptr || owned.is_leaving || owned.wanted == owned.effects) return;
-  owned.change = owned.body->make_change(owned.effects, owned.wanted);
+  if (owned.change != nullptr || owned.is_leaving || (owned.wanted == owned.effects && owned.wanted_model == nullptr)) return;
+  owned.change = owned.wanted_model == nullptr ? owned.body->make_change(owned.effects, owned.wanted)
+                                               : owned.body->make_change(owned.effects, owned.wanted, owned.wanted_model);
+  owned.wanted_model.reset();
   owned.effects = owned.wanted;
   const EffectBytes more = owned.change->calc_bytes();
   for (int e = 0; e < kEffectCount; ++e) owned.bytes[static_cast<Effect>(e)] += more[static_cast<Effect>(e)];

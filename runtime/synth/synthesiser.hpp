@@ -96,6 +96,14 @@ class Synthesiser {
   /// [main-thread]
   void set_effects(int body, EffectSet effects);
 
+  /// The body goes on ringing as another, of the same shape: an edit of its bank (bank::calc_edited) or the same bank with other gains.
+  /// Modes of the same number in the bank are the same: each keeps its energy and its phase and goes on at its new frequency and decay, the
+  /// sound going over within a period; modes that only one of the two has begin at rest or fade. Strikes under way act on the new
+  /// model. Takes memory here; that of the old model and its voice is given back by collect() once the audio thread has let go. One that
+  /// comes before the last has been taken waits for it, and of those that wait only the last is played. Throws InputError for a body that
+  /// is not there, for a model of another rate, and for one that cannot have the body's effects. [main-thread]
+  void swap_model(int body, std::shared_ptr<const Model> model);
+
   /// What was asked for last. Throws InputError when there is no such body. [main-thread]
   EffectSet get_effects(int body) const;
 
@@ -153,8 +161,9 @@ class Synthesiser {
   /// A body as the main thread sees it.
   struct Owned {
     std::unique_ptr<Body> body;
-    std::unique_ptr<BodyChange> change;  // on its way
-    EffectSet effects, wanted;           // with that change; after those that wait
+    std::unique_ptr<BodyChange> change;         // on its way
+    std::shared_ptr<const Model> wanted_model;  // that waits; nullptr: none
+    EffectSet effects, wanted;                  // with that change; after those that wait
     EffectBytes bytes;
     bool is_leaving = false;
   };
@@ -166,6 +175,7 @@ class Synthesiser {
   template <typename T>
   class Pipe;
 
+  void check_model(const Model* model) const;
   Owned& find_owned(int body);
   void send_change(int number);
   void publish_bytes(int number);

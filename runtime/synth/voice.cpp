@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "runtime/config/error.hpp"
 #include "runtime/synth/fp_guard.hpp"
@@ -54,16 +55,23 @@ bool Voice::strike(const stream::Impulse& impulse) noexcept {
     ++counters_.late;
   }
   pulse.strength_n_s = static_cast<float>(std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]));
-  const auto& triangle = model_->triangles_[static_cast<std::size_t>(impulse.triangle)];
+  pulse.triangle = impulse.triangle;
   for (int corner = 0; corner < 3; ++corner) {
     for (int axis = 0; axis < 3; ++axis) {
-      pulse.row[corner * 3 + axis] = model_->get_row(triangle[corner], axis);
       pulse.weight[corner * 3 + axis] = static_cast<float>(impulse.barycentric[corner] * impulse.impulse_n_s[axis]);
     }
   }
+  find_rows(pulse);
   pulses_.push_back(pulse);
   ++counters_.accepted;
   return true;
+}
+
+void Voice::find_rows(Pulse& pulse) const noexcept {
+  const auto& triangle = model_->triangles_[static_cast<std::size_t>(pulse.triangle)];
+  for (int corner = 0; corner < 3; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) pulse.row[corner * 3 + axis] = model_->get_row(triangle[corner], axis);
+  }
 }
 
 void Voice::process(std::span<float> pressure_pa) noexcept {
@@ -91,7 +99,7 @@ void Voice::render(int quanta) noexcept {
   horizon_ += quanta * kQuantum;
   rendered_ = held_ = quanta * kQuantum;
   if (first == 0) {
-    fading_ = false;
+    fading_ = std::exchange(inherits_, false);
     if (const int stay = std::min(limit_, cut_); stay < live_) fade_out(stay);
     cut_ = groups_;
     if (start / kPeriod % kCullEvery == 0 && is_awake()) cull();
@@ -290,10 +298,11 @@ std::span<const float> Voice::measure(float nearness) noexcept {
 /// Renders the groups from `groups` on once more, on their way out, for the period that begins.
 void Voice::fade_out(int groups) noexcept {
   const int gone = live_ - groups;
-  fade_.fill(0.0F);
-  kernels_->ring(model_->sound_.data() + groups, model_->turn_.data() + groups, state_.data() + groups, gone, fade_.data());
+  if (!fading_) fade_.fill(0.0F);
+  block_.fill(0.0F);  // not yet in use
+  kernels_->ring(model_->sound_.data() + groups, model_->turn_.data() + groups, state_.data() + groups, gone, block_.data());
   counters_.mode_samples += static_cast<std::int64_t>(gone) * kGroup * kPeriod;
-  for (int n = 0; n < kPeriod; ++n) fade_[n] *= 1.0F - static_cast<float>(n) / kPeriod;
+  for (int n = 0; n < kPeriod; ++n) fade_[n] += block_[n] * (1.0F - static_cast<float>(n) / kPeriod);
   std::fill(state_.begin() + groups, state_.begin() + live_, ModeState{});
   live_ = groups;
   fading_ = true;
@@ -306,7 +315,7 @@ void Voice::reset() noexcept {
   std::fill(damped_.begin(), damped_.end(), DampedState{});
   live_ = 0;
   damped_live_ = false;
-  fading_ = false;
+  fading_ = inherits_ = false;
   pulses_.clear();
   ++counters_.resets;
 }

@@ -35,6 +35,24 @@ struct VoiceCounters {
   std::int64_t mode_samples = 0;  // work done: modes x samples, whole groups
 };
 
+/// A mode at or near critical damping: amplitude and velocity.
+struct DampedState {
+  double q = 0.0, v = 0.0;
+};
+
+/// What a voice of one model needs to take the place of a voice of another.
+class Succession {
+ public:
+  /// Modes are the same when they have the same number in the bank. [main-thread]
+  Succession(const Model& from, const Model& to);
+
+ private:
+  friend class Voice;
+  std::vector<int> from_mode_;     // by mode of `to`; -1: a mode that `from` does not sound
+  std::vector<ModeState> states_;  // room
+  std::vector<DampedState> damped_;
+};
+
 /// All modes of a model below the Nyquist frequency. Time runs on a grid of kQuantum samples from the first one: what is decided is decided
 /// on the grid, so that the same strikes give the same bits whatever the sizes of the blocks. Memory is taken in the constructor only.
 /// One thread at a time.
@@ -74,6 +92,11 @@ class Voice {
   /// 0, as at first: all. [audio-thread]
   void set_floor(float pressure_pa) noexcept { floor_pa_ = pressure_pa; }
 
+  /// Goes on in place of another voice: at its time, with its strikes, each mode with the energy and the phase of its predecessor. The
+  /// sound goes over within a period. At the start of a period of the other voice, which is of no more use afterwards; of a voice that is
+  /// as it was made. A strike under way on a triangle that the model has not is refused. [audio-thread]
+  void take_over(Voice& other, Succession& succession) noexcept;
+
   /// Samples processed so far: the number of the next sample.
   std::int64_t get_position() const { return horizon_ - held_; }
   /// The first sample that a new strike can still reach: less than kQuantum samples ahead of the position unless blocks are whole quanta.
@@ -85,7 +108,7 @@ class Voice {
   bool is_awake() const { return live_ > 0 || damped_live_; }
   /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
   bool is_idle() const {
-    return !is_awake() && !fading_ && pulses_.empty() && held_ == 0 && (contacts_ == nullptr || contacts_->is_resting());
+    return !is_awake() && !fading_ && !inherits_ && pulses_.empty() && held_ == 0 && (contacts_ == nullptr || contacts_->is_resting());
   }
   /// As process() for a multiple of kQuantum samples of a voice that is idle, whose zeros nobody wants. [audio-thread]
   void skip(std::int64_t samples) noexcept { horizon_ += samples; }
@@ -103,13 +126,13 @@ class Voice {
     const std::int16_t* row[kStrikeRows];
     float weight[kStrikeRows];
     float strength_n_s = 0.0F;  // size of the impulse
+    std::int32_t triangle = 0;
   };
-  struct DampedState {
-    double q = 0.0, v = 0.0;
-  };
-
   void render(int quanta) noexcept;
   bool is_struck(std::int64_t sample) const noexcept;
+  void find_rows(Pulse& pulse) const noexcept;
+  DampedState get_mode_state(int mode) const noexcept;
+  void ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign, std::array<float, kPeriod>& out) const noexcept;
   void wake(int groups) noexcept;
   int find_reach(float strength_n_s) const noexcept;
   void strike_quantum(std::int64_t sample, int quantum, float* out) noexcept;
@@ -128,7 +151,8 @@ class Voice {
   int cut_ = 0;     // groups that stay when the next period begins
   float floor_pa_ = 0.0F;
   bool damped_live_ = false;
-  bool fading_ = false;       // fade_ holds what the limit took away in this period
+  bool fading_ = false;       // fade_ holds what goes in this period: what the limit took away, what another model sounded
+  bool inherits_ = false;     // fade_ is filled for the period that begins
   std::int64_t horizon_ = 0;  // samples rendered
   int held_ = 0;              // of them not yet handed out: the last of block_
   int rendered_ = 0;          // samples in block_

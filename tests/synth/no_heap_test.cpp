@@ -119,10 +119,16 @@ TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
   Synthesiser synthesiser({.max_bodies = 4, .max_strikes = 8, .ring_events = 64});
   for (int b = 0; b < 4; ++b) synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}});
   synthesiser.remove_body(3);
+  const auto other = Model::make(testing::make_cube_bank(modes, 500.0));
   std::vector<float> left(300), right(300);
   const std::array<float*, 2> out{left.data(), right.data()};
-  const long before = g_allocations;
+  long before = g_allocations;
   for (int i = 0; i < 300; ++i) {
+    if (i % 30 == 0) {  // the main thread may
+      const long until_now = g_allocations;
+      synthesiser.swap_model(i % 3, i % 60 == 0 ? other : model);
+      before += g_allocations - until_now;
+    }
     for (int k = 0; k < 10; ++k) {
       synthesiser.push(stream::Impulse{.time_s = synthesiser.get_horizon_s() + 1e-4 * k, .body = k % 5, .impulse_n_s = {0.0, 0.0, 1.0}});
       synthesiser.push(stream::Motion{synthesiser.get_horizon_s(), k % 4, {1.0, 2.0, 0.001 * i}, {}});

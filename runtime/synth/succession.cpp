@@ -1,0 +1,101 @@
+// Method:     a voice takes the place of another that rings: each mode goes on with the energy and the phase that the mode of the same
+//             number in the bank had. With q the amplitude and q' its velocity, energy is (q'^2 + lambda q^2) / 2, so q' stays and
+//             sqrt(lambda) q stays. The sound goes over within one period: what the old modes would have sounded, less what the new ones
+//             sound, is added on its way from whole to nothing; strikes act on the new modes alone, from the first sample on.
+// Source:     docs/equations.md E4, E6.
+// Deviations: a body whose density or size changes keeps its energy, which no law of physics asks for: it is what a change without a blow
+//             can mean. Damping is left out of the energy, as in calc_energy_j().
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "runtime/synth/voice.hpp"
+
+namespace carillon::synth {
+
+Succession::Succession(const Model& from, const Model& to) {
+  std::unordered_map<int, int> place;  // of a mode of the bank in `from`
+  for (int m = 0; m < from.get_mode_count(); ++m) place.emplace(from.get_bank_mode(m), m);
+  from_mode_.reserve(static_cast<std::size_t>(to.get_mode_count()));
+  for (int m = 0; m < to.get_mode_count(); ++m) {
+    const auto found = place.find(to.get_bank_mode(m));
+    from_mode_.push_back(found == place.end() ? -1 : found->second);
+  }
+  states_.resize((static_cast<std::size_t>(to.get_ringing_mode_count()) + kGroup - 1) / kGroup);
+  damped_.resize(static_cast<std::size_t>(to.get_mode_count() - to.get_ringing_mode_count()));
+}
+
+DampedState Voice::get_mode_state(int mode) const noexcept {
+  if (mode >= model_->ringing_) return damped_[static_cast<std::size_t>(mode - model_->ringing_)];
+  const auto& m = model_->modes_[static_cast<std::size_t>(mode)];
+  const ModeState& state = state_[static_cast<std::size_t>(mode / kGroup)];
+  const double omega = std::sqrt(m.lambda);
+  const double q = state.im[mode % kGroup] / std::sqrt((omega - m.decay) * (omega + m.decay));
+  return {q, state.re[mode % kGroup] - m.decay * q};
+}
+
+/// Adds `sign` times what the modes sound over the next period when nothing strikes them; the states go on.
+void Voice::ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign,
+                     std::array<float, kPeriod>& out) const noexcept {
+  alignas(64) std::array<float, kPeriod> sound{};
+  if (!states.empty()) {
+    kernels_->ring(model_->sound_.data(), model_->turn_.data(), states.data(), static_cast<int>(states.size()), sound.data());
+  }
+  for (std::size_t i = 0; i < damped.size(); ++i) {
+    const auto& m = model_->damped_[i];
+    DampedState& s = damped[i];
+    if (s.q == 0.0 && s.v == 0.0) continue;
+    for (float& p : sound) {
+      s = {m.qq * s.q + m.qv * s.v, m.vq * s.q + m.vv * s.v};
+      p += static_cast<float>(m.gain * s.v);
+    }
+  }
+  for (std::size_t n = 0; n < out.size(); ++n) out[n] += sign * sound[n];
+}
+
+void Voice::take_over(Voice& other, Succession& succession) noexcept {
+  horizon_ = other.horizon_;
+  held_ = rendered_ = 0;
+  counters_ = other.counters_;
+  floor_pa_ = other.floor_pa_;
+  pulses_.clear();
+  for (const Pulse& pulse : other.pulses_) {
+    if (pulses_.size() == pulses_.capacity() || static_cast<std::size_t>(pulse.triangle) >= model_->triangles_.size()) {
+      ++counters_.refused;
+      continue;
+    }
+    pulses_.push_back(pulse);
+    find_rows(pulses_.back());
+  }
+  fade_.fill(0.0F);
+  inherits_ = other.is_awake();
+  if (!inherits_) return;
+  for (std::size_t m = 0; m < succession.from_mode_.size(); ++m) {
+    const int from = succession.from_mode_[m];
+    if (from < 0) continue;
+    const DampedState old = other.get_mode_state(from);
+    if (old.q == 0.0 && old.v == 0.0) continue;
+    const auto& mode = model_->modes_[m];
+    const double omega = std::sqrt(mode.lambda);
+    const double q = old.q * std::sqrt(other.model_->modes_[static_cast<std::size_t>(from)].lambda) / omega;
+    if (m >= static_cast<std::size_t>(model_->ringing_)) {
+      damped_[m - static_cast<std::size_t>(model_->ringing_)] = {q, old.v};
+      damped_live_ = true;
+      continue;
+    }
+    ModeState& state = state_[m / kGroup];
+    state.re[m % kGroup] = old.v + mode.decay * q;
+    state.im[m % kGroup] = q * std::sqrt((omega - mode.decay) * (omega + mode.decay));
+    live_ = std::max(live_, static_cast<int>(m / kGroup) + 1);
+  }
+  const auto count = static_cast<std::size_t>(live_);
+  other.ring_out(std::span(other.state_).first(static_cast<std::size_t>(other.live_)), other.damped_, 1.0F, fade_);
+  // Copies are rung out; the states themselves begin the period.
+  std::copy_n(state_.begin(), count, succession.states_.begin());
+  std::copy(damped_.begin(), damped_.end(), succession.damped_.begin());
+  ring_out(std::span(succession.states_).first(count), succession.damped_, -1.0F, fade_);
+  counters_.mode_samples += static_cast<std::int64_t>(other.live_ + live_) * kGroup * kPeriod;
+  for (int n = 0; n < kPeriod; ++n) fade_[n] *= 1.0F - static_cast<float>(n) / kPeriod;
+}
+
+}  // namespace carillon::synth
