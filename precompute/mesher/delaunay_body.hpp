@@ -109,6 +109,9 @@ class Mesh3Body : public DelaunayBody {
                                           p::pointer_to_stop_atomic_boolean = &watchdog.stop));
     stop_ = nullptr;
     if (watchdog.stop) throw std::runtime_error("parts of the surface touch, or nearly so");
+    // Faces are refined before cells: where they alone met the bound there is no cell, and that is no sign of too few nodes.
+    if (complex_.number_of_cells_in_complex() == 0 && complex_.triangulation().number_of_vertices() >= sizes.most_nodes)
+      throw std::runtime_error("its faces meet in angles too sharp for elements of this size");
     return extract();
   }
 

@@ -22,10 +22,11 @@ using SimTK::dot;
 using SimTK::Transform;
 using Point = SimTK::Vec3;
 
-constexpr double kSlowest = 0.01;     // m/s; a touch slower than this is not an impact (a fall from 5 um)
-constexpr double kTogether = 1e-4;    // s; touches nearer in time than this are one impact (a Hertz contact lasts about as long)
-constexpr double kTouchDepth = 3e-7;  // m; how well the first instant of a touch is found
-constexpr double kTouchTime = 2e-7;   // s; the same in time
+constexpr double kSlowest = 1e-3;        // m/s; a touch slower than this is not an impact (a fall from 0.05 um)
+constexpr double kLongestHertz = 20e-3;  // s; of calc_hertz_duration
+constexpr double kTogether = 1e-4;       // s; touches nearer in time than this are one impact (a Hertz contact lasts about as long)
+constexpr double kTouchDepth = 1e-8;     // m; how well the first instant of a touch is found
+constexpr double kTouchTime = 2e-7;      // s; the same in time
 constexpr double kRollingTime =
     10e-3;  // s; a body that rolls or slides over the corners of its own mesh hops from one to the next so fast ...
 constexpr double kRollingSpeed = 0.1;  // m/s; ... and lands on them slower than this: that is the mesh, not the body, and must not be heard
@@ -143,6 +144,26 @@ Island::Step Island::calc_step(double step_s) {
   return touch;
 }
 
+/// Of a Hertz contact at that place [s].
+double Island::calc_duration(int a, int b, const Snapshot& now, const Point& where, const Point& normal, double mass, double speed) const {
+  double largest_radius = 0.5 * engine_.surface(a).size_m();
+  if (b >= 0) largest_radius = std::min(largest_radius, 0.5 * engine_.surface(b).size_m());
+  const Elastic elastic_a = engine_.make_elastic(a, now.poses[a], where, -normal);
+  const Elastic elastic_b = engine_.make_elastic(b, b >= 0 ? now.poses[b] : Transform(), where, normal);
+  return calc_hertz_duration(elastic_a, elastic_b, mass, speed, largest_radius);
+}
+
+/// Does the touch end before the body is back? A rebound whose flight, 2 e v / g, is shorter than the Hertz contact itself is none: weight
+/// keeps the surfaces together.
+bool Island::leaves_again(const ImpactPoint& p, double approach, const Snapshot& now) const {
+  const auto& g = world_.gravity_m_s2;
+  const double weight = std::abs(dot(Point(g[0], g[1], g[2]), p.normal));
+  const double flight_weight = 2.0 * p.restitution * approach;  // times gravity
+  if (approach <= kSlowest || flight_weight > weight * kLongestHertz) return true;
+  const double mass = 1.0 / calc_inverse_effective_mass(now.mobiles, p.a, p.b, p.where, p.normal);
+  return flight_weight > weight * calc_duration(p.a, p.b, now, p.where, p.normal, mass, approach);
+}
+
 /// Solves the impact at the present instant and notes its pulses.
 void Island::strike() {
   const Snapshot now = state_;
@@ -166,7 +187,8 @@ void Island::strike() {
   for (const auto& [key, touch] : together) {
     touches.push_back(touch);
     points.push_back(engine_.make_impact_point(touch));
-    if (is_old(touch, now, calc_approach(engine_, now, touch))) points.back().restitution = 0.0;
+    const double approach = calc_approach(engine_, now, touch);
+    if (is_old(touch, now, approach) || !leaves_again(points.back(), approach, now)) points.back().restitution = 0.0;
   }
   remember(now, touches);
   record();
@@ -218,13 +240,9 @@ void Island::emit_spot(const std::vector<const ImpactPoint*>& points, double tou
   const double e = first.restitution;
   const double speed = approach > kSlowest ? approach : push * inverse_mass;
   const double mass = std::min(push / ((1.0 + e) * speed), 1.0 / inverse_mass);
-  double largest_radius = 0.5 * engine_.surface(first.a).size_m();
-  if (first.b >= 0) largest_radius = std::min(largest_radius, 0.5 * engine_.surface(first.b).size_m());
-  const Elastic elastic_a = engine_.make_elastic(first.a, before.poses[first.a], where, -normal);
-  const Elastic elastic_b = engine_.make_elastic(first.b, first.b >= 0 ? before.poses[first.b] : Transform(), where, normal);
   lasting_.note_impact(engine_, first.a, first.b, where, state_.time_s);
   Impulse pulse;
-  pulse.duration_s = calc_hertz_duration(elastic_a, elastic_b, mass, speed, largest_radius);
+  pulse.duration_s = calc_duration(first.a, first.b, before, where, normal, mass, speed);
   pulse.time_s = touch_s + 0.5 * pulse.duration_s;
   for (const int side : {0, 1}) {
     const int body = side == 0 ? first.a : first.b;

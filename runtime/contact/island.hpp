@@ -60,6 +60,9 @@ class Island {
   void remember(const Snapshot& now, const std::vector<TouchPoint>& touches);
   std::vector<TouchPoint> find_fresh(const Snapshot& now, double faster_than) const;
   Step calc_step(double step_s);
+  double calc_duration(int a, int b, const Snapshot& now, const SimTK::Vec3& where, const SimTK::Vec3& normal, double mass,
+                       double speed) const;
+  bool leaves_again(const ImpactPoint& point, double approach, const Snapshot& now) const;
   void strike();
   void emit(const std::vector<ImpactPoint>& points, const std::vector<TouchPoint>& touches, const Snapshot& before);
   void emit_spot(const std::vector<const ImpactPoint*>& points, double touch_s, const Snapshot& before);

@@ -14,6 +14,8 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
+#include "runtime/host/axis.hpp"
+
 namespace carillon::host {
 namespace {
 
@@ -41,16 +43,6 @@ Color calc_color(double level) {
   const double u = x - static_cast<double>(i);
   const Color &a = kMagma[i], &b = kMagma[i + 1];
   return {a.r + u * (b.r - a.r), a.g + u * (b.g - a.g), a.b + u * (b.b - a.b)};
-}
-
-/// A step of 1, 2 or 5 times a power of ten that divides `span` into about `count` parts.
-double calc_tick_step(double span, double count) {
-  const double raw = span / count;
-  const double power = std::pow(10.0, std::floor(std::log10(raw)));
-  for (const double step : {1.0, 2.0, 5.0}) {
-    if (step * power >= raw * 0.999) return step * power;
-  }
-  return 10.0 * power;
 }
 
 using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
@@ -130,13 +122,13 @@ void draw_spectrum(cairo_t* cr, const SpectrogramLayout& at, const ShortTimeSpec
 void draw_axes(cairo_t* cr, const SpectrogramLayout& at, double duration_s, double nyquist_hz) {
   const double bottom = at.top + at.plot_height;
   cairo_set_font_size(cr, 17);
-  const double time_step = calc_tick_step(duration_s, 8);
-  for (int i = 0; i * time_step <= duration_s * (1 + 1e-9); ++i) {
-    const double x = std::round(at.left + i * time_step / duration_s * at.plot_width) + 0.5;
+  const TimeAxis time = make_time_axis(duration_s);
+  for (const Mark& mark : time.marks) {
+    const double x = std::round(at.left + mark.at_s / duration_s * at.plot_width) + 0.5;
     draw_line(cr, x, bottom, x, bottom + 7);
-    draw_text(cr, x, bottom + 26, fmt::format("{:g}", std::round(i * time_step * 1e9) / 1e9), Anchor::kCentre);
+    draw_text(cr, x, bottom + 26, mark.text, Anchor::kCentre);
   }
-  draw_text(cr, at.left + at.plot_width / 2, bottom + 56, "Time (s)", Anchor::kCentre);
+  draw_text(cr, at.left + at.plot_width / 2, bottom + 56, fmt::format("Time ({})", time.unit), Anchor::kCentre);
   const double octaves = std::log2(nyquist_hz / at.lowest_hz);
   for (double decade = 10; decade <= nyquist_hz; decade *= 10) {
     for (int digit = 1; digit < 10; ++digit) {
@@ -194,11 +186,12 @@ void draw_pressure(cairo_t* cr, const SpectrogramLayout& at, const Sound& sound,
   cairo_set_source_rgb(cr, 0.15, 0.15, 0.15);
   draw_frame(cr, at.left, top, at.plot_width, height);
   cairo_set_font_size(cr, 15);
+  const Label peak = make_pressure_label(peak_pa);
   if (peak_pa > 0.0) {
-    draw_text(cr, at.left - 8, top + 14, fmt::format("{:.2g}", peak_pa), Anchor::kRight);
-    draw_text(cr, at.left - 8, top + height, fmt::format("−{:.2g}", peak_pa), Anchor::kRight);
+    draw_text(cr, at.left - 8, top + 14, peak.text, Anchor::kRight);
+    draw_text(cr, at.left - 8, top + height, "−" + peak.text, Anchor::kRight);
   }
-  draw_upright_text(cr, 28, middle, "Pressure (Pa)");
+  draw_upright_text(cr, 28, middle, fmt::format("Pressure ({})", peak.unit));
 }
 
 cairo_status_t append_bytes(void* closure, const unsigned char* data, unsigned int length) {

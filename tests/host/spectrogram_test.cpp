@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <string>
+
+#include "runtime/host/axis.hpp"
 
 namespace carillon::host {
 namespace {
@@ -108,6 +111,45 @@ TEST(Spectrogram, SilenceIsADarkPicture) {
 TEST(Spectrogram, AVeryShortSoundIsDrawn) {
   const Picture picture(make_spectrogram_png(make_tone(1000.0, 1.0, 48000, 5e-5), "two samples"));
   EXPECT_GT(picture.width, 0);
+}
+
+TEST(Axis, PressuresAreTwoDigitsWithoutExponentInTheUnitThatSuitsThem) {
+  const struct {
+    double pa;
+    const char *text, *unit;
+  } cases[] = {{470.3, "470", "Pa"},      {47.03, "47", "Pa"},     {0.047, "0.047", "Pa"}, {0.5, "0.5", "Pa"},
+               {0.0099, "9.9", "mPa"},    {0.00999, "0.01", "Pa"}, {996.0, "1", "kPa"},    {2e5, "200", "kPa"},
+               {3.21e-5, "0.032", "mPa"}, {7.4e-6, "7.4", "µPa"},  {0.0, "0", "Pa"}};
+  for (const auto& c : cases) {
+    const Label label = make_pressure_label(c.pa);
+    EXPECT_EQ(label.text, c.text) << c.pa;
+    EXPECT_EQ(label.unit, c.unit) << c.pa;
+  }
+  for (double pa = 1e-8; pa < 1e6; pa *= 1.0173) {
+    const Label label = make_pressure_label(pa);
+    EXPECT_EQ(label.text.find('e'), std::string::npos) << pa;
+    EXPECT_LE(label.text.size(), pa < 1e-7 ? 7U : 5U) << pa << " " << label.text;
+    const double unit = label.unit == "µPa" ? 1e-6 : label.unit == "mPa" ? 1e-3 : label.unit == "Pa" ? 1.0 : 1e3;
+    EXPECT_NEAR(std::stod(label.text) * unit / pa, 1.0, 0.051) << pa << " " << label.text;
+  }
+}
+
+TEST(Axis, TimesAreRoundAndNeverCrowded) {
+  for (double duration = 1e-4; duration < 4000.0; duration *= 1.013) {
+    const TimeAxis axis = make_time_axis(duration);
+    const double unit = axis.unit == "s" ? 1.0 : axis.unit == "ms" ? 1e-3 : 1e-6;
+    ASSERT_GE(axis.marks.size(), 4U) << duration;
+    ASSERT_LE(axis.marks.size(), 11U) << duration;
+    EXPECT_EQ(axis.marks[0].text, "0");
+    for (const Mark& mark : axis.marks) {
+      EXPECT_LE(mark.text.size(), 4U) << duration << " " << mark.text;
+      EXPECT_NEAR(std::stod(mark.text) * unit, mark.at_s, 1e-9 * duration) << mark.text;
+      EXPECT_LE(mark.at_s, duration * (1 + 1e-8));
+    }
+  }
+  EXPECT_EQ(make_time_axis(1.5).marks[1].text, "0.2");
+  EXPECT_EQ(make_time_axis(3600.0).marks[1].text, "500");
+  EXPECT_EQ(make_time_axis(0.25).unit, "ms");
 }
 
 }  // namespace
