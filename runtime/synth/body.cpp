@@ -309,8 +309,8 @@ void Body::hear(Air& air, std::int64_t sample, std::size_t count, const Track& l
       moved = air.ears[m].process(air.source, listener, sample, heard);
       const auto begin = static_cast<int>(sample % kPeriod);
       for (std::size_t n = 0; n < count && fade != 0; ++n) {
-        const double u = (begin + static_cast<int>(n)) / static_cast<double>(kPeriod);
-        heard[n] *= fade > 0 ? u : 1.0 - u;
+        const double u = (begin + static_cast<int>(n)) / static_cast<double>(kPeriod), in = u * u * (3.0 - 2.0 * u);
+        heard[n] *= fade > 0 ? in : 1.0 - in;
       }
       for (std::size_t c = apart ? m : 0; c < (apart ? m + 1 : mix.size()); ++c)
         for (std::size_t n = 0; n < count; ++n) mix[c][n] += heard[n];

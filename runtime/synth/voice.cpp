@@ -322,7 +322,8 @@ void Voice::reset() noexcept {
 
 std::size_t Voice::calc_bytes() const {
   return sizeof(Voice) + state_.capacity() * sizeof(ModeState) + starts_.capacity() * sizeof(Starts) +
-         damped_.capacity() * sizeof(DampedState) + damped_amplitude_.capacity() * sizeof(double) + pulses_.capacity() * sizeof(Pulse);
+         damped_.capacity() * sizeof(DampedState) + damped_amplitude_.capacity() * sizeof(double) + pulses_.capacity() * sizeof(Pulse) +
+         bounds_.capacity() * sizeof(float);
 }
 
 int Voice::get_live_mode_count() const {

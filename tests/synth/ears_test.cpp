@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <limits>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "runtime/config/error.hpp"
@@ -367,6 +369,93 @@ TEST(Ears, MemoryThatCannotBeIsRefused) {
   EXPECT_THROW(History(-1.0, kRate, 512), InputError);
   EXPECT_THROW(History(10.0, 0.0, 512), InputError);
   EXPECT_THROW(History(10.0, kRate, 0), InputError);
+}
+
+// The same place, said once, said twice with speeds of an atom a year, and after a walk: the first and the last take the cheap way.
+TEST(Ears, WhatStandsStillSoundsAsWhatHardlyMoves) {
+  std::vector<double> noise(6000);
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  for (double& x : noise) x = normal(random);
+  const Vec3 place{0.3, 2.345, 0.1};
+  Track still(4), creeping(4), arrived(4);
+  still.push({0.0, place, {}});
+  creeping.push({0.0, place, {1e-14, 0.0, 0.0}});
+  creeping.push({10.0, place, {1e-14, 0.0, 0.0}});
+  arrived.push({-1.0, {0.0, 1.0, 0.0}, {1.0, 0.0, 0.0}});
+  arrived.push({-0.5, place, {}});
+  arrived.push({0.05, place, {}});
+  EXPECT_TRUE(arrived.is_still_from(-0.5));
+  EXPECT_FALSE(arrived.is_still_from(-0.6));
+  EXPECT_FALSE(creeping.is_still_from(1.0));
+  const auto a = receive(still, {0.1, 0.0, 0.0}, noise), b = receive(creeping, {0.1, 0.0, 0.0}, noise),
+             c = receive(arrived, {0.1, 0.0, 0.0}, noise), odd = receive(still, {0.1, 0.0, 0.0}, noise, 37);
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    ASSERT_NEAR(a[n], b[n], 2e-6) << n;
+    ASSERT_EQ(a[n], c[n]) << n;
+    ASSERT_EQ(a[n], odd[n]) << n;
+  }
+  EXPECT_GT(*std::max_element(a.begin(), a.end()), 0.5);
+}
+
+TEST(Ears, SayHowManySamplesCameByAWayThatChanged) {
+  Track track(8), listener(1);
+  track.push({0.0, {0.0, 1.0, 0.0}, {}});
+  History history(100.0, kRate, 32);
+  std::vector<double> out(32);
+  const std::vector<float> ones(32, 1.0F);
+  Ear ear({0.0, 0.0, 0.0}, kRate);
+  const auto run = [&](int from, int to) {
+    int moved = 0;
+    for (int n = from; n < to; n += 32) {
+      history.push(ones);
+      moved += ear.process({.track = &track, .monopole = &history}, listener, n, out);
+    }
+    return moved;
+  };
+  EXPECT_EQ(run(0, 4800), 0);
+  track.push({0.1, {0.0, 1.0, 0.0}, {3.0, 0.0, 0.0}});
+  track.push({0.2, {0.3, 1.0, 0.0}, {}});
+  EXPECT_NEAR(run(4800, 14400), 4800 + 2 * 48, 150);  // for as long as it moves, late by the way
+  EXPECT_EQ(run(14400, 19200), 0);
+}
+
+TEST(History, HoldsWhatWasPushedAsLongAsTheWayIs) {
+  for (const double longest_m : {0.0, 1.0, 7.7}) {
+    constexpr int kBlock = 50;
+    History history(longest_m, kRate, kBlock);
+    std::vector<float> all;
+    std::mt19937 random(4);
+    std::uniform_int_distribution<int> any(1, kBlock);
+    const auto get = [&all](std::int64_t n) { return n < 0 ? 0.0F : all[static_cast<std::size_t>(n)]; };
+    const auto longest = static_cast<std::int64_t>(longest_m / 343.0 * kRate);
+    for (int push = 0; push < 300; ++push) {
+      std::vector<float> samples(static_cast<std::size_t>(any(random)));
+      const bool silent = push % 11 == 3;
+      for (float& x : samples) x = silent ? 0.0F : static_cast<float>(any(random));
+      all.insert(all.end(), samples.begin(), samples.end());
+      if (silent)
+        history.push_silence(static_cast<std::int64_t>(samples.size()));
+      else
+        history.push(samples);
+      const auto size = static_cast<std::int64_t>(all.size());
+      ASSERT_EQ(history.get_position(), size);
+      ASSERT_FALSE(history.is_silent());
+      for (const int count : {1, kTaps, kTaps + kBlock}) {
+        for (std::int64_t first = size - longest - kTaps - kBlock; first + count <= size; first += 13) {
+          const float* found = history.find(first, count);
+          for (int i = 0; i < count; ++i) ASSERT_EQ(found == nullptr ? 0.0F : found[i], get(first + i)) << push << " " << first << " " << i;
+        }
+        EXPECT_EQ(history.find(size - count + 1, count), nullptr);
+        EXPECT_EQ(history.find(size - history.get_size() - 1, count), nullptr);
+      }
+    }
+    EXPECT_LE(history.get_bytes(), sizeof(float) * static_cast<std::size_t>(longest + 4 * kTaps + 2 * kBlock + 1));
+    history.push_silence(history.get_size());
+    EXPECT_TRUE(history.is_silent());
+    history.push_silence(std::int64_t{1} << 50);  // free, or this would never end
+    EXPECT_EQ(history.get_position(), static_cast<std::int64_t>(all.size()) + history.get_size() + (std::int64_t{1} << 50));
+  }
 }
 
 }  // namespace

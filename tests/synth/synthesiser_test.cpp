@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -225,7 +226,7 @@ TEST(Synthesiser, RefusesWhatMakesNoSense) {
   EXPECT_THROW(synthesiser.add_body(make_model(3)), InputError);  // for 48 kHz
 }
 
-// Other threads push and bodies come and go while it plays. (For a data race detector: what is heard is tested above.)
+// Other threads push, and bodies and effects come and go while it plays. (For a data race detector: what is heard is tested above.)
 TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
   Synthesiser synthesiser({.rate_hz = kRate, .max_bodies = 8});
   const auto model = make_model(16);
@@ -253,8 +254,13 @@ TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
     stops = true;
   });
   std::vector<int> bodies;
+  const std::array<EffectSet, 4> kSets{EffectSet{}, {Effect::kModal}, kUsualEffects.with(Effect::kAccelerationNoise), kUsualEffects};
+  std::size_t turn = 0;
   while (!stops) {
     if (!synthesiser.is_full()) bodies.push_back(synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}}));
+    ++turn;
+    synthesiser.set_effects(bodies[turn % bodies.size()], kSets[turn % kSets.size()]);
+    (void)synthesiser.get_effect_counters(bodies.front());
     if (bodies.size() > 4) {
       synthesiser.remove_body(bodies.front());
       bodies.erase(bodies.begin());
