@@ -146,6 +146,7 @@ bool Object::has(std::string_view key) {
 
 bool Object::has_string(std::string_view key) { return has(key) && json(value_)[std::string(key)].isString(); }
 bool Object::has_number(std::string_view key) { return has(key) && json(value_)[std::string(key)].isNumeric(); }
+bool Object::has_object(std::string_view key) { return has(key) && json(value_)[std::string(key)].isObject(); }
 
 namespace {
 

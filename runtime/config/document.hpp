@@ -42,6 +42,8 @@ class Object {
   bool has_string(std::string_view key);
   /// True when `key` is there and holds a number.
   bool has_number(std::string_view key);
+  /// True when `key` is there and holds an object in braces.
+  bool has_object(std::string_view key);
 
   std::string string(std::string_view key);
   std::string string_or(std::string_view key, std::string_view fallback);

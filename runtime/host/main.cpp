@@ -23,9 +23,9 @@ int main(int argc, char** argv) {
   carillon::host::ProgramOptions options;
   CLI::App app("Simulates a scene of falling bodies and renders what two ears or microphones hear.", "carillon-render");
   app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
-  app.add_option("-o,--output", options.wav, "WAV file to write: stereo, or a channel for each microphone")
-      ->required()
-      ->option_text("OUT.wav");
+  auto* output =
+      app.add_option("-o,--output", options.wav, "WAV file to write: stereo, or a channel for each microphone; required without --plan")
+          ->option_text("OUT.wav");
   app.add_option("--spectrogram", options.spectrogram, "Picture of the sound: level over time and frequency")->option_text("OUT.png");
   app.add_option("--trajectory", options.trajectory, "Paths of the bodies and their contacts")->option_text("OUT.json");
   app.add_option("--report", options.report, "Figures of the run: counts, seconds, level, gain")->option_text("OUT.json");
@@ -38,9 +38,11 @@ int main(int argc, char** argv) {
   app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
       ->check(CLI::IsMember(carillon::host::kSampleFormatNames))
       ->option_text("FORMAT");
+  app.add_flag("--plan", options.plan, "Say for each body which effects are on, why, and what they will cost; no sound is made");
   app.add_flag("-q,--quiet", options.quiet, "No progress");
   try {
     app.parse(argc, argv);
+    if (!options.plan && output->empty()) throw CLI::RequiredError("--output");
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : carillon::kExitInput;
   }

@@ -11,11 +11,15 @@
 #include "runtime/config/file.hpp"
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
+#include "runtime/host/microphones.hpp"
+#include "runtime/host/planning.hpp"
 #include "runtime/host/render.hpp"
 #include "runtime/host/report.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/host/sound_file.hpp"
 #include "runtime/host/spectrogram.hpp"
+#include "runtime/plan/costs.hpp"
+#include "runtime/plan/table.hpp"
 
 namespace carillon::host {
 namespace {
@@ -54,7 +58,8 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 
 /// Every output: can be written, is none of the inputs, and is not named twice.
 void check_outputs(const ProgramOptions& options, const Scene& scene) {
-  std::vector<std::pair<fs::path, std::string>> outputs{{options.wav, "WAV file"}};
+  std::vector<std::pair<fs::path, std::string>> outputs;
+  if (!options.plan) outputs.emplace_back(options.wav, "WAV file");
   if (options.spectrogram) outputs.emplace_back(*options.spectrogram, "spectrogram");
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
   if (options.report) outputs.emplace_back(*options.report, "report");
@@ -104,6 +109,16 @@ void print_warnings(const Scene& scene, const Sound& sound, const Figures& figur
   if (sound.resets > 0) fmt::print(stderr, "warning: {} times a body's state was no number and was cleared\n", sound.resets);
 }
 
+/// Runs the physics and prints what each body calls for; no sound is made.
+void print_plan(const ProgramOptions& options, const Scene& scene) {
+  plan::SceneFacts facts = make_facts(scene, make_microphones(scene), has_physics(scene));
+  const bool needs_contacts = plan::Planner(facts).needs_contacts();
+  const Course course =
+      options.contacts ? read_course(*options.contacts, scene) : simulate(scene, needs_contacts, Progress("physics", options.quiet));
+  const Plan plan = make_plan(std::move(facts), course.recording.events, plan::measure_costs());
+  fmt::print("{}", plan::format_plan(plan.planner, plan.facts));
+}
+
 void write_output(const fs::path& file, const std::string& bytes, const char* what) {
   config::write_file(file, bytes);
   fmt::print("{:<18} {}\n", what, file.string());
@@ -124,8 +139,12 @@ void run(const ProgramOptions& options) {
     const auto name = std::find(kSampleFormatNames.begin(), kSampleFormatNames.end(), *options.format);
     scene.output.format = static_cast<SampleFormat>(name - kSampleFormatNames.begin());
   }
+  if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
+    throw InputError("--plan makes no sound and writes no files; leave the options that name files away");
+  }
   check_outputs(options, scene);
   const Banks banks = read_banks(scene);
+  if (options.plan) return print_plan(options, scene);
 
   std::vector<const bank::Bank*> body_banks;
   std::vector<contact::Vec3> centres_m;

@@ -77,7 +77,62 @@ Quaternion read_rotation(config::Object& body) {
   return q;
 }
 
-SceneBody parse_body(config::Object& object) {
+/// The effects that "key" of `object` names, none twice.
+synth::EffectSet read_names(config::Object& object, std::string_view key) {
+  std::vector<std::string> playable;
+  for (int i = 0; i < synth::kEffectCount; ++i) {
+    const auto effect = static_cast<synth::Effect>(i);
+    if (kPlayableEffects.has(effect)) playable.emplace_back(synth::get_name(effect));
+  }
+  synth::EffectSet effects;
+  for (const config::Entry& entry : object.entries(key, std::numeric_limits<std::size_t>::max())) {
+    const auto refuse = [&](const std::string& what) { throw InputError(fmt::format("{}: \"{}\" {}", entry.place, key, what)); };
+    if (entry.object) refuse("must be a list of names of effects, and holds an object");
+    const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
+    if (!effect || !kPlayableEffects.has(*effect)) {
+      const std::string nearest = config::find_nearest(entry.text, playable);
+      refuse(fmt::format("names \"{}\", which is no effect that can be played{}; there are {}", entry.text,
+                         nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest), fmt::join(playable, ", ")));
+    }
+    if (effects.has(*effect)) refuse(fmt::format("names \"{}\" twice", entry.text));
+    effects = effects.with(*effect);
+  }
+  return effects;
+}
+
+/// "auto"; a list: exactly these; or {"base": "auto", "on": [...], "off": [...]}.
+plan::Wish read_effects(config::Object& object) {
+  plan::Wish wish;
+  if (object.has_string("effects")) {
+    const std::string text = object.string("effects");
+    if (text != "auto") {
+      object.fail("effects", fmt::format("is \"{}\"; give \"auto\", a list of names, or {{\"on\": [...], \"off\": [...]}}", text));
+    }
+    return wish;
+  }
+  if (!object.has_object("effects")) {
+    wish.automatic = false;
+    wish.on = read_names(object, "effects");
+    return wish;
+  }
+  config::Object wishes = object.object("effects");
+  wishes.choice_or("base", {"auto"}, "auto");
+  if (wishes.has("on")) wish.on = read_names(wishes, "on");
+  if (wishes.has("off")) wish.off = read_names(wishes, "off");
+  for (int i = 0; i < synth::kEffectCount; ++i) {
+    const auto effect = static_cast<synth::Effect>(i);
+    if (wish.on.has(effect) && wish.off.has(effect)) {
+      wishes.fail("off", fmt::format("names \"{}\", and so does \"on\"; keep one of them", synth::get_name(effect)));
+    }
+  }
+  wishes.finish();
+  return wish;
+}
+
+/// Exactly what a wish says where nobody plans.
+synth::EffectSet find_usual(const plan::Wish& wish) { return wish.automatic ? kDefaultEffects.with(wish.on).without(wish.off) : wish.on; }
+
+SceneBody parse_body(config::Object& object, const plan::Wish& wish) {
   SceneBody body;
   body.name = object.string("name");
   body.bank = object.path("bank");
@@ -95,6 +150,7 @@ SceneBody parse_body(config::Object& object) {
   }
   spec.restitution = read_within(object, "restitution", spec.restitution, 0.0, 1.0);
   spec.friction = read_within(object, "friction", spec.friction, 0.0, 10.0);
+  body.wish = object.has("effects") ? read_effects(object) : wish;
   object.finish();
   return body;
 }
@@ -207,28 +263,6 @@ Listener parse_listener(config::Object& object) {
   return listener;
 }
 
-/// A list of names: these effects are on, all others off.
-synth::EffectSet read_effects(config::Object& root) {
-  std::vector<std::string> playable;
-  for (int i = 0; i < synth::kEffectCount; ++i) {
-    const auto effect = static_cast<synth::Effect>(i);
-    if (kPlayableEffects.has(effect)) playable.emplace_back(synth::get_name(effect));
-  }
-  synth::EffectSet effects;
-  for (const config::Entry& entry : root.entries("effects", synth::kEffectCount)) {
-    if (entry.object) root.fail("effects", "must be a list of names of effects, and holds an object");
-    const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
-    if (!effect || !kPlayableEffects.has(*effect)) {
-      const std::string nearest = config::find_nearest(entry.text, playable);
-      root.fail("effects", fmt::format("\"{}\" is no effect that can be played{}; there are {}", entry.text,
-                                       nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest), fmt::join(playable, ", ")));
-    }
-    if (effects.has(*effect)) root.fail("effects", fmt::format("names \"{}\" twice", entry.text));
-    effects = effects.with(*effect);
-  }
-  return effects;
-}
-
 Output parse_output(config::Object& object) {
   Output output;
   if (object.has("gain")) {
@@ -268,9 +302,11 @@ Scene parse_scene(const config::Document& document) {
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
   }
   if (bodies.size() > kMostBodies) root.fail("bodies", fmt::format("lists {} bodies; a scene may hold {}", bodies.size(), kMostBodies));
+  if (root.has("effects")) scene.wish = read_effects(root);
+  scene.effects = find_usual(scene.wish);
   std::set<std::string> names;
   for (config::Object& object : bodies) {
-    scene.bodies.push_back(parse_body(object));
+    scene.bodies.push_back(parse_body(object, scene.wish));
     const std::string& name = scene.bodies.back().name;
     if (!names.insert(name).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
@@ -291,7 +327,6 @@ Scene parse_scene(const config::Document& document) {
     root.fail("duration_s", fmt::format("{} s at {} Hz and {} channels need too much memory; give fewer or a lower \"sample_rate_hz\"",
                                         scene.duration_s, scene.sample_rate_hz, count_channels(scene)));
   }
-  if (root.has("effects")) scene.effects = read_effects(root);
   const std::string radiation = root.choice_or("radiation", kGainKindNames, "sphere");
   scene.radiation =
       static_cast<radiation::GainKind>(std::find(kGainKindNames.begin(), kGainKindNames.end(), radiation) - kGainKindNames.begin());

@@ -11,6 +11,7 @@
 
 #include "runtime/config/document.hpp"
 #include "runtime/contact/world.hpp"
+#include "runtime/plan/planner.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/track.hpp"
@@ -28,7 +29,7 @@ inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm3
 /// The names of the key "radiation", in the order of radiation::GainKind.
 inline const std::vector<std::string> kGainKindNames{"osg02", "sphere"};
 
-/// What carillon-render can play; without the key "effects" it plays the default.
+/// What carillon-render can play, and what it plays where nobody plans.
 inline constexpr synth::EffectSet kPlayableEffects{synth::Effect::kModal,    synth::Effect::kHertzPulse, synth::Effect::kAccelerationNoise,
                                                    synth::Effect::kAirDelay, synth::Effect::kDoppler,    synth::Effect::kTwoEars};
 inline constexpr synth::EffectSet kDefaultEffects = kPlayableEffects.without(synth::Effect::kAccelerationNoise);
@@ -37,6 +38,7 @@ struct SceneBody {
   std::string name;
   std::filesystem::path bank;  // absolute
   contact::BodySpec spec;      // spec.bank is filled when the banks are read
+  plan::Wish wish;             // its own key "effects", or the scene's
 };
 
 /// A blow that the scene gives without physics. Point and impulse are in the frame of the body's mesh.
@@ -75,7 +77,8 @@ struct Scene {
   Listener listener;
   std::vector<Vec3> microphones_m;  // places in the world, a channel each, instead of the listener's ears
   radiation::GainKind radiation = radiation::GainKind::kSphere;
-  synth::EffectSet effects = kDefaultEffects;
+  plan::Wish wish;                             // the key "effects"
+  synth::EffectSet effects = kDefaultEffects;  // of all bodies where nobody plans
   Output output;
 };
 

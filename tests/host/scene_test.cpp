@@ -97,13 +97,34 @@ TEST(Scene, AListenerMayMoveAndMicrophonesMayTakeItsPlace) {
 TEST(Scene, EffectsAreThoseOfTheList) {
   using synth::Effect;
   const auto parse_effects = [](const std::string& list) {
-    return parse("{\"duration_s\": 2, " + kBody + ", \"effects\": " + list + "}").effects;
+    return parse("{\"duration_s\": 2, " + kBody + ", \"effects\": " + list + "}").wish;
   };
-  EXPECT_EQ(parse("{\"duration_s\": 2, " + kBody + "}").effects, kDefaultEffects);
-  EXPECT_FALSE(kDefaultEffects.has(Effect::kAccelerationNoise));
-  EXPECT_EQ(parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears"])"), kPlayableEffects);
-  EXPECT_EQ(parse_effects(R"(["doppler"])"), synth::EffectSet{Effect::kDoppler});
-  EXPECT_EQ(parse_effects("[]"), synth::EffectSet{});
+  const auto usual = parse("{\"duration_s\": 2, " + kBody + "}").wish;
+  EXPECT_TRUE(usual.automatic);
+  EXPECT_EQ(usual.on.with(usual.off), synth::EffectSet{});
+  EXPECT_TRUE(parse_effects("\"auto\"").automatic);
+  const auto list = parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears"])");
+  EXPECT_FALSE(list.automatic);
+  EXPECT_EQ(list.on, kPlayableEffects);
+  EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
+  EXPECT_FALSE(parse_effects("[]").automatic);
+  const auto some = parse_effects(R"({"base": "auto", "on": ["acceleration_noise"], "off": ["doppler", "two_ears"]})");
+  EXPECT_TRUE(some.automatic);
+  EXPECT_EQ(some.on, synth::EffectSet{Effect::kAccelerationNoise});
+  EXPECT_EQ(some.off, (synth::EffectSet{Effect::kDoppler, Effect::kTwoEars}));
+  EXPECT_TRUE(parse_effects("{}").automatic);
+}
+
+TEST(Scene, ABodyMayHaveEffectsOfItsOwn) {
+  using synth::Effect;
+  const Scene scene = parse(R"({"duration_s": 2, "effects": {"off": ["two_ears"]}, "bodies": [
+    {"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "a.h5", "effects": ["modal"]}, {"name": "c", "bank": "a.h5", "effects": "auto"}]})");
+  EXPECT_EQ(scene.bodies[0].wish.off, synth::EffectSet{Effect::kTwoEars});
+  EXPECT_TRUE(scene.bodies[0].wish.automatic);
+  EXPECT_EQ(scene.bodies[1].wish.on, synth::EffectSet{Effect::kModal});
+  EXPECT_FALSE(scene.bodies[1].wish.automatic);
+  EXPECT_EQ(scene.bodies[2].wish.off, synth::EffectSet{});
+  EXPECT_TRUE(scene.bodies[2].wish.automatic);
 }
 
 TEST(Scene, TheLeftEarIsOnTheLeft) {
@@ -197,7 +218,20 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"unknown_effect", with_root("\"effects\": [\"dopler\"]"), {":2:", "effects", "dopler", "did you mean \"doppler\"?"}},
         BadScene{"effect_of_tomorrow", with_root("\"effects\": [\"contact_damping\"]"), {"contact_damping", "acceleration_noise"}},
         BadScene{"effect_twice", with_root("\"effects\": [\"modal\", \"modal\"]"), {"effects", "twice"}},
-        BadScene{"effects_as_object", with_root("\"effects\": {}"), {"effects", "list of names"}},
+        BadScene{"object_in_effects", with_root("\"effects\": [{}]"), {":2:", "effects", "list of names"}},
+        BadScene{"effects_by_another_word", with_root("\"effects\": \"all\""), {"effects", "\"all\"", "\"auto\""}},
+        BadScene{"effects_as_number", with_root("\"effects\": 3"), {":2:", "effects"}},
+        BadScene{"effect_on_and_off",
+                 with_root("\"effects\": {\"on\": [\"doppler\"],\n\"off\": [\"modal\", \"doppler\"]}"),
+                 {":3:", "off", "doppler", "keep one"}},
+        BadScene{
+            "unknown_effect_on", with_root("\"effects\": {\n\"on\": [\"hertz_puls\"]}"), {":3:", "on", "did you mean \"hertz_pulse\"?"}},
+        BadScene{"unknown_key_of_effects", with_root("\"effects\": {\"onn\": []}"), {"onn", "\"on\""}},
+        BadScene{"unknown_base_of_effects", with_root("\"effects\": {\"base\": \"all\"}"), {"base", "auto"}},
+        BadScene{"unknown_effect_of_a_body",
+                 R"({"duration_s": 1, "bodies": [{"name": "a", "bank": "a.h5",
+  "effects": ["modl"]}]})",
+                 {":2:", "modl", "did you mean \"modal\"?"}},
         BadScene{"path_and_position",
                  with_root("\"listener\": {\"path\": [[0, 0, 0, 0]], \"position_m\": [1, 1, 1]}"),
                  {":2:", "path", "position_m", "keep one"}},

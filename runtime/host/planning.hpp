@@ -1,0 +1,28 @@
+// The plan of a scene: which effects its bodies call for, from the scene and from what happens in it.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "runtime/host/microphones.hpp"
+#include "runtime/host/scene.hpp"
+#include "runtime/plan/planner.hpp"
+#include "runtime/stream/events.hpp"
+
+namespace carillon::host {
+
+/// What is known before anything moves. Every body's spec has its bank, and the scene outlives the result. `moves`: bodies that are not
+/// fixed may move.
+plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves);
+
+/// A planner that has seen all of a scene, and what it decided.
+struct Plan {
+  plan::SceneFacts facts;
+  plan::Planner planner;
+  std::vector<plan::Change> changes;  // in order of time; the first of every body at 0
+};
+
+/// `events` in order of time.
+Plan make_plan(plan::SceneFacts facts, std::span<const stream::Event> events, const plan::Costs& costs);
+
+}  // namespace carillon::host

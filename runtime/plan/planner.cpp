@@ -1,0 +1,528 @@
+// Method:     every event says what it calls for, and until when: a strike, for as long as its modes and its click are heard; a motion,
+//             when a way to a microphone has changed by more than can be told; a lasting contact, while it slides, rolls or takes energy.
+//             Events wait until the decisions reach the time before which their effects must be on; on a grid of time each body then has
+//             what is still called for, and kHoldS longer. All rules compare an A-weighted share of exposure with one threshold.
+// Source:     Zwislocki 1969 (the ear's time); the equations of each rule in docs/effects.md.
+// Deviations: a phase error is taken at the mean frequency of the loudest strike; modes do not mask each other.
+#include "runtime/plan/planner.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <queue>
+
+#include "runtime/config/error.hpp"
+#include "runtime/synth/ears.hpp"
+#include "runtime/synth/pulse.hpp"
+
+namespace carillon::plan {
+namespace {
+
+using std::numbers::pi;
+using Rule = Reason::Rule;
+constexpr double kNever = -std::numeric_limits<double>::infinity();
+constexpr double kAlways = std::numeric_limits<double>::infinity();
+constexpr EffectSet kContactEffects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};
+constexpr EffectSet kEarEffects{Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars};
+
+std::size_t index(Effect effect) { return static_cast<std::size_t>(effect); }
+
+template <typename Function>
+void for_each_effect(Function function) {
+  for (int i = 0; i < synth::kEffectCount; ++i) function(static_cast<Effect>(i));
+}
+
+double calc_norm(const Vec3& x) { return std::hypot(x[0], x[1], x[2]); }
+
+/// What an effect acts on: without it there is nothing to do. None for kModal and kAirDelay.
+std::optional<Effect> find_base(Effect effect) {
+  if (kContactEffects.has(effect)) return Effect::kModal;
+  if (effect == Effect::kDoppler) return Effect::kAirDelay;
+  return std::nullopt;
+}
+
+}  // namespace
+
+struct Planner::State {
+  struct Body {
+    const BankLevels* bank = nullptr;
+    EffectSet possible;
+    Vec3 position_m{};
+    double nearest_m = kAlways;             // to a microphone, so far
+    double sounds_until_s = kNever;         // at the body
+    double mean_hz = 0.0;                   // of what is heard of it
+    double ring_pa2_s = 0.0, ring_s = 0.0;  // modal exposure of its strikes, falling by 60 dB a second since ring_s
+    std::vector<double> quiet_s;            // per mode of the bank's levels: when it is not heard any more
+    std::vector<double> anchor_m;           // ways to the microphones by which kDoppler is judged
+    std::array<double, synth::kEffectCount> until_s{};
+    std::array<double, synth::kEffectCount> share{};  // the loudest call so far
+    std::array<Reason, synth::kEffectCount> reason;   // of that call
+    std::array<Reason, synth::kEffectCount> call;     // of the last one
+    EffectSet now;
+    bool decided = false;
+    BodyPlan plan;
+  };
+  struct Pending {
+    double from_s = 0.0;
+    std::int64_t order = 0;
+    stream::Event event;
+    bool operator<(const Pending& other) const { return from_s != other.from_s ? from_s > other.from_s : order > other.order; }
+  };
+
+  SceneFacts facts;
+  Costs costs;
+  synth::Track listener{1};
+  std::map<const bank::Bank*, std::unique_ptr<BankLevels>> banks;
+  std::vector<Body> bodies;
+  std::priority_queue<Pending> pending;
+  std::int64_t order = 0, tick = 0;
+  double loudest_pa2_s = 0.0;                           // of all strikes so far
+  std::vector<double> projection, amplitude_pa, way_m;  // working space
+
+  double calc_inaudible_db() const { return std::min(kInaudibleDb, calc_level_db(loudest_pa2_s) - kBelowLoudestDb); }
+  void find_possible(std::size_t body);
+  void refuse(Body& body, Effect effect, const Reason& reason) {
+    body.possible = body.possible.without(effect);
+    body.reason[index(effect)] = reason;
+  }
+  double find_ways(const Body& body, double time_s);
+  void call(Body& body, Effect effect, double share, double until_s, Reason reason, double limit = kTellableShare);
+  void look(Body& body, double time_s);
+  void apply(const Pending& pending);
+  void apply(const stream::Impulse& impulse);
+  void apply(const stream::Contact& contact);
+  EffectSet decide(const BodyFacts& of, Body& body, double time_s) const;
+  void add_costs(Body& body);
+};
+
+Planner::Planner(SceneFacts facts, const Costs& costs) : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.facts = std::move(facts);
+  s.costs = costs;
+  if (s.facts.listener.empty()) s.facts.listener.push_back({});
+  s.listener = synth::make_track(s.facts.listener);
+  if (s.facts.microphones_m.empty()) throw InputError("a plan needs at least one microphone");
+  s.bodies.resize(s.facts.bodies.size());
+  for (std::size_t i = 0; i < s.bodies.size(); ++i) {
+    const BodyFacts& of = s.facts.bodies[i];
+    if (of.bank == nullptr) throw InputError(fmt::format("the plan of \"{}\" needs its bank", of.name));
+    auto& levels = s.banks[of.bank];
+    if (!levels) levels = std::make_unique<BankLevels>(*of.bank, s.facts.rate_hz);
+    State::Body& body = s.bodies[i];
+    body.bank = levels.get();
+    body.position_m = of.position_m;
+    body.until_s.fill(kNever);
+    body.share.fill(-1.0);
+    for (const Effect effect : {Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) {
+      body.reason[index(effect)] = {.rule = Rule::kNoContact};
+    }
+    body.quiet_s.assign(levels->get_modes().size(), kNever);
+    body.nearest_m = s.find_ways(body, 0.0);
+    body.anchor_m = s.way_m;
+    s.find_possible(i);
+  }
+}
+
+Planner::~Planner() = default;
+Planner::Planner(Planner&&) noexcept = default;
+
+/// Rules that hold whatever happens.
+void Planner::State::find_possible(std::size_t number) {
+  const BodyFacts& of = facts.bodies[number];
+  Body& body = bodies[number];
+  body.possible = synth::kCompiledEffects;
+  if (of.fixed) refuse(body, Effect::kAccelerationNoise, {.rule = Rule::kFixed});
+  if (facts.microphones_m.size() < 2) refuse(body, Effect::kTwoEars, {.rule = Rule::kOneMicrophone});
+  if (!facts.moves) {
+    for (const Effect effect : {Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) {
+      refuse(body, effect, {.rule = Rule::kNoContact});
+    }
+  }
+  if (of.fixed && listener.is_still()) refuse(body, Effect::kDoppler, {.rule = Rule::kStill});
+  if (body.bank->get_modes().empty()) {
+    for (const Effect effect : {Effect::kModal, Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) {
+      refuse(body, effect, {.rule = Rule::kNoModes});
+    }
+  }
+  const bool silent = body.bank->get_modes().empty() && of.fixed;
+  if (silent || (!facts.moves && !of.struck)) {
+    for_each_effect([&](Effect effect) {
+      if (body.possible.has(effect)) refuse(body, effect, {.rule = silent ? Rule::kNoModes : Rule::kNotStruck});
+    });
+  }
+}
+
+/// The ways from the body to every microphone, as if sound took no time; the shortest of them.
+double Planner::State::find_ways(const Body& body, double time_s) {
+  const Vec3 ear = listener.find(time_s).position_m;
+  way_m.clear();
+  for (const Vec3& offset : facts.microphones_m) {
+    Vec3 way{};
+    for (std::size_t k = 0; k < 3; ++k) way[k] = ear[k] + offset[k] - body.position_m[k];
+    way_m.push_back(std::max(calc_norm(way), synth::kNearestM));
+  }
+  return *std::min_element(way_m.begin(), way_m.end());
+}
+
+/// Something calls for an effect with that share of the sound, until then.
+void Planner::State::call(Body& body, Effect effect, double share, double until_s, Reason reason, double limit) {
+  const std::size_t e = index(effect);
+  if (!body.possible.has(effect)) return;
+  if (share > body.share[e]) {
+    body.share[e] = share;
+    body.reason[e] = reason;
+  }
+  if (!(share > limit)) return;
+  body.call[e] = reason;
+  body.until_s[e] = std::max(body.until_s[e], until_s);
+}
+
+/// The ways of a body's sound at that time.
+void Planner::State::look(Body& body, double time_s) {
+  const double nearest = find_ways(body, time_s);
+  body.nearest_m = std::min(body.nearest_m, nearest);
+  if (time_s > body.sounds_until_s) return;
+  const double travel_s = nearest / bank::kSoundSpeedMs;
+  const double end_s = body.sounds_until_s + travel_s;
+  const double wave = 2.0 * pi * std::max(body.mean_hz, kLowestHz) / bank::kSoundSpeedMs;  // rad/m
+  const double limit_m = std::sqrt(kTellableShare) / wave;
+  call(body, Effect::kAirDelay, wave * nearest * wave * nearest, end_s, {.rule = Rule::kAirTravel, .value = nearest, .limit = limit_m});
+  double moved = 0.0, apart = 0.0;
+  for (std::size_t m = 0; m < way_m.size(); ++m) {
+    moved = std::max(moved, std::abs(way_m[m] - body.anchor_m[m]));
+    apart = std::max(apart, std::abs(way_m[m] - way_m[0]));
+  }
+  if (way_m.size() > 1) {
+    call(body, Effect::kTwoEars, wave * apart * wave * apart, end_s,
+         {.rule = apart > limit_m ? Rule::kOtherWay : Rule::kSameWay, .value = apart, .limit = limit_m});
+  }
+  call(body, Effect::kDoppler, wave * moved * wave * moved, time_s + travel_s,
+       {.rule = moved > limit_m ? Rule::kMoving : Rule::kStill, .value = moved, .limit = limit_m});
+  if (moved > limit_m) body.anchor_m = way_m;
+}
+
+void Planner::State::apply(const stream::Impulse& impulse) {
+  Body& body = bodies[static_cast<std::size_t>(impulse.body)];
+  const BodyFacts& of = facts.bodies[static_cast<std::size_t>(impulse.body)];
+  if (!body.bank->calc_projections(impulse.triangle, impulse.barycentric, impulse.impulse_n_s, projection)) return;
+  const StrikeLevels levels = calc_strike_levels(*body.bank, projection, impulse.shape, impulse.duration_s, amplitude_pa);
+  const double distance = find_ways(body, impulse.time_s), spreading = 1.0 / (distance * distance);
+  const ClickLevels click =
+      of.fixed ? ClickLevels{} : body.bank->calc_click_levels(calc_norm(impulse.impulse_n_s), impulse.shape, impulse.duration_s);
+  const double heard = levels.modal_pa2_s * spreading, clicked = click.pa2_s * spreading;
+  loudest_pa2_s = std::max(loudest_pa2_s, heard + clicked);
+  body.ring_pa2_s = std::max(heard, body.ring_pa2_s * std::pow(10.0, -6.0 * std::max(0.0, impulse.time_s - body.ring_s)));
+  body.ring_s = impulse.time_s;
+  const double limit_db = calc_inaudible_db(), half_s = 0.5 * impulse.duration_s;
+  const double travel_s = distance / bank::kSoundSpeedMs;
+  const auto weigh = [&](double part) { return heard + clicked > 0.0 ? part / (heard + clicked) : 0.0; };
+  const auto to_db = [](double share) { return 10.0 * std::log10(std::max(share, 1e-30)); };
+
+  const double modal_db = calc_level_db(heard), click_db = calc_level_db(clicked);
+  double end_s = kNever;
+  if (modal_db > limit_db) {
+    // Each mode until its part of what is just not heard is all that is left of it.
+    const double quiet_pa = kReferencePa * std::pow(10.0, limit_db / 20.0) * distance / std::sqrt(static_cast<double>(amplitude_pa.size()));
+    double rung_s = 0.0;
+    const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      const double level = amplitude_pa[m] * modes[m].weight / quiet_pa;
+      if (!(level > 1.0)) continue;
+      const double quiet_s = impulse.time_s + std::log(level) / modes[m].decay_per_s;
+      end_s = std::max(end_s, quiet_s);
+      if (!(quiet_s > body.quiet_s[m])) continue;
+      rung_s += std::max(0.0, std::min(quiet_s, facts.duration_s) - std::max(impulse.time_s, body.quiet_s[m]));
+      body.quiet_s[m] = quiet_s;
+    }
+    end_s = std::max(end_s, impulse.time_s + half_s);
+    body.plan.effects[index(Effect::kModal)].cost_us +=
+        1e-3 * (rung_s * facts.rate_hz * costs.mode_sample_ns + static_cast<double>(modes.size()) * costs.strike_mode_ns);
+    call(body, Effect::kModal, 1.0 + heard, end_s + travel_s, {.rule = Rule::kHeard, .value = modal_db, .distance_m = distance});
+    if (levels.mean_hz > body.mean_hz) body.mean_hz = levels.mean_hz;
+  } else {
+    call(body, Effect::kModal, 0.0, kNever, {.rule = Rule::kTooQuiet, .value = modal_db, .limit = limit_db});
+  }
+  if (!of.fixed && click_db > limit_db) {
+    const double share = clicked / (clicked + body.ring_pa2_s);
+    const bool thumps = bank::kSoundSpeedMs / (2.0 * pi * body.bank->get_radius_m()) < kThumpHz;
+    const double limit = thumps ? kThumpShare / (1.0 + kThumpShare) : kTellableShare;
+    call(body, Effect::kAccelerationNoise, share,
+         impulse.time_s + half_s + travel_s + 20.0 * body.bank->get_radius_m() / bank::kSoundSpeedMs,
+         {.rule = thumps ? Rule::kThump : Rule::kChange, .value = to_db(share), .limit = to_db(limit), .distance_m = click_db}, limit);
+    if (share > limit && !of.wish.off.has(Effect::kAccelerationNoise)) {
+      end_s = std::max(end_s, impulse.time_s + half_s);
+      body.mean_hz = std::max(body.mean_hz, click.mean_hz);
+    }
+  } else if (!of.fixed) {
+    call(body, Effect::kAccelerationNoise, 0.0, kNever, {.rule = Rule::kTooQuiet, .value = click_db, .limit = limit_db});
+  }
+  if (end_s == kNever) {
+    call(body, Effect::kHertzPulse, 0.0, kNever, {.rule = Rule::kTooQuiet, .value = modal_db, .limit = limit_db});
+    return;
+  }
+  // What an impulse without length would add, and to a click all that its pulse takes away.
+  const double lost = weigh((levels.pulse_loss_pa2_s + click.pulse_loss_pa2_s) * spreading);
+  call(body, Effect::kHertzPulse, lost, end_s + travel_s, {.rule = Rule::kChange, .value = to_db(lost), .limit = to_db(kTellableShare)});
+  if (lost > kTellableShare) {
+    body.plan.effects[index(Effect::kHertzPulse)].cost_us +=
+        1e-3 * costs.pulse_mode_sample_ns * static_cast<double>(amplitude_pa.size()) * impulse.duration_s * facts.rate_hz;
+  }
+  body.sounds_until_s = std::max(body.sounds_until_s, end_s);
+  look(body, impulse.time_s);
+}
+
+void Planner::State::apply(const stream::Contact& contact) {
+  Body& body = bodies[static_cast<std::size_t>(contact.body)];
+  if (contact.state == stream::ContactState::kEnd) return;
+  const double slip = calc_norm(contact.slip_m_s);
+  const double sweep = std::max(contact.sweep_m_s, contact.other_sweep_m_s);
+  const bool presses = contact.force_n > 0.0;
+  const auto offer = [&](Effect effect, double speed) {
+    const bool goes = presses && speed > kCreepMs;
+    call(body, effect, goes ? 1.0 + speed : 0.0, contact.time_s,
+         {.rule = goes ? Rule::kSlip : Rule::kNoSlip, .value = speed, .limit = kCreepMs});
+    return goes;
+  };
+  const bool slides = offer(Effect::kRoughness, slip), rolls = offer(Effect::kRolling, sweep);
+  if (slides || rolls) {
+    call(body, Effect::kModal, 1.0, contact.time_s, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
+    body.sounds_until_s = std::max(body.sounds_until_s, contact.time_s + kHoldS);
+    if (body.mean_hz == 0.0) body.mean_hz = 4000.0;  // where a mean frequency is not known the ear is at its best
+    look(body, contact.time_s);
+  }
+  if (contact.time_s > body.sounds_until_s || !(contact.impedance_n_s_m > 0.0)) return;
+  // A dashpot z at the point adds z (phi . n)^2 / 2 to a decay; a decay that is wrong by the part e changes an exposure by e^2 / 2.
+  if (!body.bank->calc_projections(contact.triangle, contact.barycentric, contact.normal, projection)) return;
+  double most = 0.0;
+  const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    if (!slides && !rolls && body.quiet_s[m] < contact.time_s) continue;
+    most = std::max(most, 0.5 * contact.impedance_n_s_m * projection[m] * projection[m] / modes[m].decay_per_s);
+  }
+  const double share = std::min(1.0, 0.5 * most * most);
+  call(body, Effect::kContactDamping, share, contact.time_s,
+       {.rule = Rule::kChange, .value = 10.0 * std::log10(std::max(share, 1e-30)), .limit = 10.0 * std::log10(kTellableShare)});
+}
+
+void Planner::State::apply(const Pending& next) {
+  if (const auto* impulse = std::get_if<stream::Impulse>(&next.event)) apply(*impulse);
+  if (const auto* contact = std::get_if<stream::Contact>(&next.event)) apply(*contact);
+  if (const auto* motion = std::get_if<stream::Motion>(&next.event)) {
+    Body& body = bodies[static_cast<std::size_t>(motion->body)];
+    body.position_m = motion->position_m;
+    look(body, motion->time_s);
+  }
+}
+
+EffectSet Planner::State::decide(const BodyFacts& of, Body& body, double time_s) const {
+  EffectSet set = of.wish.on;
+  if (of.wish.automatic) {
+    for_each_effect([&](Effect effect) {
+      const auto base = find_base(effect);
+      if (of.wish.on.has(effect) && base) set = set.with(*base);  // what is forced on brings what it acts on
+      if (body.until_s[index(effect)] + kHoldS >= time_s) set = set.with(effect);
+    });
+  }
+  set = set.without(of.wish.off);
+  if (!of.wish.automatic) return set;
+  for_each_effect([&](Effect effect) {
+    const auto base = find_base(effect);
+    if (base && !set.has(*base) && !of.wish.on.has(effect)) set = set.without(effect);
+  });
+  if (!set.has(Effect::kModal) && !set.has(Effect::kAccelerationNoise)) {
+    for (const Effect effect : {Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars}) {
+      if (!of.wish.on.has(effect)) set = set.without(effect);
+    }
+  }
+  return set;
+}
+
+/// For one tick with the effects that the body now has.
+void Planner::State::add_costs(Body& body) {
+  const double time_s = static_cast<double>(tick) * kTickS;
+  const double travel_s = body.nearest_m / bank::kSoundSpeedMs;
+  if (time_s > body.sounds_until_s + travel_s || time_s >= facts.duration_s) return;
+  const double samples = kTickS * facts.rate_hz, all = static_cast<double>(facts.microphones_m.size());
+  const double ears = body.now.has(Effect::kTwoEars) ? all : 1.0;
+  const auto add = [&](Effect effect, double ns) {
+    if (body.now.has(effect)) body.plan.effects[index(effect)].cost_us += 1e-3 * samples * ns;
+  };
+  add(Effect::kModal, costs.voice_sample_ns);
+  add(Effect::kAirDelay, costs.ear_sample_ns);
+  add(Effect::kTwoEars, (all - 1.0) * costs.ear_sample_ns);
+  add(Effect::kDoppler, ears * (costs.moving_ear_sample_ns - costs.ear_sample_ns));
+  add(Effect::kAccelerationNoise, ears * costs.dipole_ear_sample_ns + costs.click_sample_ns);
+  for (const Effect effect : {Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) add(effect, costs.force_sample_ns);
+}
+
+EffectSet Planner::get_possible(int body) const {
+  const auto i = static_cast<std::size_t>(body);
+  const Wish& wish = state_->facts.bodies.at(i).wish;
+  const EffectSet offered = wish.automatic ? state_->bodies[i].possible.with(wish.on) : wish.on;
+  return offered.without(wish.off);
+}
+
+bool Planner::needs_contacts() const {
+  for (std::size_t i = 0; i < state_->bodies.size(); ++i) {
+    const EffectSet possible = get_possible(static_cast<int>(i));
+    if (state_->facts.moves && possible.without(kContactEffects) != possible) return true;
+  }
+  return false;
+}
+
+void Planner::watch(const stream::Event& event) {
+  State& s = *state_;
+  double from_s = stream::get_time_s(event);
+  const auto is_ours = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < s.bodies.size(); };
+  if (stream::find_fault(event) != nullptr) return;
+  if (const auto* impulse = std::get_if<stream::Impulse>(&event)) {
+    if (!is_ours(impulse->body)) return;
+    const double lead = s.bodies[static_cast<std::size_t>(impulse->body)].bank->get_radius_m() / bank::kSoundSpeedMs;
+    from_s -= 0.5 * synth::calc_pulse_length(impulse->shape, impulse->duration_s) + lead;
+  } else if (const auto* contact = std::get_if<stream::Contact>(&event)) {
+    if (!is_ours(contact->body)) return;
+  } else if (const auto* motion = std::get_if<stream::Motion>(&event)) {
+    if (!is_ours(motion->body)) return;
+  } else if (const auto* listener = std::get_if<stream::Listener>(&event)) {
+    if (s.order == 0 || s.listener.is_still()) s.listener = synth::Track(4096);
+    s.listener.push({listener->time_s, listener->position_m, listener->velocity_m_s});
+    return;
+  } else {
+    return;
+  }
+  s.pending.push({from_s, s.order++, event});
+}
+
+std::vector<Change> Planner::advance(double known_s) {
+  State& s = *state_;
+  std::vector<Change> changes;
+  for (;; ++s.tick) {
+    const double time_s = static_cast<double>(s.tick) * kTickS, seen_s = time_s + kTickS + kLeadS;
+    if (!(time_s <= s.facts.duration_s) || !(seen_s <= known_s)) break;
+    while (!s.pending.empty() && s.pending.top().from_s <= seen_s) {
+      s.apply(s.pending.top());
+      s.pending.pop();
+    }
+    for (std::size_t i = 0; i < s.bodies.size(); ++i) {
+      State::Body& body = s.bodies[i];
+      if (!s.listener.is_still()) s.look(body, seen_s);
+      const BodyFacts& of = s.facts.bodies[i];
+      const EffectSet set = s.decide(of, body, time_s);
+      if (set != body.now || !body.decided) {
+        Change change{time_s, static_cast<int>(i), set, {}};
+        for_each_effect([&](Effect effect) {
+          const bool on = set.has(effect);
+          if (body.decided && on == body.now.has(effect)) return;
+          EffectPlan& plan = body.plan.effects[index(effect)];
+          if (on && !plan.ever) plan.first_s = time_s;
+          plan.ever = plan.ever || on;
+          plan.switched += on;
+          const bool forced = !of.wish.automatic || of.wish.on.has(effect) || of.wish.off.has(effect);
+          Reason reason = on ? body.call[index(effect)] : body.decided ? Reason{.rule = Rule::kSilent} : body.reason[index(effect)];
+          if (forced) reason = {.rule = of.wish.automatic || on ? Rule::kForced : Rule::kNotOffered};
+          change.switches.push_back({effect, on, reason});
+        });
+        body.now = set;
+        body.decided = true;
+        changes.push_back(std::move(change));
+      }
+      for_each_effect([&](Effect effect) {
+        if (!set.has(effect)) return;
+        EffectPlan& plan = body.plan.effects[index(effect)];
+        plan.last_s = std::min(time_s + kTickS, s.facts.duration_s);
+        plan.on_s += std::max(0.0, plan.last_s - time_s);
+      });
+      s.add_costs(body);
+    }
+  }
+  return changes;
+}
+
+double Planner::get_time_s() const { return static_cast<double>(state_->tick) * kTickS; }
+
+BodyPlan Planner::get_plan(int number) const {
+  const auto i = static_cast<std::size_t>(number);
+  const State::Body& body = state_->bodies.at(i);
+  const Wish& wish = state_->facts.bodies[i].wish;
+  BodyPlan plan = body.plan;
+  for_each_effect([&](Effect effect) {
+    EffectPlan& of = plan.effects[index(effect)];
+    of.reason = body.reason[index(effect)];
+    if (!of.ever) of.cost_us = 0.0;
+    const bool forced = wish.on.has(effect) || wish.off.has(effect);
+    if (forced || !wish.automatic) {
+      of.reason = {.rule = forced && (wish.automatic || wish.on.has(effect)) ? Rule::kForced : Rule::kNotOffered};
+      return;
+    }
+    const auto base = find_base(effect);
+    if (base && (wish.off.has(*base) || (!plan[*base].ever && body.possible.has(effect)))) {
+      of.reason = {.rule = Rule::kNeedsOther, .other = *base};
+    }
+    if (of.ever && of.reason.rule == Rule::kNotStruck) of.reason = {.rule = Rule::kForced};  // brought along
+  });
+  return plan;
+}
+
+double Planner::calc_silence_pa(int number) const {
+  constexpr double kStandardPa = 1e-10;  // of VoiceOptions
+  constexpr double kMargin = 0.25;       // of what is not heard: bodies come nearer, and modes add up
+  const State::Body& body = state_->bodies.at(static_cast<std::size_t>(number));
+  if (!(state_->loudest_pa2_s > 0.0)) return kStandardPa;
+  const double quiet_pa = kReferencePa * std::pow(10.0, state_->calc_inaudible_db() / 20.0);
+  return std::max(kStandardPa, kMargin * quiet_pa * body.nearest_m);
+}
+
+std::string describe(const Reason& r) {
+  switch (r.rule) {
+    case Rule::kForced:
+      return "the scene says so";
+    case Rule::kNotOffered:
+      return "not in the scene's list";
+    case Rule::kNeedsOther:
+      return fmt::format("has nothing to act on without {}", synth::get_name(r.other));
+    case Rule::kNotStruck:
+      return "nothing happens to the body";
+    case Rule::kNoModes:
+      return "no mode between 20 Hz and 20 kHz";
+    case Rule::kTooQuiet:
+      return fmt::format("{:.1f} dB(A), below {:.1f} dB(A) nobody hears it", r.value, r.limit);
+    case Rule::kHeard:
+      return fmt::format("heard with {:.1f} dB(A) at {:.2f} m", r.value, r.distance_m);
+    case Rule::kSilent:
+      return fmt::format("nothing has called for it for {:g} s", kHoldS);
+    case Rule::kChange:
+      return fmt::format("without it the sound would differ by {:.1f} dB, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
+                         r.limit);
+    case Rule::kThump:
+      return fmt::format("a thump of {:.1f} dB in the sound of so large a body, told from it above {:.1f} dB", r.value, r.limit);
+    case Rule::kFixed:
+      return "a body that cannot move has none";
+    case Rule::kOneMicrophone:
+      return "there is one microphone";
+    case Rule::kStill:
+      return r.limit > 0.0 ? fmt::format("way to the microphones changes by {:.3f} mm while it sounds, less than {:.3f} mm", 1e3 * r.value,
+                                         1e3 * r.limit)
+                           : "neither the body nor the listener moves";
+    case Rule::kMoving:
+      return fmt::format("way to a microphone changes while it sounds, by more than {:.3f} mm", 1e3 * r.limit);
+    case Rule::kSameWay:
+      return fmt::format("ways to the microphones differ by {:.3f} mm, less than {:.3f} mm", 1e3 * r.value, 1e3 * r.limit);
+    case Rule::kOtherWay:
+      return fmt::format("ways to the microphones differ by {:.1f} mm, more than {:.3f} mm", 1e3 * r.value, 1e3 * r.limit);
+    case Rule::kNoContact:
+      return "no contact lasts";
+    case Rule::kNoSlip:
+      return fmt::format("{:.2g} mm/s at most, less than {:g} mm/s", 1e3 * r.value, 1e3 * r.limit);
+    case Rule::kSlip:
+      return fmt::format("{:.3g} m/s, more than {:g} mm/s", r.value, 1e3 * r.limit);
+    case Rule::kAirTravel:
+      return fmt::format("{:.2f} m to the nearest microphone, {:.2f} ms", r.value, 1e3 * r.value / bank::kSoundSpeedMs);
+  }
+  return "";
+}
+
+}  // namespace carillon::plan

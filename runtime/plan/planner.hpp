@@ -1,0 +1,163 @@
+// Which effects each body calls for, and why: decided from what is known before anything moves, and from the events as they come.
+//
+//   plan::Planner planner(facts);                           // bodies, listener, wishes of the scene
+//   for (const stream::Event& event : events) planner.watch(event);
+//   for (const plan::Change& change : planner.advance(known_until_s)) synthesiser.set_effects(change.body, change.effects);
+//
+// One thread at a time, never an audio thread: it allocates.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runtime/plan/costs.hpp"
+#include "runtime/plan/levels.hpp"
+#include "runtime/stream/events.hpp"
+#include "runtime/synth/effects.hpp"
+#include "runtime/synth/track.hpp"
+
+namespace carillon::plan {
+
+using stream::Vec3;
+using synth::Effect;
+using synth::EffectSet;
+
+/// The one threshold that all rules share: an effect is called for when leaving it out would change the body's A-weighted sound by more
+/// than this share of its exposure, -50 dB. Errors of several effects and bodies then stay below -40 dB together.
+inline constexpr double kTellableShare = 1e-5;
+/// A sphere of more than 18 cm rings below this frequency, c / 2 pi a, when it is pushed: no click, but a thump where the body's own low
+/// modes are, which the ear does not tell from their onset. It is called for when it raises their level by 1 dB, the least that is heard
+/// (Jesteadt, Wier & Green 1977).
+inline constexpr double kThumpHz = 300.0;
+inline constexpr double kThumpShare = 0.259;
+/// Not heard: 20 dB below the reference of hearing, and at least 90 dB below the loudest strike so far.
+inline constexpr double kInaudibleDb = -20.0;
+inline constexpr double kBelowLoudestDb = 90.0;
+/// Slower than this nothing slides or rolls.
+inline constexpr double kCreepMs = 1e-3;
+/// An effect is on this long before it is needed, and stays on for so long after.
+inline constexpr double kLeadS = 0.02;
+inline constexpr double kHoldS = 0.25;
+/// Decisions are made on this grid of time.
+inline constexpr double kTickS = 0.01;
+
+/// What the scene says about the effects of a body. `on` and `off` have nothing in common.
+struct Wish {
+  bool automatic = true;  // the planner decides about what is neither on nor off; without, that is off
+  EffectSet on{}, off{};
+};
+
+struct BodyFacts {
+  std::string name;
+  const bank::Bank* bank = nullptr;  // with the gains that it is played with; must outlive the planner
+  bool fixed = false;
+  bool struck = false;  // by the scene itself
+  Vec3 position_m{};    // of the centre of mass, at the beginning
+  Wish wish{};
+};
+
+struct SceneFacts {
+  double rate_hz = 48000.0;
+  double duration_s = std::numeric_limits<double>::infinity();
+  std::vector<BodyFacts> bodies;
+  bool moves = true;                       // some body may move, and so touch others
+  std::vector<Vec3> microphones_m;         // from the listener, a channel each
+  std::vector<synth::Place> listener{{}};  // its way, as far as it is known; at least one place
+};
+
+/// The numbers that decided, and what they mean.
+struct Reason {
+  enum class Rule : std::uint8_t {
+    kForced,      // by the scene
+    kNotOffered,  // the scene gives a list without it
+    kNeedsOther,  // an effect on which it depends is off; `other`
+    kNotStruck,   // nothing has happened to the body
+    kNoModes,     // none that is heard
+    kTooQuiet,    // value: level [dB(A)], limit
+    kHeard,       // value: level [dB(A)], distance [m]
+    kSilent,      // it has died away
+    kChange,      // value: the change that leaving it out makes [dB], limit: kTellableShare in dB
+    kThump,       // value: its share of the sound [dB], limit: kThumpShare in dB
+    kFixed,       // cannot be accelerated
+    kOneMicrophone,
+    kStill,  // value: the farthest that its way to a microphone changed [m], limit [m]
+    kMoving,
+    kSameWay,  // value: the largest difference of the ways to two microphones [m], limit [m]
+    kOtherWay,
+    kNoContact,  // no contact lasts
+    kNoSlip,     // value: speed [m/s], limit
+    kSlip,
+    kAirTravel  // value: distance [m]
+  };
+  Rule rule = Rule::kNotStruck;
+  double value = 0.0, limit = 0.0, distance_m = 0.0;
+  Effect other = Effect::kModal;
+};
+
+/// As a sentence without a full stop: "leaving it out would change the sound by -23.1 dB, more than -50 dB".
+std::string describe(const Reason& reason);
+
+/// One effect that goes on or off, and why.
+struct Switch {
+  Effect effect = Effect::kModal;
+  bool on = false;
+  Reason reason;
+};
+
+/// From `time_s` on a body has these effects. The first of a body lists all of them, later ones what changes.
+struct Change {
+  double time_s = 0.0;
+  int body = 0;
+  EffectSet effects;
+  std::vector<Switch> switches;
+};
+
+/// An effect of a body over the whole scene so far.
+struct EffectPlan {
+  bool ever = false;                   // it was on at some time
+  double on_s = 0.0;                   // for so long
+  double first_s = 0.0, last_s = 0.0;  // from, until
+  int switched = 0;                    // times that it went on
+  Reason reason;                       // of the decision that weighed most: what called loudest for it, or else why nothing did
+  double cost_us = 0.0;                // CPU time that it will take, all together
+};
+
+struct BodyPlan {
+  std::array<EffectPlan, synth::kEffectCount> effects;
+  const EffectPlan& operator[](Effect effect) const { return effects[static_cast<std::size_t>(effect)]; }
+};
+
+class Planner {
+ public:
+  /// Throws InputError when a body has no bank, or arrays of a bank disagree.
+  explicit Planner(SceneFacts facts, const Costs& costs = {});
+  ~Planner();
+  Planner(Planner&&) noexcept;
+
+  /// What a body may call for whatever happens, by what is known before anything moves: banks, places, the listener's way, wishes.
+  EffectSet get_possible(int body) const;
+  /// Whether any plan may hang on contacts that last: the physics need not record them otherwise.
+  bool needs_contacts() const;
+
+  /// Events in order of their time, of the bodies by their index; others are not looked at.
+  void watch(const stream::Event& event);
+
+  /// Decides for all times for which is known what happens kLeadS later. `known_s`: nothing earlier will be watched from now on. Changes in
+  /// order of time; the first call gives one for every body.
+  std::vector<Change> advance(double known_s);
+
+  double get_time_s() const;  // up to which it has decided
+  BodyPlan get_plan(int body) const;
+  /// Below this pressure at 1 m [Pa] a body is not heard at any microphone, by what has been watched so far.
+  double calc_silence_pa(int body) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace carillon::plan
