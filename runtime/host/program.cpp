@@ -109,16 +109,6 @@ void print_warnings(const Scene& scene, const Sound& sound, const Figures& figur
   if (sound.resets > 0) fmt::print(stderr, "warning: {} times a body's state was no number and was cleared\n", sound.resets);
 }
 
-/// Runs the physics and prints what each body calls for; no sound is made.
-void print_plan(const ProgramOptions& options, const Scene& scene) {
-  plan::SceneFacts facts = make_facts(scene, make_microphones(scene), has_physics(scene));
-  const bool needs_contacts = plan::Planner(facts).needs_contacts();
-  const Course course =
-      options.contacts ? read_course(*options.contacts, scene) : simulate(scene, needs_contacts, Progress("physics", options.quiet));
-  const Plan plan = make_plan(std::move(facts), course.recording.events, plan::measure_costs());
-  fmt::print("{}", plan::format_plan(plan.planner, plan.facts));
-}
-
 void write_output(const fs::path& file, const std::string& bytes, const char* what) {
   config::write_file(file, bytes);
   fmt::print("{:<18} {}\n", what, file.string());
@@ -144,8 +134,7 @@ void run(const ProgramOptions& options) {
   }
   check_outputs(options, scene);
   const Banks banks = read_banks(scene);
-  if (options.plan) return print_plan(options, scene);
-
+  plan::SceneFacts facts = make_facts(scene, make_microphones(scene), options.contacts.has_value() || has_physics(scene));
   std::vector<const bank::Bank*> body_banks;
   std::vector<contact::Vec3> centres_m;
   for (const SceneBody& body : scene.bodies) {
@@ -156,14 +145,22 @@ void run(const ProgramOptions& options) {
   Figures figures;
   figures.bodies = scene.bodies.size();
   auto started = Clock::now();
-  const Course course = options.contacts ? read_course(*options.contacts, scene)
-                                         : simulate(scene, options.record.has_value(), Progress("physics", options.quiet));
+  const bool has_contacts = options.record.has_value() || plan::Planner(facts).needs_contacts();
+  const Course course =
+      options.contacts ? read_course(*options.contacts, scene) : simulate(scene, has_contacts, Progress("physics", options.quiet));
   figures.physics_s = get_seconds_since(started);
+  const bool measures = options.plan || options.report.has_value();
+  const Plan plan = make_plan(std::move(facts), course.recording.events, measures ? plan::measure_costs() : plan::Costs{});
+  if (options.plan) {
+    fmt::print("{}", plan::format_plan(plan.planner, plan.facts));
+    return;
+  }
   contact::Simulation simulation = contact::collect(course.recording.events, centres_m);
   simulation.steps = course.steps;
   started = Clock::now();
-  const Sound sound = calc_sound(scene, body_banks, course.recording.events,
-                                 {.rate_hz = scene.sample_rate_hz, .progress = Progress("sound", options.quiet)});
+  const Sound sound =
+      calc_sound(scene, body_banks, course.recording.events,
+                 {.rate_hz = scene.sample_rate_hz, .plan = &plan, .measures = measures, .progress = Progress("sound", options.quiet)});
   figures.sound_s = get_seconds_since(started);
   figures.real_time_factor = (figures.physics_s + figures.sound_s) / scene.duration_s;
   figures.modes = sound.modes;
@@ -180,7 +177,7 @@ void run(const ProgramOptions& options) {
                               : "";
   const std::string trajectory = options.trajectory ? make_trajectory_json(scene, body_banks, simulation) : "";
   const std::string recording = options.record ? stream::format_recording(course.recording) : "";
-  const std::string report = options.report ? make_report_json(scene, simulation, sound, figures) : "";
+  const std::string report = options.report ? make_report_json(scene, simulation, sound, plan, figures) : "";
   print_summary(scene, sound, figures);
   print_warnings(scene, sound, figures);
   if (options.spectrogram) write_output(*options.spectrogram, png, "spectrogram");

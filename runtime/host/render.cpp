@@ -74,13 +74,57 @@ std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank:
   return courses;
 }
 
-/// What of the scene's effects a body has: nothing pushes one that is fixed, and microphones stay where they are put.
-synth::EffectSet find_effects(const Scene& scene, std::size_t body, bool is_played) {
+/// What of its effects a body can have: nothing pushes one that is fixed, and microphones stay where they are put.
+synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects, bool is_played) {
   if (!is_played) return {};
-  synth::EffectSet effects = scene.effects;
   if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
   return effects;
+}
+
+/// The changes of a plan, made when their time has come.
+class Changes {
+ public:
+  Changes(const Scene& scene, const std::vector<BodyCourse>& courses, const Plan* plan) : scene_(&scene), courses_(&courses) {
+    if (plan != nullptr) changes_ = plan->changes;
+  }
+  /// What a body begins with, and what it has at any time.
+  synth::EffectSet find_first(std::size_t body) const {
+    const auto first = std::find_if(changes_.begin(), changes_.end(), [&](const auto& change) { return is_of(change, body); });
+    return find(body, first == changes_.end() ? scene_->effects : first->effects);
+  }
+  synth::EffectSet find_all(std::size_t body) const {
+    synth::EffectSet all = find_first(body);
+    for (const plan::Change& change : changes_)
+      if (is_of(change, body)) all = all.with(find(body, change.effects));
+    return all;
+  }
+  void apply(double until_s, synth::Synthesiser& synthesiser) {
+    if (changes_.empty()) return;
+    synthesiser.collect();
+    for (; next_ < changes_.size() && changes_[next_].time_s < until_s; ++next_) {
+      const int body = changes_[next_].body;
+      const synth::EffectSet effects = find(static_cast<std::size_t>(body), changes_[next_].effects);
+      if (effects != synthesiser.get_effects(body)) synthesiser.set_effects(body, effects);
+    }
+  }
+
+ private:
+  static bool is_of(const plan::Change& change, std::size_t body) { return static_cast<std::size_t>(change.body) == body; }
+  synth::EffectSet find(std::size_t body, synth::EffectSet effects) const {
+    return find_effects(*scene_, body, effects, (*courses_)[body].is_played);
+  }
+
+  const Scene* scene_;
+  const std::vector<BodyCourse>* courses_;
+  std::span<const plan::Change> changes_;
+  std::size_t next_ = 0;
+};
+
+/// Below which pressure at 1 m a body sleeps: where the planner is free to say so, what nobody hears.
+double find_silence_pa(const Scene& scene, std::size_t body, const Plan* plan) {
+  const bool is_planned = plan != nullptr && scene.bodies[body].wish.automatic && !scene.bodies[body].wish.on.has(Effect::kModal);
+  return is_planned ? plan->planner.calc_silence_pa(static_cast<int>(body)) : synth::BodySettings{}.silence_pa;
 }
 
 /// How far the microphones ever get from where the first of them starts.
@@ -105,15 +149,16 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
 
   Sound sound;
   sound.rate_hz = options.rate_hz;
+  Changes changes(scene, courses, options.plan);
   std::vector<FedBody> fed(scene.bodies.size());
   std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;  // bodies of the same bank share its tables
   std::vector<std::shared_ptr<const synth::Model>> body_models;
   for (std::size_t i = 0; i < fed.size(); ++i) {
-    const synth::EffectSet effects = find_effects(scene, i, courses[i].is_played);
+    const synth::EffectSet effects = changes.find_all(i);
     sound.body_effects.push_back(effects);
     std::shared_ptr<const synth::Model>& model = models[banks[i]];
     if (!model) {
-      const bool clicks = scene.effects.has(Effect::kAccelerationNoise);
+      const bool clicks = options.plan != nullptr || scene.effects.has(Effect::kAccelerationNoise);
       model =
           synth::Model::make(*banks[i], {.rate_hz = rate_hz, .sphere_radius_m = clicks ? radiation::calc_sphere_radius_m(*banks[i]) : 0.0});
     }
@@ -135,7 +180,8 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     const double longest_m = std::min(courses[i].reach_m + ears_reach_m, kFarthestHeardM);
     synthesiser.add_body(body_models[i], {.position_m = courses[i].first.position_m,
                                           .rotation = courses[i].first.rotation,
-                                          .effects = sound.body_effects[i],
+                                          .effects = changes.find_first(i),
+                                          .silence_pa = find_silence_pa(scene, i, options.plan),
                                           .longest_m = longest_m,
                                           .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs)});
   }
@@ -151,6 +197,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   const auto first_time = std::chrono::steady_clock::now();
   for (std::size_t start = 0; start < samples; start += kBlock) {
     const std::size_t count = std::min(kBlock, samples - start);
+    changes.apply(static_cast<double>(start + kBlock) / rate_hz, synthesiser);
     feed.hand_on(static_cast<double>(start + kBlock) / rate_hz, synthesiser);
     synthesiser.process(out.data(), static_cast<int>(channels), static_cast<int>(count));
     for (std::size_t c = 0; c < channels; ++c) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/stream/events.hpp"
 #include "runtime/synth/effects.hpp"
@@ -25,7 +26,7 @@ struct Sound {
   std::int64_t strikes = 0;                            // impulses that were played
   std::int64_t refused = 0;                            // impulses that could not be (too many at once, not finite)
   std::int64_t resets = 0;                             // bodies cleared because their state was no number
-  std::vector<synth::EffectSet> body_effects;          // per body, what it was given
+  std::vector<synth::EffectSet> body_effects;          // per body, what it had at any time
   std::vector<synth::EffectCounters> effect_counters;  // per body, at the end
   double seconds_per_tick = 0.0;                       // of the counters' ticks; 0 where they were not asked for
   double seconds_cpu = 0.0;
@@ -33,6 +34,7 @@ struct Sound {
 
 struct RenderOptions {
   int rate_hz = 48000;
+  const Plan* plan = nullptr;              // whose changes the bodies follow; without, all bodies have the scene's effects
   bool measures = false;                   // what each effect of each body costs
   std::function<void(double)> progress{};  // may be empty; called with the finished fraction
 };

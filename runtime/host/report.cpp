@@ -8,11 +8,13 @@
 
 #include "runtime/config/document.hpp"
 #include "runtime/host/pose.hpp"
+#include "runtime/plan/table.hpp"
 
 namespace carillon::host {
 namespace {
 
 constexpr double kPosesPerS = 200.0;
+constexpr std::size_t kMostChanges = 10000;
 
 /// JSON has no infinity: silence has the level null.
 std::string make_level(double db) { return std::isfinite(db) ? fmt::format("{:.2f}", db) : "null"; }
@@ -37,6 +39,19 @@ contact::Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse&
     for (int k = 0; k < 3; ++k) point[k] += impulse.barycentric[corner] * bank.vertices_m[vertex][k];
   }
   return point;
+}
+
+/// What the effects of a body have done and cost, as members of a JSON object.
+plan::MoreJson list_measured(const Sound& sound, std::size_t body, double duration_s) {
+  plan::MoreJson more;
+  const synth::EffectCounters& counters = sound.effect_counters[body];
+  for (int e = 0; e < synth::kEffectCount; ++e) {
+    const auto effect = static_cast<synth::Effect>(e);
+    more[static_cast<std::size_t>(e)] =
+        fmt::format("\"measured_us_per_s\": {:.4g}, \"units\": {}",
+                    1e6 * static_cast<double>(counters.ticks[effect]) * sound.seconds_per_tick / duration_s, counters.units[effect]);
+  }
+  return more;
 }
 
 }  // namespace
@@ -76,7 +91,8 @@ std::string make_trajectory_json(const Scene& scene, const std::vector<const ban
   return json;
 }
 
-std::string make_report_json(const Scene& scene, const contact::Simulation& simulation, const Sound& sound, const Figures& f) {
+std::string make_report_json(const Scene& scene, const contact::Simulation& simulation, const Sound& sound, const Plan& plan,
+                             const Figures& f) {
   std::string json = "{\n";
   auto out = std::back_inserter(json);
   fmt::format_to(out, " \"scene\": {},\n \"duration_s\": {},\n \"sample_rate_hz\": {},\n \"samples\": {},\n \"channels\": {},\n",
@@ -86,8 +102,10 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
                  " \"bodies\": {},\n \"modes\": {},\n \"contacts\": {},\n \"impulses\": {},\n \"impulses_played\": {},\n "
                  "\"impulses_refused\": {},\n \"resets\": {},\n",
                  f.bodies, f.modes, f.contacts, simulation.impulses.size(), sound.strikes, sound.refused, sound.resets);
-  fmt::format_to(out, " \"physics_steps\": {},\n \"physics_s\": {:.4f},\n \"sound_s\": {:.4f},\n \"real_time_factor\": {:.4f},\n",
-                 simulation.steps, f.physics_s, f.sound_s, f.real_time_factor);
+  fmt::format_to(out,
+                 " \"physics_steps\": {},\n \"physics_s\": {:.4f},\n \"sound_s\": {:.4f},\n \"sound_cpu_s\": {:.5f},\n "
+                 "\"real_time_factor\": {:.4f},\n",
+                 simulation.steps, f.physics_s, f.sound_s, sound.seconds_cpu, f.real_time_factor);
   fmt::format_to(
       out, " \"peak_pa\": {:.6g},\n \"mean_db_spl\": {},\n \"loudest_db_spl\": {},\n \"gain_per_pa\": {:.6g},\n \"gain_reduced\": {},\n",
       f.peak_pa, make_level(f.levels.mean_db), make_level(f.levels.loudest_db), f.gain.per_pa, f.gain.reduced);
@@ -95,10 +113,11 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const auto played = std::count_if(simulation.impulses.begin(), simulation.impulses.end(),
                                       [i](const contact::Impulse& impulse) { return impulse.body == static_cast<std::int32_t>(i); });
-    fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g}}}", i == 0 ? "" : ",",
-                   config::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i]);
+    fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   \"effects\": {}}}",
+                   i == 0 ? "" : ",", config::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i],
+                   plan::make_plan_json(plan.planner, plan.facts, static_cast<int>(i), list_measured(sound, i, scene.duration_s)));
   }
-  json += "\n ]\n}\n";
+  fmt::format_to(out, "\n ],\n \"changes\": {}\n}}\n", plan::make_changes_json(plan.changes, plan.facts, kMostChanges));
   return json;
 }
 

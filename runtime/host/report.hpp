@@ -23,7 +23,8 @@ struct Figures {
   Gain gain;
   double real_time_factor = 0.0;  // (physics_s + sound_s) / duration: below 1 is faster than real time
 };
-std::string make_report_json(const Scene& scene, const contact::Simulation& simulation, const Sound& sound, const Figures& figures);
+std::string make_report_json(const Scene& scene, const contact::Simulation& simulation, const Sound& sound, const Plan& plan,
+                             const Figures& figures);
 
 /// Number of contacts among the impulses.
 std::int64_t count_contacts(const contact::Simulation& simulation);

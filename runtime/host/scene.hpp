@@ -30,9 +30,8 @@ inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm3
 inline const std::vector<std::string> kGainKindNames{"osg02", "sphere"};
 
 /// What carillon-render can play, and what it plays where nobody plans.
-inline constexpr synth::EffectSet kPlayableEffects{synth::Effect::kModal,    synth::Effect::kHertzPulse, synth::Effect::kAccelerationNoise,
-                                                   synth::Effect::kAirDelay, synth::Effect::kDoppler,    synth::Effect::kTwoEars};
-inline constexpr synth::EffectSet kDefaultEffects = kPlayableEffects.without(synth::Effect::kAccelerationNoise);
+inline constexpr synth::EffectSet kPlayableEffects = synth::kCompiledEffects;
+inline constexpr synth::EffectSet kDefaultEffects = synth::kUsualEffects;
 
 struct SceneBody {
   std::string name;

@@ -81,6 +81,8 @@ struct Planner::State {
   std::priority_queue<Pending> pending;
   std::int64_t order = 0, tick = 0;
   double loudest_pa2_s = 0.0;                           // of all strikes so far
+  Vec3 middle{};                                        // of the microphones
+  double middle_m = 0.0;                                // way to it
   std::vector<double> projection, amplitude_pa, way_m;  // working space
 
   double calc_inaudible_db() const { return std::min(kInaudibleDb, calc_level_db(loudest_pa2_s) - kBelowLoudestDb); }
@@ -106,6 +108,8 @@ Planner::Planner(SceneFacts facts, const Costs& costs) : state_(std::make_unique
   if (s.facts.listener.empty()) s.facts.listener.push_back({});
   s.listener = synth::make_track(s.facts.listener);
   if (s.facts.microphones_m.empty()) throw InputError("a plan needs at least one microphone");
+  for (const Vec3& place : s.facts.microphones_m)
+    for (std::size_t k = 0; k < 3; ++k) s.middle[k] += place[k] / static_cast<double>(s.facts.microphones_m.size());
   s.bodies.resize(s.facts.bodies.size());
   for (std::size_t i = 0; i < s.bodies.size(); ++i) {
     const BodyFacts& of = s.facts.bodies[i];
@@ -156,7 +160,7 @@ void Planner::State::find_possible(std::size_t number) {
   }
 }
 
-/// The ways from the body to every microphone, as if sound took no time; the shortest of them.
+/// The ways from the body to every microphone and to their middle, as if sound took no time; the shortest of the microphones.
 double Planner::State::find_ways(const Body& body, double time_s) {
   const Vec3 ear = listener.find(time_s).position_m;
   way_m.clear();
@@ -165,6 +169,9 @@ double Planner::State::find_ways(const Body& body, double time_s) {
     for (std::size_t k = 0; k < 3; ++k) way[k] = ear[k] + offset[k] - body.position_m[k];
     way_m.push_back(std::max(calc_norm(way), synth::kNearestM));
   }
+  middle_m = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) middle_m += std::pow(ear[k] + middle[k] - body.position_m[k], 2.0);
+  middle_m = std::max(std::sqrt(middle_m), synth::kNearestM);
   return *std::min_element(way_m.begin(), way_m.end());
 }
 
@@ -194,7 +201,7 @@ void Planner::State::look(Body& body, double time_s) {
   double moved = 0.0, apart = 0.0;
   for (std::size_t m = 0; m < way_m.size(); ++m) {
     moved = std::max(moved, std::abs(way_m[m] - body.anchor_m[m]));
-    apart = std::max(apart, std::abs(way_m[m] - way_m[0]));
+    apart = std::max(apart, std::abs(way_m[m] - middle_m));
   }
   if (way_m.size() > 1) {
     call(body, Effect::kTwoEars, wave * apart * wave * apart, end_s,
@@ -510,9 +517,11 @@ std::string describe(const Reason& r) {
     case Rule::kMoving:
       return fmt::format("way to a microphone changes while it sounds, by more than {:.3f} mm", 1e3 * r.limit);
     case Rule::kSameWay:
-      return fmt::format("ways to the microphones differ by {:.3f} mm, less than {:.3f} mm", 1e3 * r.value, 1e3 * r.limit);
+      return fmt::format("ways to the microphones differ from that to their middle by {:.3f} mm, less than {:.3f} mm", 1e3 * r.value,
+                         1e3 * r.limit);
     case Rule::kOtherWay:
-      return fmt::format("ways to the microphones differ by {:.1f} mm, more than {:.3f} mm", 1e3 * r.value, 1e3 * r.limit);
+      return fmt::format("ways to the microphones differ from that to their middle by {:.1f} mm, more than {:.3f} mm", 1e3 * r.value,
+                         1e3 * r.limit);
     case Rule::kNoContact:
       return "no contact lasts";
     case Rule::kNoSlip:

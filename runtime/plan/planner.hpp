@@ -39,8 +39,9 @@ inline constexpr double kInaudibleDb = -20.0;
 inline constexpr double kBelowLoudestDb = 90.0;
 /// Slower than this nothing slides or rolls.
 inline constexpr double kCreepMs = 1e-3;
-/// An effect is on this long before it is needed, and stays on for so long after.
-inline constexpr double kLeadS = 0.02;
+/// An effect is on this long before it is needed, so that a change that is still on its way to the ears is over; and stays on for so long
+/// after.
+inline constexpr double kLeadS = 0.05;
 inline constexpr double kHoldS = 0.25;
 /// Decisions are made on this grid of time.
 inline constexpr double kTickS = 0.01;
@@ -86,7 +87,7 @@ struct Reason {
     kOneMicrophone,
     kStill,  // value: the farthest that its way to a microphone changed [m], limit [m]
     kMoving,
-    kSameWay,  // value: the largest difference of the ways to two microphones [m], limit [m]
+    kSameWay,  // value: the largest difference of a way to a microphone from the way to their middle [m], limit [m]
     kOtherWay,
     kNoContact,  // no contact lasts
     kNoSlip,     // value: speed [m/s], limit

@@ -49,7 +49,7 @@ std::string format_plan(const Planner& planner, const SceneFacts& facts) {
   return text;
 }
 
-std::string make_plan_json(const Planner& planner, const SceneFacts& facts, int body) {
+std::string make_plan_json(const Planner& planner, const SceneFacts& facts, int body, const MoreJson& more) {
   std::string json = "{";
   auto out = std::back_inserter(json);
   const double duration = find_duration(planner, facts);
@@ -57,8 +57,9 @@ std::string make_plan_json(const Planner& planner, const SceneFacts& facts, int 
   for (int e = 0; e < synth::kEffectCount; ++e) {
     const auto effect = static_cast<Effect>(e);
     const EffectPlan& of = plan[effect];
-    fmt::format_to(out, "{}\"{}\": {{\"on_s\": {:.3f}, \"switched\": {}, \"predicted_us_per_s\": {:.4g}, \"why\": {}}}", e == 0 ? "" : ", ",
-                   synth::get_name(effect), of.on_s, of.switched, of.cost_us / duration, quote(describe(of.reason)));
+    fmt::format_to(out, "{}\"{}\": {{\"on_s\": {:.3f}, \"switched\": {}, \"predicted_us_per_s\": {:.4g}, \"why\": {}{}{}}}",
+                   e == 0 ? "" : ",\n   ", synth::get_name(effect), of.on_s, of.switched, of.cost_us / duration, quote(describe(of.reason)),
+                   more[static_cast<std::size_t>(e)].empty() ? "" : ", ", more[static_cast<std::size_t>(e)]);
   }
   return json + "}";
 }

@@ -103,7 +103,9 @@ TEST(Scene, EffectsAreThoseOfTheList) {
   EXPECT_TRUE(usual.automatic);
   EXPECT_EQ(usual.on.with(usual.off), synth::EffectSet{});
   EXPECT_TRUE(parse_effects("\"auto\"").automatic);
-  const auto list = parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears"])");
+  const auto list =
+      parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears", "roughness", "rolling",
+    "contact_damping"])");
   EXPECT_FALSE(list.automatic);
   EXPECT_EQ(list.on, kPlayableEffects);
   EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
@@ -216,7 +218,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"gain_zero", with_root("\"output\": {\"gain\": 0}"), {"gain", "greater than 0"}},
         BadScene{"unknown_format", with_root("\"output\": {\"format\": \"pcm25\"}"), {"format", "pcm24"}},
         BadScene{"unknown_effect", with_root("\"effects\": [\"dopler\"]"), {":2:", "effects", "dopler", "did you mean \"doppler\"?"}},
-        BadScene{"effect_of_tomorrow", with_root("\"effects\": [\"contact_damping\"]"), {"contact_damping", "acceleration_noise"}},
+        BadScene{"effect_of_tomorrow", with_root("\"effects\": [\"reverberation\"]"), {"reverberation", "acceleration_noise"}},
         BadScene{"effect_twice", with_root("\"effects\": [\"modal\", \"modal\"]"), {"effects", "twice"}},
         BadScene{"object_in_effects", with_root("\"effects\": [{}]"), {":2:", "effects", "list of names"}},
         BadScene{"effects_by_another_word", with_root("\"effects\": \"all\""), {"effects", "\"all\"", "\"auto\""}},

@@ -249,11 +249,13 @@ TEST(Planner, TwoEarsAreForSourcesBesideTheMiddle) {
     stage.body().position_m = {x, 2.0, 0.0};
     return find_effects(play(stage.facts, {make_strike(0.5, 0.01)}), 0.5).has(Effect::kTwoEars);
   };
-  // The ways differ by 0.2 x / r: 0.17 mm at 1 kHz, which is 1.7 mm beside the middle.
-  const double limit = std::sqrt(1e-5) * kC / (2.0 * pi * 1000.0) * 2.0 / 0.2;
+  EXPECT_TRUE(has(0.0)) << "both ears are 2.5 mm farther away than the middle between them";
+  // Two microphones 2 cm apart: the ways differ from that to the middle by 0.01 x / r, and 0.17 mm can be told at 1 kHz.
+  stage.facts.microphones_m = {{-0.01, 0.0, 0.0}, {0.01, 0.0, 0.0}};
+  const double limit = std::sqrt(1e-5) * kC / (2.0 * pi * 1000.0) * 2.0 / 0.01;
   EXPECT_FALSE(has(0.0));
-  EXPECT_FALSE(has(0.9 * limit));
-  EXPECT_TRUE(has(1.1 * limit));
+  EXPECT_FALSE(has(0.8 * limit));
+  EXPECT_TRUE(has(1.2 * limit));
   stage.facts.microphones_m = {{0.3, 0.0, 0.0}};
   EXPECT_FALSE(has(0.5));
 }
