@@ -76,11 +76,69 @@ struct Drive {
   float ramp[2][kTerms];  // moments of 1 - u and of u, times the length of a sample [s]
 };
 
-/// A group of modes as filters of one input: y[n] = a1 y[n-1] + a2 y[n-2] + x[n], pressure = sum of gain y[n].
-template <typename Number>
-struct alignas(64) FilterGroup {
-  Number a1[kGroup], a2[kGroup], gain[kGroup];
-  Number y1[kGroup], y2[kGroup];  // y[n-1], y[n-2]
+inline constexpr int kGridPoints = 256;  // frequencies of the grid on which the modes of a driven bank meet, 0 to the sample rate
+inline constexpr int kReach = 8;         // of them that make up a mode of little damping; of more: twice or three times as many
+inline constexpr int kGridMargin = 16;   // of grid points below the first and above the one of the Nyquist frequency
+inline constexpr int kGridSize = 128 + 3 * kGridMargin;  // floats of a grid: one point at the Nyquist frequency, the rest for whole vectors
+inline constexpr int kRunStep = 2, kPointStep = 2;       // modes of runs and points of windows are multiples: few loops end by surprise
+inline constexpr int kTapMargin = 16, kTapLength = kTapMargin + kPeriod;
+
+/// Sixteen numbers, aligned.
+struct alignas(64) LaneRow {
+  float value[kGroup];
+};
+
+/// What the transforms between a period of samples and the grid need.
+struct alignas(64) GridTransform {
+  float window[kPeriod];                         // by which the sums of grid exponentials are multiplied
+  float turn_re[8][16], turn_im[8][16];          // e^{2 pi i j k / 16}
+  float twiddle_re[16][16], twiddle_im[16][16];  // e^{2 pi i j k / 256}
+  float alternate[16];                           // 1, -1, ...
+};
+
+/// How each mode turns over a period while nothing drives it, and what a step of 1 N at the start of a period makes of it.
+struct alignas(64) FilterTurn {
+  double re[kGroup], im[kGroup];
+  float step_re[kGroup], step_im[kGroup];
+};
+
+/// The grid points that a group of modes listens to, counted from kGridMargin below zero.
+struct GridWindow {
+  int first, points;
+};
+
+/// Modes that follow each other and add to the same kReach grid points; behind them, up to a multiple of kRunStep, others with zeros for
+/// rows. `place`: of the first point in the copy of the grid whose windows begin at the same multiple of kReach, so that those of one copy
+/// do not overlap unless they are the same, and no run waits for what the one before it has stored.
+struct GridRun {
+  int first_mode, modes, place;
+};
+
+/// Modes that are in no grid: re + i im is c^t, scale what stands before the sum of input[kPeriod - 1 - t] c^t.
+struct alignas(64) DirectTable {
+  float re[kGroup][kPeriod], im[kGroup][kPeriod];
+  float scale_re[kGroup], scale_im[kGroup];
+};
+
+/// The answer of a bank to an impulse, 16 times: tap[s][kTapMargin + n] is that after n - s samples, zero before the impulse.
+struct alignas(64) ResponseTable {
+  float tap[16][kTapLength];
+};
+
+/// A driven bank: `groups` of modes on the grid, then `direct_groups` of others.
+struct FilterBank {
+  const GridTransform* transform = nullptr;
+  int groups = 0, direct_groups = 0, run_count = 0;
+  const FilterTurn* turns = nullptr;
+  const GridWindow* windows = nullptr;  // of the groups of the grid
+  const float* weights = nullptr;       // for each group, [point][re, im][mode]
+  const GridRun* runs = nullptr;
+  const float* rows = nullptr;  // for each mode of each run, [re, im][kReach]
+  const DirectTable* direct = nullptr;
+  ModeState* states = nullptr;
+  float* start_re = nullptr;  // the states in single precision
+  float* start_im = nullptr;
+  float* copies = nullptr;  // kReach x 2 x kGridSize zeros
 };
 
 struct Kernels {
@@ -101,9 +159,12 @@ struct Kernels {
   /// their brakes, kept below the mode's angle; e is linear between both ends.
   void (*drive)(const StrikeTable* strike, const TurnTable* turn, const Drive& drive, int quantum, ModeState* state, Starts* starts,
                 int groups, float* out) noexcept;
-  /// Adds the pressure that an input makes, 1 to kPeriod samples of both.
-  void (*filter)(FilterGroup<float>* modes, int groups, const float* input, int samples, float* out) noexcept;
-  void (*filter_double)(FilterGroup<double>* modes, int groups, const double* input, int samples, double* out) noexcept;
+  /// Takes a period of input, and a step of force at its end, and gives the pressure of the modes in the next one by what drove them until
+  /// now.
+  void (*filter)(const FilterBank& bank, const float* input, double step, float* ringing) noexcept;
+  /// What a period's input makes in quantum `tile` of the same period, from the period's start on. What is behind the quantum does not
+  /// matter, what is yet to come within it must be zero.
+  void (*respond)(const ResponseTable& response, const float* input, int tile, float* out) noexcept;
 };
 
 /// Best that this processor has. Any thread.

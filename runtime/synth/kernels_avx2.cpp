@@ -1,4 +1,4 @@
-// Method:     kernels_body.inl on AVX2 and FMA: 8 lanes, 16 registers.
+// Method:     kernels_body.inl and kernels_driven.inl on AVX2 and FMA: 8 lanes, 16 registers.
 // Source:     Intel's intrinsics guide.
 // Deviations: none.
 #include <immintrin.h>
@@ -19,6 +19,7 @@ struct F {
   }
   void store(float* at) const { _mm256_storeu_ps(at, v); }
   friend F operator+(F a, F b) { return {_mm256_add_ps(a.v, b.v)}; }
+  friend F operator-(F a, F b) { return {_mm256_sub_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm256_mul_ps(a.v, b.v)}; }
   friend F operator/(F a, F b) { return {_mm256_div_ps(a.v, b.v)}; }
 };
@@ -42,13 +43,15 @@ struct D {
 };
 inline D more(D c, D a, D b) { return {_mm256_fmadd_pd(a.lo, b.lo, c.lo), _mm256_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
 inline D less(D c, D a, D b) { return {_mm256_fnmadd_pd(a.lo, b.lo, c.lo), _mm256_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
-inline D fma(D a, D b, D c) { return more(c, a, b); }
 
-constexpr int kVectors = 2, kColumns = 2, kFloatChains = 2, kDoubleChains = 1, kAhead = 0;
+using H = F;
+
+constexpr int kVectors = 2, kColumns = 2, kAhead = 0, kRowSets = 2, kTapSets = 2;
 #include "runtime/synth/kernels_body.inl"
+#include "runtime/synth/kernels_driven.inl"
 
 }  // namespace
 
-const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, filter, filter_double};
+const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, filter, respond};
 
 }  // namespace carillon::synth

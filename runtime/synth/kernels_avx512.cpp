@@ -1,4 +1,4 @@
-// Method:     kernels_body.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
+// Method:     kernels_body.inl and kernels_driven.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
 // Source:     Intel's intrinsics guide.
 // Deviations: none.
 #include <immintrin.h>
@@ -19,6 +19,7 @@ struct F {
   }
   void store(float* at) const { _mm512_storeu_ps(at, v); }
   friend F operator+(F a, F b) { return {_mm512_add_ps(a.v, b.v)}; }
+  friend F operator-(F a, F b) { return {_mm512_sub_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm512_mul_ps(a.v, b.v)}; }
   friend F operator/(F a, F b) { return {_mm512_div_ps(a.v, b.v)}; }
 };
@@ -42,13 +43,23 @@ struct D {
 };
 inline D more(D c, D a, D b) { return {_mm512_fmadd_pd(a.lo, b.lo, c.lo), _mm512_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
 inline D less(D c, D a, D b) { return {_mm512_fnmadd_pd(a.lo, b.lo, c.lo), _mm512_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
-inline D fma(D a, D b, D c) { return more(c, a, b); }
 
-constexpr int kVectors = 2, kColumns = 4, kFloatChains = 6, kDoubleChains = 3, kAhead = 512;
+/// Half of F.
+struct H {
+  static constexpr int kWidth = 8;
+  __m256 v;
+  static H load(const float* at) { return {_mm256_loadu_ps(at)}; }
+  void store(float* at) const { _mm256_storeu_ps(at, v); }
+  friend H operator+(H a, H b) { return {_mm256_add_ps(a.v, b.v)}; }
+  friend H operator-(H a, H b) { return {_mm256_sub_ps(a.v, b.v)}; }
+};
+
+constexpr int kVectors = 2, kColumns = 4, kAhead = 512, kRowSets = 2, kTapSets = 4;
 #include "runtime/synth/kernels_body.inl"
+#include "runtime/synth/kernels_driven.inl"
 
 }  // namespace
 
-const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, filter, filter_double};
+const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, filter, respond};
 
 }  // namespace carillon::synth

@@ -15,6 +15,7 @@ struct F {
   static F convert(const std::int16_t* at) { return {static_cast<float>(*at)}; }
   void store(float* at) const { *at = v; }
   friend F operator+(F a, F b) { return {a.v + b.v}; }
+  friend F operator-(F a, F b) { return {a.v - b.v}; }
   friend F operator*(F a, F b) { return {a.v * b.v}; }
   friend F operator/(F a, F b) { return {a.v / b.v}; }
 };
@@ -35,13 +36,15 @@ struct D {
 };
 inline D more(D c, D a, D b) { return {c.v + a.v * b.v}; }  // c + a b
 inline D less(D c, D a, D b) { return {c.v - a.v * b.v}; }  // c - a b
-inline D fma(D a, D b, D c) { return more(c, a, b); }
 
-constexpr int kVectors = 8, kColumns = 1, kFloatChains = 1, kDoubleChains = 1, kAhead = 0;
+using H = F;
+
+constexpr int kVectors = 8, kColumns = 1, kAhead = 0, kRowSets = 1, kTapSets = 1;
 #include "runtime/synth/kernels_body.inl"
+#include "runtime/synth/kernels_driven.inl"
 
 }  // namespace
 
-const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, drive, filter, filter_double};
+const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, drive, filter, respond};
 
 }  // namespace carillon::synth

@@ -1,4 +1,4 @@
-// Method:     kernels_body.inl on x86-64 as every such processor has it: 4 lanes, no fused multiply-add.
+// Method:     kernels_body.inl and kernels_driven.inl on x86-64 as every such processor has it: 4 lanes, no fused multiply-add.
 // Source:     Intel's intrinsics guide.
 // Deviations: none.
 #include <immintrin.h>
@@ -20,6 +20,7 @@ struct F {
   }
   void store(float* at) const { _mm_storeu_ps(at, v); }
   friend F operator+(F a, F b) { return {_mm_add_ps(a.v, b.v)}; }
+  friend F operator-(F a, F b) { return {_mm_sub_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm_mul_ps(a.v, b.v)}; }
   friend F operator/(F a, F b) { return {_mm_div_ps(a.v, b.v)}; }
 };
@@ -43,13 +44,15 @@ struct D {
 };
 inline D more(D c, D a, D b) { return {_mm_add_pd(c.lo, _mm_mul_pd(a.lo, b.lo)), _mm_add_pd(c.hi, _mm_mul_pd(a.hi, b.hi))}; }  // c + a b
 inline D less(D c, D a, D b) { return {_mm_sub_pd(c.lo, _mm_mul_pd(a.lo, b.lo)), _mm_sub_pd(c.hi, _mm_mul_pd(a.hi, b.hi))}; }  // c - a b
-inline D fma(D a, D b, D c) { return more(c, a, b); }
 
-constexpr int kVectors = 4, kColumns = 1, kFloatChains = 2, kDoubleChains = 1, kAhead = 0;
+using H = F;
+
+constexpr int kVectors = 4, kColumns = 1, kAhead = 0, kRowSets = 1, kTapSets = 1;
 #include "runtime/synth/kernels_body.inl"
+#include "runtime/synth/kernels_driven.inl"
 
 }  // namespace
 
-const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, filter, filter_double};
+const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, filter, respond};
 
 }  // namespace carillon::synth
