@@ -7,14 +7,19 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <optional>
 #include <span>
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include "runtime/abi/carillon.h"
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/edits.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/stream/events.hpp"
+#include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
@@ -25,7 +30,9 @@ struct carillon_model {
   std::shared_ptr<const carillon::synth::Model> model;
 };
 struct carillon_synth {
+  explicit carillon_synth(carillon::synth::SynthesiserOptions options) : synthesiser(std::move(options)) {}
   carillon::synth::Synthesiser synthesiser;
+  carillon::synth::LoadKeeper load;
 };
 
 namespace {
@@ -64,20 +71,135 @@ carillon_status refuse(const char* text, char* message, size_t message_size) {
   return CARILLON_BAD_ARGUMENT;
 }
 
-/// Whether a structure of the caller is there and as large as ours: there has been but one version so far.
+/// The sizes that structures had first: no caller's is smaller. Once one has grown, its first size stands here.
 template <typename T>
-bool is_whole(const T* given) {
-  return given != nullptr && given->size >= sizeof(T);
-}
+constexpr std::size_t kLeastSize = sizeof(T);
 
 template <typename T>
-void init(T* given) {
-  if (given == nullptr) return;
-  *given = T{};
-  given->size = sizeof(T);
+T make_default() {
+  return T{};
 }
+
+/// Writes the defaults of as many fields as the caller's structure has.
+template <typename T>
+void init(T* given, size_t size) {
+  if (given == nullptr || size < kLeastSize<T>) return;
+  T ours = make_default<T>();
+  ours.size = static_cast<uint32_t>(std::min(size, sizeof(T)));
+  std::memcpy(given, &ours, ours.size);
+}
+
+/// A structure of the caller's with the defaults of the fields that it has not; nothing when it was not initialised.
+template <typename T>
+std::optional<T> read(const T* given) {
+  if (given == nullptr || given->size < kLeastSize<T>) return std::nullopt;
+  T ours = make_default<T>();
+  std::memcpy(&ours, given, std::min<std::size_t>(given->size, sizeof(T)));
+  return ours;
+}
+
+/// Gives the caller as many fields as its structure has, which must have been initialised.
+template <typename T>
+void write(T ours, T* given) {
+  ours.size = given->size;
+  std::memcpy(given, &ours, std::min<std::size_t>(given->size, sizeof(T)));
+}
+
+template <>
+carillon_model_options make_default() {
+  carillon_model_options options{};
+  options.rate_hz = 48000.0;
+  return options;
+}
+
+template <>
+carillon_edits make_default() {
+  carillon_edits edits{};
+  edits.density_scale = edits.stiffness_scale = edits.size_scale = 1.0;
+  return edits;
+}
+
+template <>
+carillon_options make_default() {
+  const synth::SynthesiserOptions ours;
+  carillon_options options{};
+  options.rate_hz = ours.rate_hz;
+  options.max_bodies = ours.max_bodies;
+  options.max_strikes = ours.max_strikes;
+  options.ring_events = ours.ring_events;
+  options.longest_m = ours.longest_m;
+  options.max_waypoints = ours.max_waypoints;
+  options.budget = ours.budget;
+  return options;
+}
+
+uint32_t to_bits(synth::EffectSet effects) {
+  uint32_t bits = 0;
+  for (int e = 0; e < synth::kEffectCount; ++e)
+    if (effects.has(static_cast<synth::Effect>(e))) bits |= 1U << static_cast<unsigned>(e);
+  return bits;
+}
+
+synth::EffectSet to_effects(uint32_t bits) {
+  if (bits >= 1U << static_cast<unsigned>(synth::kEffectCount))
+    throw InputError("effects " + std::to_string(bits) + " are no sum of carillon_effect");
+  synth::EffectSet effects;
+  for (int e = 0; e < synth::kEffectCount; ++e)
+    if ((bits >> static_cast<unsigned>(e) & 1U) != 0) effects = effects.with(static_cast<synth::Effect>(e));
+  return effects;
+}
+
+template <>
+carillon_body_options make_default() {
+  const synth::BodySettings ours;
+  carillon_body_options options{};
+  options.effects = to_bits(ours.effects);
+  options.rotation[0] = 1.0;
+  options.longest_m = ours.longest_m;
+  options.silence_pa = ours.silence_pa;
+  return options;
+}
+
+template <>
+carillon_impulse make_default() {
+  carillon_impulse impulse{};
+  impulse.barycentric[0] = 1.0;
+  impulse.other = -1;
+  return impulse;
+}
+
+template <>
+carillon_contact make_default() {
+  carillon_contact contact{};
+  contact.state = CARILLON_CONTACT_HOLD;
+  contact.barycentric[0] = 1.0;
+  contact.normal[2] = 1.0;
+  contact.patch_radius_m = 1e-4;
+  contact.other = -1;
+  return contact;
+}
+
+template <>
+carillon_motion make_default() {
+  carillon_motion motion{};
+  motion.rotation[0] = 1.0;
+  return motion;
+}
+
+static_assert(CARILLON_EFFECT_COUNT == synth::kEffectCount && CARILLON_TWO_EARS == 1 << static_cast<int>(synth::Effect::kTwoEars) &&
+              CARILLON_ACCELERATION_NOISE == 1 << static_cast<int>(synth::Effect::kAccelerationNoise));
 
 stream::Vec3 to_vector(const double* x) { return {x[0], x[1], x[2]}; }
+stream::Quaternion to_quaternion(const double* x) { return {x[0], x[1], x[2], x[3]}; }
+
+/// For the click of the body; 0, which a body without clicks may have, when the surface has no inside.
+double find_sphere_radius_m(const bank::Bank& bank) {
+  try {
+    return radiation::calc_sphere_radius_m(bank);
+  } catch (const InputError&) {
+    return 0.0;
+  }
+}
 
 carillon_status push(carillon_synth* synth, const stream::Event& event) noexcept {
   if (stream::find_fault(event) != nullptr) {
@@ -117,22 +239,52 @@ double carillon_bank_frequency_hz(const carillon_bank* bank, int32_t mode) {
   return mode < 0 || mode >= carillon_bank_mode_count(bank) ? 0.0 : bank->bank.freq_hz(static_cast<std::size_t>(mode));
 }
 
-void carillon_model_options_init(carillon_model_options* options) {
-  init(options);
-  if (options != nullptr) options->rate_hz = 48000.0;
+const char* carillon_status_text(carillon_status status) {
+  switch (status) {
+    case CARILLON_OK:
+      return "ok";
+    case CARILLON_BAD_ARGUMENT:
+      return "bad argument";
+    case CARILLON_BAD_INPUT:
+      return "bad input";
+    case CARILLON_FULL:
+      return "no room";
+    case CARILLON_SYSTEM:
+      return "the system failed";
+  }
+  return "unknown status";
 }
+
+void carillon_edits_init_sized(carillon_edits* edits, size_t size) { init(edits, size); }
+
+carillon_status carillon_bank_edit(const carillon_bank* bank, const carillon_edits* edits, carillon_bank** edited, char* message,
+                                   size_t message_size) {
+  const auto ours = read(edits);
+  if (edited != nullptr) *edited = nullptr;
+  if (bank == nullptr || edited == nullptr || !ours)
+    return refuse("carillon_bank_edit: bank and edited must not be NULL, edits must be initialised", message, message_size);
+  return run(message, message_size, [&] {
+    bank::Edits wanted{.density_scale = ours->density_scale, .stiffness_scale = ours->stiffness_scale, .size_scale = ours->size_scale};
+    if (ours->sets_damping != 0) wanted.alphas = {ours->alpha1_s, ours->alpha2_per_s};
+    *edited = new carillon_bank{bank::calc_edited(bank->bank, wanted)};
+  });
+}
+
+void carillon_model_options_init_sized(carillon_model_options* options, size_t size) { init(options, size); }
 
 carillon_status carillon_model_make(const carillon_bank* bank, const carillon_model_options* options, carillon_model** model, char* message,
                                     size_t message_size) {
+  const auto ours = read(options);
   if (model != nullptr) *model = nullptr;
-  if (bank == nullptr || model == nullptr || !is_whole(options))
+  if (bank == nullptr || model == nullptr || !ours)
     return refuse("carillon_model_make: bank and model must not be NULL, options must be initialised", message, message_size);
-  if (options->radiation != CARILLON_RADIATION_SPHERE && options->radiation != CARILLON_RADIATION_OSG02)
+  if (ours->radiation != CARILLON_RADIATION_SPHERE && ours->radiation != CARILLON_RADIATION_OSG02)
     return refuse("carillon_model_make: options.radiation is none of carillon_radiation", message, message_size);
   return run(message, message_size, [&] {
-    const auto kind = options->radiation == CARILLON_RADIATION_SPHERE ? radiation::GainKind::kSphere : radiation::GainKind::kOsg02;
+    const auto kind = ours->radiation == CARILLON_RADIATION_SPHERE ? radiation::GainKind::kSphere : radiation::GainKind::kOsg02;
     const std::vector<double> gains = radiation::calc_gains(bank->bank, kind);
-    *model = new carillon_model{synth::Model::make(bank->bank, {.rate_hz = options->rate_hz, .gains = gains})};
+    *model = new carillon_model{
+        synth::Model::make(bank->bank, {.rate_hz = ours->rate_hz, .gains = gains, .sphere_radius_m = find_sphere_radius_m(bank->bank)})};
   });
 }
 
@@ -140,35 +292,29 @@ void carillon_model_release(carillon_model* model) { delete model; }
 
 int32_t carillon_model_mode_count(const carillon_model* model) { return model == nullptr ? 0 : model->model->get_mode_count(); }
 
-void carillon_options_init(carillon_options* options) {
-  init(options);
-  if (options == nullptr) return;
-  const synth::SynthesiserOptions ours;
-  options->rate_hz = ours.rate_hz;
-  options->max_bodies = ours.max_bodies;
-  options->max_strikes = ours.max_strikes;
-  options->ring_events = ours.ring_events;
-  options->longest_m = ours.longest_m;
-}
+void carillon_options_init_sized(carillon_options* options, size_t size) { init(options, size); }
 
 carillon_status carillon_create(const carillon_options* options, carillon_synth** synth, char* message, size_t message_size) {
+  const auto given = read(options);
   if (synth != nullptr) *synth = nullptr;
-  if (synth == nullptr || !is_whole(options))
+  if (synth == nullptr || !given)
     return refuse("carillon_create: synth must not be NULL, options must be initialised", message, message_size);
-  if (options->microphones_m != nullptr && options->microphone_count < 1)
+  if (given->microphones_m != nullptr && given->microphone_count < 1)
     return refuse("carillon_create: microphone_count must be positive where microphones are given", message, message_size);
   return run(message, message_size, [&] {
-    synth::SynthesiserOptions ours{.rate_hz = options->rate_hz,
-                                   .listener_m = to_vector(options->listener_m),
-                                   .max_bodies = options->max_bodies,
-                                   .max_strikes = options->max_strikes,
-                                   .ring_events = options->ring_events,
-                                   .longest_m = options->longest_m};
-    if (options->microphones_m != nullptr) {
+    synth::SynthesiserOptions ours{.rate_hz = given->rate_hz,
+                                   .listener_m = to_vector(given->listener_m),
+                                   .max_bodies = given->max_bodies,
+                                   .max_strikes = given->max_strikes,
+                                   .max_waypoints = given->max_waypoints,
+                                   .ring_events = given->ring_events,
+                                   .longest_m = given->longest_m,
+                                   .budget = given->budget};
+    if (given->microphones_m != nullptr) {
       ours.microphones_m.clear();
-      for (int32_t m = 0; m < options->microphone_count; ++m) ours.microphones_m.push_back(to_vector(options->microphones_m[m]));
+      for (int32_t m = 0; m < given->microphone_count; ++m) ours.microphones_m.push_back(to_vector(given->microphones_m[m]));
     }
-    *synth = new carillon_synth{synth::Synthesiser(std::move(ours))};
+    *synth = new carillon_synth(std::move(ours));
   });
 }
 
@@ -186,6 +332,44 @@ carillon_status carillon_add_body(carillon_synth* synth, const carillon_model* m
   return run(message, message_size, [&] { *body = synth->synthesiser.add_body(model->model, {.position_m = to_vector(position_m)}); });
 }
 
+void carillon_body_options_init_sized(carillon_body_options* options, size_t size) { init(options, size); }
+
+carillon_status carillon_add_body_with(carillon_synth* synth, const carillon_model* model, const carillon_body_options* options,
+                                       int32_t* body, char* message, size_t message_size) {
+  const auto ours = read(options);
+  if (body != nullptr) *body = -1;
+  if (synth == nullptr || model == nullptr || body == nullptr || !ours)
+    return refuse("carillon_add_body_with: synth, model and body must not be NULL, options must be initialised", message, message_size);
+  if (synth->synthesiser.is_full()) {
+    write_message("there is no room for another body; raise max_bodies, or remove one", message, message_size);
+    return CARILLON_FULL;
+  }
+  return run(message, message_size, [&] {
+    *body = synth->synthesiser.add_body(model->model, {.position_m = to_vector(ours->position_m),
+                                                       .rotation = to_quaternion(ours->rotation),
+                                                       .effects = to_effects(ours->effects),
+                                                       .silence_pa = ours->silence_pa,
+                                                       .longest_m = ours->longest_m,
+                                                       .max_waypoints = ours->max_waypoints});
+  });
+}
+
+carillon_status carillon_set_effects(carillon_synth* synth, int32_t body, uint32_t effects, char* message, size_t message_size) {
+  if (synth == nullptr) return refuse("carillon_set_effects: synth must not be NULL", message, message_size);
+  return run(message, message_size, [&] { synth->synthesiser.set_effects(body, to_effects(effects)); });
+}
+
+uint32_t carillon_get_effects(const carillon_synth* synth, int32_t body) {
+  uint32_t bits = 0;
+  if (synth != nullptr) (void)run(nullptr, 0, [&] { bits = to_bits(synth->synthesiser.get_effects(body)); });
+  return bits;
+}
+
+carillon_status carillon_swap_model(carillon_synth* synth, int32_t body, const carillon_model* model, char* message, size_t message_size) {
+  if (synth == nullptr || model == nullptr) return refuse("carillon_swap_model: synth and model must not be NULL", message, message_size);
+  return run(message, message_size, [&] { synth->synthesiser.swap_model(body, model->model); });
+}
+
 carillon_status carillon_remove_body(carillon_synth* synth, int32_t body) {
   if (synth == nullptr) return CARILLON_BAD_ARGUMENT;
   return run(nullptr, 0, [&] { synth->synthesiser.remove_body(body); });
@@ -199,37 +383,78 @@ void carillon_set_gain(carillon_synth* synth, double per_pa) {
   if (synth != nullptr) synth->synthesiser.set_gain(per_pa);
 }
 
-void carillon_impulse_init(carillon_impulse* impulse) {
-  init(impulse);
-  if (impulse != nullptr) impulse->barycentric[0] = 1.0;
+void carillon_set_budget(carillon_synth* synth, double mode_samples_per_s) {
+  if (synth != nullptr) synth->synthesiser.set_budget(mode_samples_per_s);
 }
-void carillon_motion_init(carillon_motion* motion) { init(motion); }
-void carillon_listener_init(carillon_listener* listener) { init(listener); }
+
+double carillon_get_budget(const carillon_synth* synth) { return synth == nullptr ? 0.0 : synth->synthesiser.get_budget(); }
+
+carillon_status carillon_keep_load(carillon_synth* synth, double share, double busy_s) {
+  if (synth == nullptr) return CARILLON_BAD_ARGUMENT;
+  if (!(share >= 0.01 && share <= 1.0) || !(busy_s >= 0.0)) return CARILLON_BAD_INPUT;
+  synth->load.keep(synth->synthesiser, share, busy_s);
+  return CARILLON_OK;
+}
+
+void carillon_impulse_init_sized(carillon_impulse* impulse, size_t size) { init(impulse, size); }
+void carillon_contact_init_sized(carillon_contact* contact, size_t size) { init(contact, size); }
+void carillon_motion_init_sized(carillon_motion* motion, size_t size) { init(motion, size); }
+void carillon_listener_init_sized(carillon_listener* listener, size_t size) { init(listener, size); }
 
 carillon_status carillon_push_impulse(carillon_synth* synth, const carillon_impulse* impulse) {
-  if (synth == nullptr || !is_whole(impulse)) return CARILLON_BAD_ARGUMENT;
-  return push(synth, stream::Impulse{.time_s = impulse->time_s,
-                                     .body = impulse->body,
-                                     .triangle = impulse->triangle,
-                                     .shape = impulse->gaussian != 0 ? stream::PulseShape::kGaussian : stream::PulseShape::kHertz,
-                                     .barycentric = to_vector(impulse->barycentric),
-                                     .impulse_n_s = to_vector(impulse->impulse_n_s),
-                                     .duration_s = impulse->duration_s});
+  const auto ours = read(impulse);
+  if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
+  return push(synth, stream::Impulse{.time_s = ours->time_s,
+                                     .body = ours->body,
+                                     .other = ours->other,
+                                     .triangle = ours->triangle,
+                                     .shape = ours->gaussian != 0 ? stream::PulseShape::kGaussian : stream::PulseShape::kHertz,
+                                     .barycentric = to_vector(ours->barycentric),
+                                     .impulse_n_s = to_vector(ours->impulse_n_s),
+                                     .duration_s = ours->duration_s});
+}
+
+carillon_status carillon_push_contact(carillon_synth* synth, const carillon_contact* contact) {
+  const auto ours = read(contact);
+  if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
+  if (ours->state < CARILLON_CONTACT_BEGIN || ours->state > CARILLON_CONTACT_END) return CARILLON_BAD_INPUT;
+  return push(synth, stream::Contact{.time_s = ours->time_s,
+                                     .id = ours->id,
+                                     .body = ours->body,
+                                     .other = ours->other,
+                                     .triangle = ours->triangle,
+                                     .state = static_cast<stream::ContactState>(ours->state),
+                                     .barycentric = to_vector(ours->barycentric),
+                                     .normal = to_vector(ours->normal),
+                                     .slip_m_s = to_vector(ours->slip_m_s),
+                                     .force_n = ours->force_n,
+                                     .sweep_m_s = ours->sweep_m_s,
+                                     .other_sweep_m_s = ours->other_sweep_m_s,
+                                     .spin_rad_s = ours->spin_rad_s,
+                                     .patch_radius_m = ours->patch_radius_m,
+                                     .impedance_n_s_m = ours->impedance_n_s_m});
 }
 
 carillon_status carillon_push_motion(carillon_synth* synth, const carillon_motion* motion) {
-  if (synth == nullptr || !is_whole(motion)) return CARILLON_BAD_ARGUMENT;
-  return push(synth, stream::Motion{.time_s = motion->time_s,
-                                    .body = motion->body,
-                                    .position_m = to_vector(motion->position_m),
-                                    .velocity_m_s = to_vector(motion->velocity_m_s)});
+  const auto ours = read(motion);
+  if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
+  return push(synth, stream::Motion{.time_s = ours->time_s,
+                                    .body = ours->body,
+                                    .position_m = to_vector(ours->position_m),
+                                    .velocity_m_s = to_vector(ours->velocity_m_s),
+                                    .rotation = to_quaternion(ours->rotation)});
 }
 
 carillon_status carillon_push_listener(carillon_synth* synth, const carillon_listener* listener) {
-  if (synth == nullptr || !is_whole(listener)) return CARILLON_BAD_ARGUMENT;
-  return push(synth, stream::Listener{.time_s = listener->time_s,
-                                      .position_m = to_vector(listener->position_m),
-                                      .velocity_m_s = to_vector(listener->velocity_m_s)});
+  const auto ours = read(listener);
+  if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
+  return push(synth, stream::Listener{
+                         .time_s = ours->time_s, .position_m = to_vector(ours->position_m), .velocity_m_s = to_vector(ours->velocity_m_s)});
+}
+
+carillon_status carillon_push_mark(carillon_synth* synth, double time_s) {
+  if (synth == nullptr) return CARILLON_BAD_ARGUMENT;
+  return push(synth, stream::Mark{time_s});
 }
 
 void carillon_process(carillon_synth* synth, float* const* out, int32_t channels, int32_t frames) {
@@ -240,17 +465,41 @@ void carillon_process(carillon_synth* synth, float* const* out, int32_t channels
 double carillon_time_s(const carillon_synth* synth) { return synth == nullptr ? 0.0 : synth->synthesiser.get_time_s(); }
 double carillon_horizon_s(const carillon_synth* synth) { return synth == nullptr ? 0.0 : synth->synthesiser.get_horizon_s(); }
 
+void carillon_counters_init_sized(carillon_counters* counters, size_t size) { init(counters, size); }
+
 carillon_status carillon_get_counters(const carillon_synth* synth, carillon_counters* counters) {
-  if (synth == nullptr || !is_whole(counters)) return CARILLON_BAD_ARGUMENT;
+  if (synth == nullptr || !read(counters)) return CARILLON_BAD_ARGUMENT;
   const synth::SynthesiserCounters ours = synth->synthesiser.get_counters();
-  counters->strikes = ours.strikes;
-  counters->refused = ours.refused;
-  counters->late = ours.late;
-  counters->faults = ours.faults;
-  counters->overflows = ours.overflows;
-  counters->resets = ours.resets;
-  counters->mode_samples = ours.mode_samples;
+  write(carillon_counters{.size = 0,
+                          .reserved = 0,
+                          .strikes = ours.strikes,
+                          .refused = ours.refused,
+                          .late = ours.late,
+                          .faults = ours.faults,
+                          .overflows = ours.overflows,
+                          .resets = ours.resets,
+                          .mode_samples = ours.mode_samples,
+                          .faded = ours.faded,
+                          .underruns = ours.underruns,
+                          .zeroed = ours.zeroed},
+        counters);
   return CARILLON_OK;
 }
+
+void carillon_effect_counters_init_sized(carillon_effect_counters* counters, size_t size) { init(counters, size); }
+
+carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_t body, carillon_effect_counters* counters) {
+  if (synth == nullptr || !read(counters)) return CARILLON_BAD_ARGUMENT;
+  const synth::EffectCounters ours = synth->synthesiser.get_effect_counters(body);
+  carillon_effect_counters given{};
+  for (int e = 0; e < synth::kEffectCount; ++e) {
+    given.units[e] = ours.units[static_cast<synth::Effect>(e)];
+    given.bytes[e] = ours.bytes[static_cast<synth::Effect>(e)];
+  }
+  write(given, counters);
+  return CARILLON_OK;
+}
+
+double carillon_peak_pa(const carillon_synth* synth, int32_t body) { return synth == nullptr ? 0.0 : synth->synthesiser.get_peak_pa(body); }
 
 }  // extern "C"

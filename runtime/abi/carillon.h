@@ -1,12 +1,13 @@
 /* Carillon for programs in C, and for those of other languages and compilers: a scene of bodies that ring, played block by block.
  *
- * Every structure begins with its own size: set it with the *_init function, and programs built against this header go on working with later
- * libraries. Functions that can fail return a status, and write a message of at most message_size bytes, zero included, when `message` is not
+ * Every structure begins with its own size: set it with the *_init macro, and programs built against this header go on working with later
+ * libraries, which add fields at the end only. (Other languages call the *_init_sized function with the size of the structure as they know
+ * it.) Functions that can fail return a status, and write a message of at most message_size bytes, zero included, when `message` is not
  * NULL; what they were to make is then NULL and nothing has changed. Pointers must not be NULL unless it says so; NULL gives
  * CARILLON_BAD_ARGUMENT.
  *
- * Threads: [main] one thread at a time; [audio] one thread at a time, never waits, takes no memory, makes no system call; [any] any thread at
- * any time, never waits. Units are SI; vectors x y z. */
+ * Threads: [main] one thread at a time; [audio] one thread at a time, never waits, takes no memory, makes no system call; [any] any thread
+ * at any time, never waits. Units are SI; vectors x y z. */
 #ifndef CARILLON_H
 #define CARILLON_H
 
@@ -23,7 +24,7 @@
 extern "C" {
 #endif
 
-#define CARILLON_ABI_VERSION 1
+#define CARILLON_ABI_VERSION 2
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -35,6 +36,9 @@ typedef enum carillon_status {
   CARILLON_FULL = 3,         /* no room: raise a limit of carillon_options, or wait */
   CARILLON_SYSTEM = 4        /* the disk or the memory failed */
 } carillon_status;
+
+/* "ok", "bad argument", ... [any] */
+CARILLON_API const char* carillon_status_text(carillon_status status);
 
 typedef struct carillon_bank carillon_bank;
 typedef struct carillon_model carillon_model;
@@ -53,6 +57,24 @@ CARILLON_API int32_t carillon_bank_triangle_count(const carillon_bank* bank);
 /* The undamped frequency [Hz] of a mode, 0 when there is no such mode. */
 CARILLON_API double carillon_bank_frequency_hz(const carillon_bank* bank, int32_t mode);
 
+/* Another density, stiffness, size or damping of a body, without a solve. */
+typedef struct carillon_edits {
+  uint32_t size;
+  int32_t sets_damping;   /* not 0: Rayleigh damping of alpha1_s, alpha2_per_s in place of the bank's law */
+  double density_scale;   /* 1e-6 to 1e6, as all scales */
+  double stiffness_scale; /* of both Lame constants */
+  double size_scale;      /* of all lengths */
+  double alpha1_s;
+  double alpha2_per_s;
+} carillon_edits;
+
+/* All scales 1, the damping as it is. */
+#define carillon_edits_init(edits) carillon_edits_init_sized((edits), sizeof(carillon_edits))
+CARILLON_API void carillon_edits_init_sized(carillon_edits* edits, size_t size);
+/* The bank of the edited body. CARILLON_BAD_INPUT for scales out of range, alphas below 0, and bodies of several materials. */
+CARILLON_API carillon_status carillon_bank_edit(const carillon_bank* bank, const carillon_edits* edits, carillon_bank** edited,
+                                                char* message, size_t message_size);
+
 /* ---- Models: a bank made ready for a sample rate. [any], not on an audio thread. */
 
 typedef enum carillon_radiation {
@@ -67,7 +89,8 @@ typedef struct carillon_model_options {
 } carillon_model_options;
 
 /* 48 kHz, CARILLON_RADIATION_SPHERE. */
-CARILLON_API void carillon_model_options_init(carillon_model_options* options);
+#define carillon_model_options_init(options) carillon_model_options_init_sized((options), sizeof(carillon_model_options))
+CARILLON_API void carillon_model_options_init_sized(carillon_model_options* options, size_t size);
 CARILLON_API carillon_status carillon_model_make(const carillon_bank* bank, const carillon_model_options* options, carillon_model** model,
                                                  char* message, size_t message_size);
 /* NULL is allowed. Bodies that play the model keep it. */
@@ -87,24 +110,78 @@ typedef struct carillon_options {
   double listener_m[3];
   const double (*microphones_m)[3]; /* from the listener, axes of the world; NULL: two ears 20 cm apart along x */
   int32_t microphone_count;
+  int32_t max_waypoints; /* of a body's way that are remembered */
+  double budget;         /* carillon_set_budget */
 } carillon_options;
 
-/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m. */
-CARILLON_API void carillon_options_init(carillon_options* options);
+/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m, 64 waypoints, no limit to the work. */
+#define carillon_options_init(options) carillon_options_init_sized((options), sizeof(carillon_options))
+CARILLON_API void carillon_options_init_sized(carillon_options* options, size_t size);
 
 /* [main] */
 CARILLON_API carillon_status carillon_create(const carillon_options* options, carillon_synth** synth, char* message, size_t message_size);
 /* [main], once no other thread uses it. NULL is allowed. */
 CARILLON_API void carillon_destroy(carillon_synth* synth);
 /* [main] A new body at a place, heard from the next 128 frames on; its number, which events name. */
-CARILLON_API carillon_status carillon_add_body(carillon_synth* synth, const carillon_model* model, const double position_m[3], int32_t* body,
-                                               char* message, size_t message_size);
+CARILLON_API carillon_status carillon_add_body(carillon_synth* synth, const carillon_model* model, const double position_m[3],
+                                               int32_t* body, char* message, size_t message_size);
+
+/* What a body does; a set of them is their sum. docs/howto/scene-files.md says what each is. */
+typedef enum carillon_effect {
+  CARILLON_MODAL = 1,
+  CARILLON_HERTZ_PULSE = 2,
+  CARILLON_ROUGHNESS = 4,
+  CARILLON_ROLLING = 8,
+  CARILLON_CONTACT_DAMPING = 16,
+  CARILLON_ACCELERATION_NOISE = 32,
+  CARILLON_AIR_DELAY = 64,
+  CARILLON_DOPPLER = 128,
+  CARILLON_TWO_EARS = 256
+} carillon_effect;
+#define CARILLON_EFFECT_COUNT 9
+
+typedef struct carillon_body_options {
+  uint32_t size;
+  uint32_t effects; /* sum of carillon_effect */
+  double position_m[3];
+  double rotation[4];    /* of the frame of the mesh: w x y z, unit */
+  double longest_m;      /* as in carillon_options; 0: what it says there */
+  double silence_pa;     /* a body below this at 1 m sleeps */
+  int32_t max_waypoints; /* 0: as in carillon_options */
+  int32_t reserved;
+} carillon_body_options;
+
+/* At the origin, not turned, the usual effects: all but CARILLON_ACCELERATION_NOISE that this library can play. */
+#define carillon_body_options_init(options) carillon_body_options_init_sized((options), sizeof(carillon_body_options))
+CARILLON_API void carillon_body_options_init_sized(carillon_body_options* options, size_t size);
+/* [main] carillon_add_body with all that can be chosen. */
+CARILLON_API carillon_status carillon_add_body_with(carillon_synth* synth, const carillon_model* model,
+                                                    const carillon_body_options* options, int32_t* body, char* message,
+                                                    size_t message_size);
+/* [main] What the body does from one of the next periods of 128 frames on, without a click. Effects that are off cost nothing and hold no
+ * memory once carillon_collect has been called. */
+CARILLON_API carillon_status carillon_set_effects(carillon_synth* synth, int32_t body, uint32_t effects, char* message,
+                                                  size_t message_size);
+/* [main] 0 for a body that is not there. */
+CARILLON_API uint32_t carillon_get_effects(const carillon_synth* synth, int32_t body);
+/* [main] The body goes on ringing with another model, that of an edited bank as a rule: every mode keeps its energy and its phase and goes
+ * on at its new frequency and decay, without a click. The body keeps the model; the old one's memory comes back with carillon_collect. */
+CARILLON_API carillon_status carillon_swap_model(carillon_synth* synth, int32_t body, const carillon_model* model, char* message,
+                                                 size_t message_size);
 /* [main] It falls silent; its number is free once carillon_collect has given its memory back. */
 CARILLON_API carillon_status carillon_remove_body(carillon_synth* synth, int32_t body);
 /* [main] Gives back the memory of removed bodies; call it now and then. */
 CARILLON_API void carillon_collect(carillon_synth* synth);
 /* [any] Full scale per pascal; 1 at first. */
 CARILLON_API void carillon_set_gain(carillon_synth* synth, double per_pa);
+/* [any] Work that a second of sound may take, in mode-samples (modes times samples, as carillon_counters counts them); INFINITY: no limit,
+ * as at first. When there is more to do, the least audible modes of all bodies fade out; no body and no strike is ever dropped. Not a
+ * number: 0. */
+CARILLON_API void carillon_set_budget(carillon_synth* synth, double mode_samples_per_s);
+CARILLON_API double carillon_get_budget(const carillon_synth* synth);
+/* [main] Sets the budget so that carillon_process takes this share of one core, 0.01 to 1. Call it some ten times a second with the time
+ * [s] that carillon_process has taken altogether, by a clock of yours: nothing in the library looks at one. */
+CARILLON_API carillon_status carillon_keep_load(carillon_synth* synth, double share, double busy_s);
 
 /* One contact pulse. Point and impulse are in the frame of the body's mesh. */
 typedef struct carillon_impulse {
@@ -116,7 +193,37 @@ typedef struct carillon_impulse {
   double duration_s;
   double barycentric[3];
   double impulse_n_s[3];
+  int32_t other; /* the other body; -1: the ground, or unknown */
+  int32_t reserved;
 } carillon_impulse;
+
+typedef enum carillon_contact_state {
+  CARILLON_CONTACT_BEGIN = 0,
+  CARILLON_CONTACT_HOLD = 1,
+  CARILLON_CONTACT_END = 2
+} carillon_contact_state;
+
+/* One moment of a contact that lasts, as one of its two bodies feels it; the other body gets one too, with the same id. Between two of them
+ * all values change linearly. Vectors are in the frame of the body's mesh. */
+typedef struct carillon_contact {
+  uint32_t size;
+  int32_t state; /* carillon_contact_state */
+  uint64_t id;   /* of the touch, the same while it lasts */
+  int32_t body;
+  int32_t other;    /* the other body; -1: the ground, or unknown */
+  int32_t triangle; /* of the bank */
+  int32_t reserved;
+  double time_s;
+  double barycentric[3];
+  double normal[3];       /* unit, from the other body into this one */
+  double slip_m_s[3];     /* velocity of this surface against the other's */
+  double force_n;         /* normal, at least 0 */
+  double sweep_m_s;       /* speed of the contact over this body's surface; 0 for a box that slides flat */
+  double other_sweep_m_s; /* over the other's */
+  double spin_rad_s;      /* relative angular speed about the tangents: rolling */
+  double patch_radius_m;  /* Hertz radius of the touch under force_n */
+  double impedance_n_s_m; /* of the other body at the point, as a dashpot; 0: takes nothing */
+} carillon_contact;
 
 /* Where a body is: its centre of mass in the world. */
 typedef struct carillon_motion {
@@ -125,6 +232,7 @@ typedef struct carillon_motion {
   double time_s;
   double position_m[3];
   double velocity_m_s[3];
+  double rotation[4]; /* of the frame of its mesh: w x y z, unit */
 } carillon_motion;
 
 /* Where the listener is. */
@@ -135,14 +243,25 @@ typedef struct carillon_listener {
   double velocity_m_s[3];
 } carillon_listener;
 
-CARILLON_API void carillon_impulse_init(carillon_impulse* impulse);
-CARILLON_API void carillon_motion_init(carillon_motion* motion);
-CARILLON_API void carillon_listener_init(carillon_listener* listener);
+#define carillon_impulse_init(impulse) carillon_impulse_init_sized((impulse), sizeof(carillon_impulse))
+CARILLON_API void carillon_impulse_init_sized(carillon_impulse* impulse, size_t size);
+#define carillon_contact_init(contact) carillon_contact_init_sized((contact), sizeof(carillon_contact))
+CARILLON_API void carillon_contact_init_sized(carillon_contact* contact, size_t size);
+#define carillon_motion_init(motion) carillon_motion_init_sized((motion), sizeof(carillon_motion))
+CARILLON_API void carillon_motion_init_sized(carillon_motion* motion, size_t size);
+#define carillon_listener_init(listener) carillon_listener_init_sized((listener), sizeof(carillon_listener))
+CARILLON_API void carillon_listener_init_sized(carillon_listener* listener, size_t size);
 
-/* [any] Events, in any order; those before carillon_horizon_s act late. CARILLON_BAD_INPUT for numbers that are not finite, and the like. */
+/* [any] Events, in any order; those before carillon_horizon_s act late. CARILLON_BAD_INPUT for numbers that are not finite, and the like.
+ */
 CARILLON_API carillon_status carillon_push_impulse(carillon_synth* synth, const carillon_impulse* impulse);
+CARILLON_API carillon_status carillon_push_contact(carillon_synth* synth, const carillon_contact* contact);
 CARILLON_API carillon_status carillon_push_motion(carillon_synth* synth, const carillon_motion* motion);
 CARILLON_API carillon_status carillon_push_listener(carillon_synth* synth, const carillon_listener* listener);
+
+/* [any] Physics has run up to this time: nothing earlier follows. Optional; with it contacts are held until then, and what the sound had to
+ * do without it is counted (carillon_counters.underruns). */
+CARILLON_API carillon_status carillon_push_mark(carillon_synth* synth, double time_s);
 
 /* [audio] The next frames: out[c] takes `frames` numbers for each of `channels` channels, the first ones the microphones'. Nothing happens
  * when synth or out is NULL or a count is not positive. */
@@ -162,10 +281,30 @@ typedef struct carillon_counters {
   int64_t overflows;    /* events for which the ring had no room */
   int64_t resets;       /* bodies silenced because their state was no number */
   int64_t mode_samples; /* work: modes times samples */
+  int64_t faded;        /* groups of 16 modes that had to go for the budget */
+  int64_t underruns;    /* times that the sound overtook the last carillon_push_mark */
+  int64_t zeroed;       /* numbers of the output that were none, and are 0 */
 } carillon_counters;
 
+#define carillon_counters_init(counters) carillon_counters_init_sized((counters), sizeof(carillon_counters))
+CARILLON_API void carillon_counters_init_sized(carillon_counters* counters, size_t size);
 /* [any] `counters->size` must be set. */
 CARILLON_API carillon_status carillon_get_counters(const carillon_synth* synth, carillon_counters* counters);
+
+/* What one body's effects have done, in the order of carillon_effect, and the memory that they hold. */
+typedef struct carillon_effect_counters {
+  uint32_t size;
+  uint32_t reserved;
+  int64_t units[CARILLON_EFFECT_COUNT]; /* modal: mode-samples; hertz_pulse: pulses; the others: samples */
+  int64_t bytes[CARILLON_EFFECT_COUNT];
+} carillon_effect_counters;
+
+#define carillon_effect_counters_init(counters) carillon_effect_counters_init_sized((counters), sizeof(carillon_effect_counters))
+CARILLON_API void carillon_effect_counters_init_sized(carillon_effect_counters* counters, size_t size);
+/* [any] `counters->size` must be set. Zeros for a body that is not there. */
+CARILLON_API carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_t body, carillon_effect_counters* counters);
+/* [any] The loudest that its modes have been [Pa at 1 m]; 0 for a body that is not there. */
+CARILLON_API double carillon_peak_pa(const carillon_synth* synth, int32_t body);
 
 #ifdef __cplusplus
 }

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 
 #include "runtime/config/error.hpp"
 
@@ -64,7 +65,7 @@ struct Device::State {
   Library library;
   synth::Synthesiser* synthesiser = nullptr;
   PaStream* stream = nullptr;
-  std::atomic<std::int64_t> callbacks{0}, frames{0}, underflows{0};
+  std::atomic<std::int64_t> callbacks{0}, frames{0}, underflows{0}, busy_ns{0};
   bool is_running = false;
 
   static int play(const void*, void* out, unsigned long frames, const PaStreamCallbackTimeInfo*, PaStreamCallbackFlags flags, void* self) {
@@ -72,7 +73,10 @@ struct Device::State {
     if ((flags & paOutputUnderflow) != 0) state.underflows.fetch_add(1, std::memory_order_relaxed);
     state.callbacks.fetch_add(1, std::memory_order_relaxed);
     state.frames.fetch_add(static_cast<std::int64_t>(frames), std::memory_order_relaxed);
+    const auto started = std::chrono::steady_clock::now();
     state.synthesiser->process(static_cast<float* const*>(out), state.synthesiser->get_microphone_count(), static_cast<int>(frames));
+    const auto spent = std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - started);
+    state.busy_ns.fetch_add(spent.count(), std::memory_order_relaxed);
     return paContinue;
   }
 };
@@ -119,7 +123,8 @@ DeviceStatistics Device::get_statistics() const noexcept {
   return {.callbacks = state_->callbacks.load(std::memory_order_relaxed),
           .frames = state_->frames.load(std::memory_order_relaxed),
           .underflows = state_->underflows.load(std::memory_order_relaxed),
-          .latency_s = info != nullptr ? info->outputLatency : 0.0};
+          .latency_s = info != nullptr ? info->outputLatency : 0.0,
+          .busy_s = 1e-9 * static_cast<double>(state_->busy_ns.load(std::memory_order_relaxed))};
 }
 
 }  // namespace carillon::live

@@ -32,6 +32,10 @@ int main(int argc, char** argv) {
   app.add_option("--gain", options.gain_per_pa, "Full scale per pascal, instead of the scene's (or 1)")
       ->check(CLI::PositiveNumber)
       ->option_text("G");
+  app.add_option("--cpu", options.cpu_share,
+                 "Share of one core that the sound may take, 0.01 to 1; the least audible modes fade out for it")
+      ->check(CLI::Range(0.01, 1.0))
+      ->option_text("SHARE");
   app.add_flag("-q,--quiet", options.quiet, "Print nothing");
   try {
     app.parse(argc, argv);

@@ -23,6 +23,7 @@
 #include "runtime/host/scene.hpp"
 #include "runtime/host/strikes.hpp"
 #include "runtime/live/device.hpp"
+#include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
@@ -50,12 +51,12 @@ class Course {
   /// Up to where it is known what happens.
   double get_time_s() const { return world_ == nullptr || time_s_ >= end_s_ ? std::numeric_limits<double>::infinity() : time_s_; }
 
-  /// Hands on what happens before a time, as far as there is room.
+  /// Hands on what happens before a time, as far as there is room, and says how far physics has run.
   void hand_on(double until_s, synth::Synthesiser& synthesiser) {
     while (true) {
       const bool has_strike = next_ < strikes_.size() && strikes_[next_].time_s <= until_s;
       const bool has_event = !waiting_.empty() && stream::get_time_s(waiting_.front()) <= until_s;
-      if (!has_strike && !has_event) return;
+      if (!has_strike && !has_event) break;
       const bool takes_strike = has_strike && (!has_event || strikes_[next_].time_s < stream::get_time_s(waiting_.front()));
       if (!synthesiser.push(takes_strike ? stream::Event(strikes_[next_]) : waiting_.front())) return;  // full: later
       if (takes_strike)
@@ -63,6 +64,8 @@ class Course {
       else
         waiting_.pop_front();
     }
+    const double known_s = std::min(get_time_s(), until_s);
+    if (known_s > marked_s_ && synthesiser.push(stream::Mark{known_s})) marked_s_ = known_s;
   }
 
  private:
@@ -70,7 +73,7 @@ class Course {
   std::size_t next_ = 0;
   std::unique_ptr<contact::World> world_;
   std::deque<stream::Event> waiting_;
-  double time_s_ = 0.0, end_s_ = 0.0;
+  double time_s_ = 0.0, end_s_ = 0.0, marked_s_ = -1.0;
 };
 
 /// The way of a listener that walks, as events.
@@ -120,23 +123,26 @@ void play(const PlayerOptions& options) {
   course.hand_on(options.look_ahead_s, synthesiser);
   walk.hand_on(options.look_ahead_s, synthesiser);
   device.start();
-  std::int64_t behind = 0;  // looks at which physics was not ahead
+  synth::LoadKeeper keeper;
   for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
     const double until = now + options.look_ahead_s;
     course.advance(until);
     course.hand_on(until, synthesiser);
     walk.hand_on(until, synthesiser);
-    if (course.get_time_s() < synthesiser.get_horizon_s()) ++behind;
+    if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
     if (course.get_time_s() >= until) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   device.stop();
   const DeviceStatistics card = device.get_statistics();
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   if (options.quiet) return;
+  const double card_s = std::max(static_cast<double>(card.frames), 1.0) / rate_hz;
   fmt::print("played             {:.2f} s in {} blocks, {} underflows, latency {:.1f} ms\n", static_cast<double>(card.frames) / rate_hz,
              card.callbacks, card.underflows, 1e3 * card.latency_s);
   fmt::print("strikes            {}, {} late, {} refused\n", counters.strikes, counters.late, counters.refused);
-  fmt::print("physics            {} times behind the sound\n", behind);
+  fmt::print("physics            {} times behind the sound\n", counters.underruns);
+  fmt::print("work               {:.1f} % of a core, {:.3g} mode-samples/s, {} groups of modes faded\n", 100.0 * card.busy_s / card_s,
+             static_cast<double>(counters.mode_samples) / card_s, counters.faded);
 }
 
 }  // namespace carillon::live

@@ -12,6 +12,7 @@ struct PlayerOptions {
   std::string device;         // empty: the system's default
   int frames = 256;           // of a block
   double look_ahead_s = 0.1;  // by which physics runs ahead of the sound
+  double cpu_share = 0.0;     // of a core that the sound may take; 0: all that it needs
   double gain_per_pa = 0.0;   // 0: the scene's gain_per_pa, or 1
   bool quiet = false;
 };

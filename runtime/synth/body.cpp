@@ -279,6 +279,14 @@ void Body::make_sound(std::size_t count, BodyScratch& scratch, TickFunction tick
       clicker_->click.skip(static_cast<std::int64_t>(count));
     } else {
       clicker_->click.process(dipole);
+      int bad = 0;
+      for (const std::span<float>& axis : dipole)
+        for (const float p : axis) bad |= static_cast<int>(!(std::abs(p) <= std::numeric_limits<float>::max()));
+      if (bad != 0) {
+        clicker_->click.reset();
+        for (const std::span<float>& axis : dipole) std::fill(axis.begin(), axis.end(), 0.0F);
+        ++work_.resets;
+      }
       work_.units[Effect::kAccelerationNoise] += static_cast<std::int64_t>(count);
     }
     for (Air* air : airs) {

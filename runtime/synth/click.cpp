@@ -68,6 +68,12 @@ bool Click::strike(const stream::Impulse& impulse, const stream::Quaternion& to_
   return true;
 }
 
+void Click::reset() noexcept {
+  state_.fill(0.0);
+  pulses_.clear();
+  awake_ = false;
+}
+
 void Click::take_over(const Click& other) noexcept {
   position_ = other.position_;
   refused_ = other.refused_;

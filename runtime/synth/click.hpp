@@ -38,6 +38,8 @@ class Click {
   bool is_idle() const { return !awake_ && pulses_.empty(); }
   /// As process() of so many samples of a click that is idle, whose zeros nobody wants. [audio-thread]
   void skip(std::int64_t samples) noexcept { position_ += samples; }
+  /// Silence; no pulse is left. [audio-thread]
+  void reset() noexcept;
   /// Goes on in place of another click, with its time and its strikes; the sound goes on without a step and dies away as this sphere's
   /// does. [audio-thread]
   void take_over(const Click& other) noexcept;

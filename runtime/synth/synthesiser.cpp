@@ -262,6 +262,18 @@ Body* Synthesiser::find_body(std::int32_t number) noexcept {
   return body;
 }
 
+void Synthesiser::take(const stream::Mark& mark) noexcept {
+  marked_s_ = has_marks_ ? std::max(marked_s_, mark.time_s) : mark.time_s;
+  has_marks_ = true;
+}
+
+/// At the start of a period: whether physics has run to its end. What is not known yet comes late, or not at all.
+void Synthesiser::watch_marks() noexcept {
+  const bool is_overtaken = has_marks_ && marked_s_ * options_.rate_hz < static_cast<double>(sample_ + kPeriod);
+  work_.underruns += static_cast<std::int64_t>(is_overtaken && !is_overtaken_);
+  is_overtaken_ = is_overtaken;
+}
+
 void Synthesiser::take(const stream::Impulse& impulse) noexcept {
   Body* body = find_body(impulse.body);
   if (body == nullptr) return;
@@ -292,6 +304,7 @@ void Synthesiser::take(const stream::Listener& listener) noexcept {
 void Synthesiser::take_events() noexcept {
   stream::Event event;
   while (ring_.pop(event)) {
+    if (const auto* mark = std::get_if<stream::Mark>(&event)) take(*mark);
     if (const auto* impulse = std::get_if<stream::Impulse>(&event)) take(*impulse);
     if (const auto* contact = std::get_if<stream::Contact>(&event)) take(*contact);
     if (const auto* motion = std::get_if<stream::Motion>(&event)) take(*motion);
@@ -365,6 +378,7 @@ void Synthesiser::render(int samples) noexcept {
   take_events();
   if (begins) {
     finish_changes();
+    watch_marks();
     keep_budget();
   }
   for (auto& mix : mix_) std::fill_n(mix.begin(), samples, 0.0);
@@ -397,7 +411,14 @@ void Synthesiser::process(float* const* out, int channels, int frames) noexcept 
     const int count = std::min(held_, frames - done);
     for (int c = 0; c < heard; ++c) {
       const double* from = mix_[static_cast<std::size_t>(c)].data() + (rendered_ - held_);
-      for (int n = 0; n < count; ++n) out[c][done + n] = static_cast<float>(gain * from[n]);
+      int bad = 0;
+      for (int n = 0; n < count; ++n) {
+        const auto heard_fs = static_cast<float>(gain * from[n]);
+        const bool is_number = std::abs(heard_fs) <= std::numeric_limits<float>::max();
+        bad += static_cast<int>(!is_number);
+        out[c][done + n] = is_number ? heard_fs : 0.0F;
+      }
+      work_.zeroed += bad;
     }
     held_ -= count;
     done += count;
@@ -436,7 +457,8 @@ double Synthesiser::get_peak_pa(int body) const noexcept {
 }
 
 void Synthesiser::publish_counters() noexcept {
-  const std::array<std::int64_t, 6> values{work_.strikes, work_.refused, work_.late, work_.resets, work_.mode_samples, work_.faded};
+  const std::array<std::int64_t, 8> values{work_.strikes,      work_.refused, work_.late,      work_.resets,
+                                           work_.mode_samples, work_.faded,   work_.underruns, work_.zeroed};
   for (std::size_t i = 0; i < values.size(); ++i) published_[i].store(values[i], std::memory_order_relaxed);
 }
 
@@ -449,7 +471,9 @@ SynthesiserCounters Synthesiser::get_counters() const noexcept {
           .overflows = ring_.get_overflows(),
           .resets = get(3),
           .mode_samples = get(4),
-          .faded = get(5)};
+          .faded = get(5),
+          .underruns = get(6),
+          .zeroed = get(7)};
 }
 
 }  // namespace carillon::synth

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -75,6 +76,8 @@ struct SynthesiserCounters {
   std::int64_t resets = 0;        // bodies silenced because their state was no number
   std::int64_t mode_samples = 0;  // work: modes times samples
   std::int64_t faded = 0;         // groups of modes that had to go for the budget
+  std::int64_t underruns = 0;     // times that the sound overtook the last stream::Mark
+  std::int64_t zeroed = 0;        // numbers of the output that were none, and are 0
 };
 
 class Synthesiser {
@@ -116,8 +119,10 @@ class Synthesiser {
   /// Gives back the memory of removed bodies and effects that the audio thread has let go, and sends changes that wait. [main-thread]
   void collect();
 
-  /// Full scale per pascal; 1 at first. [any-thread]
-  void set_gain(double per_pa) noexcept { gain_.store(static_cast<float>(per_pa), std::memory_order_relaxed); }
+  /// Full scale per pascal; 1 at first. What is no finite number counts as 0. [any-thread]
+  void set_gain(double per_pa) noexcept {
+    gain_.store(std::isfinite(per_pa) ? static_cast<float>(per_pa) : 0.0F, std::memory_order_relaxed);
+  }
 
   /// Mode-samples that a second of sound may take (modes times samples, as the counters count them); infinity: as many as there are. When
   /// there are more, the modes that are least audible at the microphones fade out over a period, over all bodies, though never the first
@@ -182,6 +187,8 @@ class Synthesiser {
   void apply_commands() noexcept;
   void finish_changes() noexcept;
   void take_events() noexcept;
+  void take(const stream::Mark& mark) noexcept;
+  void watch_marks() noexcept;
   void take(const stream::Impulse& impulse) noexcept;
   void take(const stream::Contact& contact) noexcept;
   void take(const stream::Motion& motion) noexcept;
@@ -209,6 +216,8 @@ class Synthesiser {
   Track listener_;
   Mix mix_;
   BodyScratch scratch_;
+  double marked_s_ = 0.0;  // of the last Mark: physics has run so far
+  bool has_marks_ = false, is_overtaken_ = false;
   int rendered_ = 0;         // samples in mix_
   int held_ = 0;             // of them not yet handed out: the last
   std::int64_t sample_ = 0;  // rendered so far
@@ -220,7 +229,7 @@ class Synthesiser {
   std::atomic<float> gain_{1.0F};
   std::atomic<std::int64_t> position_{0};
   std::atomic<std::int64_t> horizon_{0};
-  std::array<std::atomic<std::int64_t>, 6> published_{};
+  std::array<std::atomic<std::int64_t>, 8> published_{};
 };
 
 }  // namespace carillon::synth

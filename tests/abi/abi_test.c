@@ -7,12 +7,12 @@
 
 static int failures = 0;
 
-#define CHECK(condition)                                                  \
-  do {                                                                    \
-    if (!(condition)) {                                                   \
-      fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);     \
-      ++failures;                                                         \
-    }                                                                     \
+#define CHECK(condition)                                              \
+  do {                                                                \
+    if (!(condition)) {                                               \
+      fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
+      ++failures;                                                     \
+    }                                                                 \
   } while (0)
 
 static char message[256];
@@ -74,9 +74,38 @@ static void check_models(const carillon_bank* bank, carillon_model** model) {
   CHECK(carillon_model_make(bank, &options, &other, message, sizeof message) == CARILLON_BAD_INPUT && other == NULL && message[0] != '\0');
   options.size = 0;
   CHECK(carillon_model_make(bank, &options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  carillon_model_options_init_sized(&options, sizeof options - 8); /* smaller than it ever was: not touched */
+  CHECK(options.size == 0);
   CHECK(carillon_model_make(NULL, NULL, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
   CHECK(carillon_model_mode_count(NULL) == 0);
   carillon_model_release(NULL);
+}
+
+static void check_edits(const carillon_bank* bank) {
+  carillon_edits edits;
+  carillon_bank* edited = (carillon_bank*)1;
+  double factor;
+  carillon_edits_init(&edits);
+  carillon_edits_init(NULL);
+  edits.density_scale = 2;
+  edits.stiffness_scale = 3;
+  edits.size_scale = 0.5;
+  CHECK(carillon_bank_edit(bank, &edits, &edited, message, sizeof message) == CARILLON_OK && edited != NULL);
+  factor = sqrt(3.0 / 2.0) / 0.5;
+  CHECK(fabs(carillon_bank_frequency_hz(edited, 0) - factor * carillon_bank_frequency_hz(bank, 0)) <
+        1e-9 * carillon_bank_frequency_hz(bank, 0));
+  carillon_bank_close(edited);
+  edits.sets_damping = 1;
+  edits.alpha1_s = -1;
+  CHECK(carillon_bank_edit(bank, &edits, &edited, message, sizeof message) == CARILLON_BAD_INPUT && edited == NULL && message[0] != '\0');
+  edits.sets_damping = 0;
+  edits.size_scale = NAN;
+  CHECK(carillon_bank_edit(bank, &edits, &edited, message, sizeof message) == CARILLON_BAD_INPUT && edited == NULL);
+  edits.size = 1;
+  CHECK(carillon_bank_edit(bank, &edits, &edited, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_edit(NULL, &edits, &edited, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_edit(bank, NULL, &edited, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_edit(bank, &edits, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
 }
 
 static float play(carillon_synth* synth, int blocks) {
@@ -126,6 +155,150 @@ static void check_events(carillon_synth* synth, int32_t body) {
   CHECK(carillon_push_impulse(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_impulse(NULL, &impulse) == CARILLON_BAD_ARGUMENT);
   CHECK(carillon_push_motion(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_motion(NULL, &motion) == CARILLON_BAD_ARGUMENT);
   CHECK(carillon_push_listener(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_listener(NULL, &listener) == CARILLON_BAD_ARGUMENT);
+}
+
+static void check_contacts(const carillon_model* model) {
+  static const double place[3] = {0, 1, 0};
+  carillon_options options;
+  carillon_synth* synth;
+  carillon_contact contact;
+  carillon_counters counters;
+  int32_t body;
+  carillon_options_init(&options);
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_add_body(synth, model, place, &body, NULL, 0) == CARILLON_OK);
+  carillon_contact_init(&contact);
+  carillon_contact_init(NULL);
+  contact.body = body;
+  contact.id = 7;
+  contact.force_n = 2;
+  contact.slip_m_s[0] = contact.sweep_m_s = contact.other_sweep_m_s = 0.3;
+  contact.state = CARILLON_CONTACT_BEGIN;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_OK);
+  contact.state = CARILLON_CONTACT_HOLD;
+  contact.time_s = 0.1;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_OK);
+  contact.state = CARILLON_CONTACT_END;
+  contact.time_s = 0.2;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_OK);
+  CHECK(carillon_push_mark(synth, 0.5) == CARILLON_OK);
+  (void)play(synth, 300);
+  contact.state = 3;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_BAD_INPUT);
+  contact.state = CARILLON_CONTACT_HOLD;
+  contact.force_n = -1;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_BAD_INPUT);
+  contact.force_n = NAN;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_BAD_INPUT);
+  contact.size = 8;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_push_contact(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_contact(NULL, &contact) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_push_mark(synth, NAN) == CARILLON_BAD_INPUT && carillon_push_mark(NULL, 1) == CARILLON_BAD_ARGUMENT);
+  carillon_counters_init(&counters);
+  carillon_counters_init(NULL);
+  CHECK(carillon_get_counters(synth, &counters) == CARILLON_OK && counters.underruns == 0 && counters.faults == 3);
+  (void)play(synth, 200); /* beyond the mark */
+  CHECK(carillon_get_counters(synth, &counters) == CARILLON_OK && counters.underruns == 1);
+  carillon_destroy(synth);
+}
+
+static void check_bodies(const carillon_bank* bank, const carillon_model* model) {
+  carillon_options options;
+  carillon_synth* synth;
+  carillon_body_options body_options;
+  carillon_model_options model_options;
+  carillon_edits edits;
+  carillon_bank* edited;
+  carillon_model* other;
+  carillon_impulse impulse;
+  carillon_counters counters;
+  carillon_effect_counters effects;
+  int32_t body, second;
+  int i;
+  carillon_options_init(&options);
+  options.max_bodies = 2;
+  options.budget = 16 * 48000.0;
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_get_budget(synth) == 16 * 48000.0 && carillon_get_budget(NULL) == 0);
+  carillon_body_options_init(&body_options);
+  carillon_body_options_init(NULL);
+  CHECK((body_options.effects & CARILLON_MODAL) != 0 && (body_options.effects & CARILLON_ACCELERATION_NOISE) == 0);
+  body_options.position_m[1] = 1;
+  body_options.effects = CARILLON_MODAL | CARILLON_HERTZ_PULSE | CARILLON_TWO_EARS;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &body, message, sizeof message) == CARILLON_OK && body == 0);
+  CHECK(carillon_get_effects(synth, body) == body_options.effects);
+  CHECK(carillon_get_effects(synth, 77) == 0 && carillon_get_effects(NULL, 0) == 0);
+  body_options.effects = 512;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &second, message, sizeof message) == CARILLON_BAD_INPUT && second == -1);
+  body_options.effects = CARILLON_MODAL;
+  body_options.rotation[0] = 0;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &second, message, sizeof message) == CARILLON_BAD_INPUT);
+  body_options.rotation[0] = NAN;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &second, message, sizeof message) == CARILLON_BAD_INPUT);
+  body_options.rotation[0] = 1;
+  body_options.silence_pa = -1;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &second, message, sizeof message) == CARILLON_BAD_INPUT);
+  body_options.size = 0;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &second, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_add_body_with(NULL, NULL, NULL, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+
+  CHECK(carillon_set_effects(synth, body, CARILLON_MODAL | CARILLON_AIR_DELAY, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_get_effects(synth, body) == (CARILLON_MODAL | CARILLON_AIR_DELAY));
+  CHECK(carillon_set_effects(synth, body, 1 << 20, message, sizeof message) == CARILLON_BAD_INPUT && message[0] != '\0');
+  CHECK(carillon_set_effects(synth, 5, CARILLON_MODAL, message, sizeof message) == CARILLON_BAD_INPUT);
+  CHECK(carillon_set_effects(NULL, 0, CARILLON_MODAL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+
+  carillon_edits_init(&edits);
+  edits.size_scale = 1.3;
+  CHECK(carillon_bank_edit(bank, &edits, &edited, NULL, 0) == CARILLON_OK);
+  carillon_model_options_init(&model_options);
+  CHECK(carillon_model_make(edited, &model_options, &other, NULL, 0) == CARILLON_OK);
+  carillon_bank_close(edited);
+  carillon_impulse_init(&impulse);
+  impulse.impulse_n_s[0] = impulse.impulse_n_s[2] = 0.01;
+  impulse.duration_s = 1e-4;
+  for (i = 0; i < 20; ++i) {
+    impulse.time_s = carillon_horizon_s(synth) + 0.001;
+    CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_OK);
+    CHECK(carillon_swap_model(synth, body, i % 2 ? model : other, message, sizeof message) == CARILLON_OK);
+    CHECK(play(synth, 7) > 0);
+    CHECK(carillon_keep_load(synth, 0.3, 0.001 * i) == CARILLON_OK);
+  }
+  carillon_model_release(other); /* the body keeps it */
+  CHECK(play(synth, 7) > 0);
+  model_options.rate_hz = 32000;
+  CHECK(carillon_model_make(bank, &model_options, &other, NULL, 0) == CARILLON_OK);
+  CHECK(carillon_swap_model(synth, body, other, message, sizeof message) == CARILLON_BAD_INPUT && message[0] != '\0');
+  carillon_model_release(other);
+  CHECK(carillon_swap_model(synth, 9, model, message, sizeof message) == CARILLON_BAD_INPUT);
+  CHECK(carillon_swap_model(NULL, body, model, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_swap_model(synth, body, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_keep_load(NULL, 0.3, 1) == CARILLON_BAD_ARGUMENT && carillon_keep_load(synth, 0, 1) == CARILLON_BAD_INPUT);
+  CHECK(carillon_keep_load(synth, NAN, 1) == CARILLON_BAD_INPUT && carillon_keep_load(synth, 0.5, NAN) == CARILLON_BAD_INPUT);
+  carillon_set_budget(synth, INFINITY);
+  carillon_set_budget(NULL, 1);
+  CHECK(carillon_get_budget(synth) == INFINITY);
+
+  carillon_effect_counters_init(&effects);
+  carillon_effect_counters_init(NULL);
+  CHECK(carillon_get_effect_counters(synth, body, &effects) == CARILLON_OK && effects.units[0] > 0 && effects.bytes[0] > 0);
+  CHECK(effects.units[5] == 0 && effects.bytes[5] == 0);
+  CHECK(carillon_get_effect_counters(synth, 99, &effects) == CARILLON_OK && effects.units[0] == 0);
+  CHECK(carillon_get_effect_counters(synth, body, NULL) == CARILLON_BAD_ARGUMENT &&
+        carillon_get_effect_counters(NULL, 0, &effects) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_peak_pa(synth, body) > 0 && carillon_peak_pa(synth, -1) == 0 && carillon_peak_pa(NULL, 0) == 0);
+
+  /* No number of the output is none, whatever comes. */
+  carillon_set_gain(synth, NAN);
+  CHECK(play(synth, 4) == 0);
+  carillon_set_gain(synth, 1e38);
+  impulse.impulse_n_s[0] = 1e300;
+  impulse.time_s = carillon_horizon_s(synth) + 0.001;
+  CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_OK);
+  CHECK(isfinite(play(synth, 40)));
+  carillon_counters_init(&counters);
+  CHECK(carillon_get_counters(synth, &counters) == CARILLON_OK && counters.resets >= 1);
+  carillon_destroy(synth);
 }
 
 static void check_synth(const carillon_model* model) {
@@ -189,7 +362,8 @@ static void check_synth(const carillon_model* model) {
   CHECK(carillon_create(&options, &other, message, sizeof message) == CARILLON_BAD_INPUT && other == NULL && message[0] != '\0');
   options.size = 1;
   CHECK(carillon_create(&options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT);
-  CHECK(carillon_create(NULL, &other, NULL, 0) == CARILLON_BAD_ARGUMENT && carillon_create(&options, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_create(NULL, &other, NULL, 0) == CARILLON_BAD_ARGUMENT &&
+        carillon_create(&options, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
   carillon_destroy(NULL);
 }
 
@@ -200,8 +374,13 @@ int main(int argc, char** argv) {
   CHECK(carillon_abi_version() == CARILLON_ABI_VERSION);
   check_banks(argv[1], &bank);
   check_models(bank, &model);
+  CHECK(strcmp(carillon_status_text(CARILLON_OK), "ok") == 0 && strlen(carillon_status_text(CARILLON_FULL)) > 3);
+  CHECK(strlen(carillon_status_text((carillon_status)99)) > 3);
+  check_edits(bank);
+  check_bodies(bank, model);
   carillon_bank_close(bank); /* the model stays */
   check_synth(model);
+  check_contacts(model);
   carillon_model_release(model);
   return failures == 0 ? 0 : 1;
 }

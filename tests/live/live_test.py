@@ -65,10 +65,15 @@ class Live(unittest.TestCase):
         strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
         self.assertGreater(int(strikes[1]), 10)  # nine on the gong, and the cube's
         self.assertEqual(int(strikes[3]), 0)
+        self.assertRegex(run.stdout, r"physics +\d+ times behind the sound")
+        work = re.search(r"work +(\S+) % of a core, (\S+) mode-samples/s, (\d+) groups of modes faded", run.stdout)
+        self.assertGreater(float(work[2]), 0)
+        self.assertEqual(int(work[3]), 0)
 
     def test_bad_input_is_one_clear_line_and_no_sound(self):
         for arguments, code, words in [((self.scene, "--device", "nobody"), 2, ["nobody", "system"]),
                                        ((self.root / "none.json",), 2, ["none.json"]),
+                                       ((self.scene, "--cpu", "7"), 2, ["--cpu"]),
                                        ((), 2, ["scene"])]:
             run = live(*arguments)
             self.assertEqual(run.returncode, code, run.stderr)

@@ -200,6 +200,85 @@ TEST(Synthesiser, SleepingBodiesDoNoWork) {
   EXPECT_EQ(synthesiser.get_counters().mode_samples, before);
 }
 
+// The clock of a bank that has died away is its counters: not one mode-sample more, for each of many bodies.
+TEST(Synthesiser, ABankThatHasDiedAwayCostsNothing) {
+  Synthesiser synthesiser({.rate_hz = kRate, .max_bodies = 40});
+  const auto model = make_model(100, 60.0);
+  std::vector<stream::Event> events;
+  for (int b = 0; b < 40; ++b) {
+    synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
+    if (b % 2 == 0) events.emplace_back(make_impulse(b, 0.001 + 0.0001 * b));
+  }
+  play(synthesiser, events, 48000, [] { return 256; });
+  EXPECT_GT(synthesiser.get_counters().mode_samples, 20 * 100 * 128);
+  // The modes die one after the other, and are left out one after the other: far less than all of them until the last is silent.
+  EXPECT_LT(synthesiser.get_counters().mode_samples, 20LL * 112 * 48000 / 2);
+  const auto units = [&](int body) { return synthesiser.get_effect_counters(body).units; };
+  std::vector<PerEffect<std::int64_t>> before;
+  for (int b = 0; b < 40; ++b) before.push_back(units(b));
+  EXPECT_EQ(units(1)[Effect::kModal], 0);  // never struck
+  const std::int64_t work = synthesiser.get_counters().mode_samples;
+  const Channels out = play(synthesiser, {}, 48000, [] { return 256; });
+  EXPECT_EQ(synthesiser.get_counters().mode_samples, work);
+  for (int b = 0; b < 40; ++b)
+    for (int e = 0; e < kEffectCount; ++e) EXPECT_EQ(units(b)[static_cast<Effect>(e)], before[b][static_cast<Effect>(e)]);
+  EXPECT_EQ(*std::max_element(out[0].begin(), out[0].end()), 0.0F);
+}
+
+TEST(Synthesiser, CountsHowOftenItOvertakesPhysics) {
+  Synthesiser synthesiser({.rate_hz = kRate});
+  play(synthesiser, {}, 4800, [] { return 64; });
+  EXPECT_EQ(synthesiser.get_counters().underruns, 0);  // nobody said how far physics has run
+  EXPECT_TRUE(synthesiser.push(stream::Mark{0.2}));
+  play(synthesiser, {}, 4800 - 256, [] { return 64; });
+  EXPECT_EQ(synthesiser.get_counters().underruns, 0);
+  play(synthesiser, {}, 4800, [] { return 64; });
+  EXPECT_EQ(synthesiser.get_counters().underruns, 1);  // once, however long it lasts
+  EXPECT_TRUE(synthesiser.push(stream::Mark{0.1}));    // an older one changes nothing
+  EXPECT_TRUE(synthesiser.push(stream::Mark{0.4}));
+  play(synthesiser, {}, 4800 - 256, [] { return 64; });
+  EXPECT_EQ(synthesiser.get_counters().underruns, 1);
+  play(synthesiser, {}, 9600, [] { return 64; });
+  EXPECT_EQ(synthesiser.get_counters().underruns, 2);
+}
+
+// By way of the modes, the click, the way through the air and the gain.
+TEST(Synthesiser, WhatIsNoNumberNeverReachesTheOutput) {
+  std::vector<testing::InventedMode> modes{{300.0, 20.0, 1.0, {0.3, 0.2, 1.0}}, {20000.0, 1e6, 1.0, {0.3, 0.2, 1.0}}};
+  const auto model = Model::make(testing::make_cube_bank(modes), {.rate_hz = kRate, .sphere_radius_m = 0.05});
+  for (const EffectSet effects : {EffectSet{Effect::kModal}, EffectSet{Effect::kAccelerationNoise},
+                                  EffectSet{Effect::kModal, Effect::kAccelerationNoise, Effect::kAirDelay, Effect::kTwoEars}}) {
+    Synthesiser synthesiser({.rate_hz = kRate});
+    const int wild = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}, .effects = effects});
+    const int tame = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 1.0}, .effects = effects});
+    const auto play_all = [&](std::vector<stream::Event> events) {
+      const Channels out = play(synthesiser, events, 4800, [] { return 64; });
+      for (const auto& channel : out)
+        for (const float p : channel) EXPECT_TRUE(std::isfinite(p));
+      return *std::max_element(out[0].begin(), out[0].end());
+    };
+    stream::Impulse huge = make_impulse(wild, 0.02);
+    huge.impulse_n_s = {1e308, 1e308, -1e308};
+    play_all({make_impulse(wild, 0.01), huge});
+    const SynthesiserCounters counters = synthesiser.get_counters();
+    EXPECT_GE(counters.resets, 1);
+    EXPECT_EQ(counters.zeroed, 0);  // stopped at its source, before it could drown the other body
+    EXPECT_GT(play_all({make_impulse(tame, 0.11)}), 0.0F);
+    huge.time_s = 0.25;
+    play_all({stream::Motion{0.2, wild, {1e300, -1e300, 1e300}, {1e300, 0.0, 0.0}}, stream::Motion{0.21, wild, {-1e300, 1e300, 1e300}, {}},
+              make_impulse(wild, 0.22), huge});
+    play_all({stream::Listener{.time_s = 0.31, .position_m = {-1e300, 1e308, 0.0}}, make_impulse(tame, 0.32)});
+    synthesiser.set_gain(std::nan(""));
+    EXPECT_EQ(play_all({}), 0.0F);
+  }
+  Synthesiser synthesiser({.rate_hz = kRate});
+  const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
+  synthesiser.set_gain(3e38);
+  const Channels out = play(synthesiser, {make_impulse(body, 0.01, 1e4)}, 4800, [] { return 64; });
+  for (const float p : out[0]) EXPECT_TRUE(std::isfinite(p));
+  EXPECT_GT(synthesiser.get_counters().zeroed, 0);
+}
+
 TEST(Synthesiser, FurtherChannelsAreSilentAndFewerAreEnough) {
   Synthesiser synthesiser({.rate_hz = kRate});
   const int body = synthesiser.add_body(make_model(4), {.position_m = {1.0, 1.0, 0.0}});
