@@ -42,6 +42,13 @@ for program in ("strike_c", "strike_cpp"):
     heard[program] = re.fullmatch(r"(\d+) modes, peak (\S+) Pa at the left ear\n", line).groups()
 if heard["strike_c"][0] != heard["strike_cpp"][0] or not all(float(peak) > 0 for _, peak in heard.values()):
     sys.exit("the two programs do not play the same bank")
+lines = []
+for program in ("slide_c", "edit_cpp"):
+    line = run(work / "example-build" / program, bank, capture_output=True).stdout
+    print(program, line.strip())
+    lines.append(re.fullmatch(r"peak (\S+) Pa, (\S+) Pa after the edit; (\d+) -> (\d+) Hz(?:; 0 underruns)?\n", line).groups())
+if lines[0][2:] != lines[1][2:]:
+    sys.exit("the two programs do not edit the same bank")
 bad = subprocess.run([work / "example-build/strike_c", __file__], capture_output=True, text=True)
 if bad.returncode != 1 or "installed_package.py" not in bad.stderr:
     sys.exit(f"no clear error for a file that is no bank: {bad.stderr}")
