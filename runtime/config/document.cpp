@@ -108,7 +108,9 @@ Document::Document(std::shared_ptr<DocumentData> data) : data_(std::move(data)) 
 Object Document::root() const { return Object(data_, &data_->root, ""); }
 const std::filesystem::path& Document::file() const { return data_->file; }
 
-Document read_document(const std::filesystem::path& file) { return parse_document(read_file(file, "JSON file", kMaxBytes), file); }
+Document read_document(const std::filesystem::path& file, std::string_view too_long) {
+  return parse_document(read_file(file, "JSON file", kMaxBytes, too_long), file);
+}
 
 Document parse_document(std::string_view text, const std::filesystem::path& file, int first_line) {
   auto data = std::make_shared<DocumentData>();
@@ -116,6 +118,10 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   data->first_line = first_line;
   if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);  // UTF-8 byte order mark
   data->text = std::string(text);
+  if (const std::size_t at = text.find('\0'); at != std::string_view::npos) {
+    const auto line = first_line + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+    throw InputError(fmt::format("{}:{}: there is a zero byte, which no text has; check that this is the right file", file.string(), line));
+  }
   check_depth(*data);
   Json::CharReaderBuilder builder;
   Json::CharReaderBuilder::strictMode(&builder.settings_);

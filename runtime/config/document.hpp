@@ -133,7 +133,7 @@ class Document {
 
 /// Reads and parses a document of at most 16 MiB. Throws InputError: no such file, not a regular file, too large,
 /// a syntax error (line and column), a duplicate key, a root that is no object.
-Document read_document(const std::filesystem::path& file);
+Document read_document(const std::filesystem::path& file, std::string_view too_long = "check that this is the right file");
 
 /// The same from text; `file` names it in messages and anchors relative paths, `first_line` is the number of its first line there.
 Document parse_document(std::string_view text, const std::filesystem::path& file, int first_line = 1);

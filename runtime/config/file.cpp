@@ -51,7 +51,7 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes) {
+std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes, std::string_view mend) {
   // O_NONBLOCK: opening a pipe without a writer must not wait.
   const Descriptor fd(::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   if (fd.get() < 0) {
@@ -63,8 +63,8 @@ std::string read_file(const fs::path& file, std::string_view what, std::uint64_t
                                  S_ISDIR(info.st_mode) ? "a folder" : "a pipe or a device"));
   }
   if (static_cast<std::uint64_t>(info.st_size) > max_bytes) {
-    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); check that this is the right file", file.string(),
-                                 info.st_size, what, max_bytes));
+    throw InputError(
+        fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", file.string(), info.st_size, what, max_bytes, mend));
   }
   std::string bytes(static_cast<std::size_t>(info.st_size), '\0');
   std::size_t done = 0;

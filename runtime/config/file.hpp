@@ -12,7 +12,8 @@ namespace carillon::config {
 
 /// The bytes of a regular file. Throws InputError when there is none, when it is a folder, a pipe or a device (never waits on one), when it
 /// cannot be read, or when it holds more than `max_bytes`. `what` says in messages what was expected ("job file").
-std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes);
+std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes,
+                      std::string_view mend = "check that this is the right file");
 
 /// Writes the bytes to a temporary file beside `file`, fsyncs, renames it to `file` and fsyncs the folder: readers see the old content
 /// or the new. The temporary file has no name until it is whole, where the file system can do that (not on NFS): a process that is ended in

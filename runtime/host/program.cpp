@@ -117,7 +117,7 @@ void write_output(const fs::path& file, const std::string& bytes, const char* wh
 }  // namespace
 
 void run(const ProgramOptions& options) {
-  Scene scene = parse_scene(config::read_document(options.scene));
+  Scene scene = read_scene(options.scene);
   if (options.rate_hz) {
     scene.sample_rate_hz = *options.rate_hz;
     if (!fits_in_memory(scene)) {

@@ -17,7 +17,8 @@ constexpr double kShortestS = 1e-3;
 constexpr double kLongestS = 3600.0;
 constexpr double kFarthestM = 1e4;  // of positions; sound takes half a minute from there
 constexpr std::size_t kMostBodies = 1000;
-constexpr double kMaxSpeedMs = 300.0;  // below the speed of sound in air
+constexpr std::size_t kLongestName = 200;  // bytes
+constexpr double kMaxSpeedMs = 300.0;      // below the speed of sound in air
 constexpr double kMaxSpinRadS = 1e4;
 constexpr double kMaxEarDistanceM = 10.0;
 constexpr std::size_t kMostWaypoints = 100000;
@@ -135,6 +136,11 @@ synth::EffectSet find_usual(const plan::Wish& wish) { return wish.automatic ? kD
 SceneBody parse_body(config::Object& object, const plan::Wish& wish) {
   SceneBody body;
   body.name = object.string("name");
+  if (body.name.size() > kLongestName ||
+      std::any_of(body.name.begin(), body.name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
+    object.fail("name",
+                fmt::format("is no name: at most {} bytes, and none of them a line feed or another control character", kLongestName));
+  }
   body.bank = object.path("bank");
   contact::BodySpec& spec = body.spec;
   spec.name = body.name;
@@ -160,6 +166,7 @@ contact::GroundSpec parse_ground(config::Object& object) {
   ground.height_m = read_within(object, "height_m", ground.height_m, -kFarthestM, kFarthestM);
   ground.young_modulus_pa = object.number_or("young_modulus_pa", ground.young_modulus_pa, config::kPositive);
   ground.poisson_ratio = object.number_or("poisson_ratio", ground.poisson_ratio, {-1.0, 0.5});
+  ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1e-3, 1e6);
   ground.restitution = read_within(object, "restitution", ground.restitution, 0.0, 1.0);
   ground.friction = read_within(object, "friction", ground.friction, 0.0, 10.0);
   object.finish();
@@ -283,6 +290,10 @@ Output parse_output(config::Object& object) {
 
 }  // namespace
 
+Scene read_scene(const std::filesystem::path& file) {
+  return parse_scene(config::read_document(file, fmt::format("a scene may hold {} bodies and {} strikes", kMostBodies, kMostStrikes)));
+}
+
 Scene parse_scene(const config::Document& document) {
   Scene scene;
   scene.file = document.file();
@@ -301,7 +312,9 @@ Scene parse_scene(const config::Document& document) {
     root.finish();  // a mistyped key is the likeliest reason
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
   }
-  if (bodies.size() > kMostBodies) root.fail("bodies", fmt::format("lists {} bodies; a scene may hold {}", bodies.size(), kMostBodies));
+  if (bodies.size() > kMostBodies)
+    root.fail("bodies", fmt::format("lists {} bodies; a scene may hold {}: leave some out, or make several scenes of it", bodies.size(),
+                                    kMostBodies));
   if (root.has("effects")) scene.wish = read_effects(root);
   scene.effects = find_usual(scene.wish);
   std::set<std::string> names;

@@ -81,6 +81,9 @@ struct Scene {
   Output output;
 };
 
+/// Reads a scene file. Throws as parse_scene does, and for a file that cannot be read.
+Scene read_scene(const std::filesystem::path& file);
+
 /// Reads a scene. Banks are only named, not opened. Throws InputError "file:line: ..." for anything that is not a scene.
 Scene parse_scene(const config::Document& document);
 

@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.02, 10.0))
       ->option_text("S");
   app.add_option("--gain", options.gain_per_pa, "Full scale per pascal, instead of the scene's (or 1)")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1e-12, 1e12))
       ->option_text("G");
   app.add_option("--cpu", options.cpu_share,
                  "Share of one core that the sound may take, 0.01 to 1; the least audible modes fade out for it")

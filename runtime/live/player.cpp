@@ -38,8 +38,12 @@ class Course {
   Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks) : strikes_(host::make_impulses(scene, banks)) {
     std::stable_sort(strikes_.begin(), strikes_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
     if (!host::has_physics(scene)) return;
-    world_ = std::make_unique<contact::World>(host::make_world(scene),
-                                              contact::WorldOptions{.end_s = scene.duration_s, .lasting_contacts = false});
+    try {
+      world_ = std::make_unique<contact::World>(host::make_world(scene),
+                                                contact::WorldOptions{.end_s = scene.duration_s, .lasting_contacts = false});
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
+    }
     end_s_ = scene.duration_s;
   }
 
@@ -96,7 +100,7 @@ class Walk {
 }  // namespace
 
 void play(const PlayerOptions& options) {
-  host::Scene scene = host::parse_scene(config::read_document(options.scene));
+  host::Scene scene = host::read_scene(options.scene);
   const host::Banks banks = host::read_banks(scene);
   std::vector<const bank::Bank*> body_banks;
   for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -22,6 +23,8 @@ namespace {
 
 constexpr std::uint64_t kMostBytes = 1u << 30;
 constexpr double kMostBack = 1.0;           // s
+constexpr double kLongestPulse = 10.0;      // s
+constexpr double kLargest = 1e9;            // of any other amount, in SI units: what is more is a mistake, and would overflow
 constexpr long long kMostBodies = 1 << 20;  // more than any scene holds
 constexpr long long kInt32 = std::numeric_limits<std::int32_t>::max();
 constexpr long long kInt64 = std::numeric_limits<std::int64_t>::max();
@@ -91,6 +94,8 @@ class EventReader {
     read_place(e);
     e.impulse_n_s = in_.numbers<3>("impulse_n_s");
     e.duration_s = in_.number("duration_s");
+    check_size("impulse_n_s", e.impulse_n_s);
+    check_size("duration_s", e.duration_s, kLongestPulse);
     e.shape = static_cast<PulseShape>(find(kShapeNames, in_.choice_or("shape", kShapeNames, kShapeNames.front())));
     return finish(e);
   }
@@ -108,6 +113,13 @@ class EventReader {
     e.spin_rad_s = in_.number("spin_rad_s");
     e.patch_radius_m = in_.number("patch_radius_m");
     e.impedance_n_s_m = in_.number_or("impedance_n_s_m", 0.0);
+    check_size("slip_m_s", e.slip_m_s);
+    check_size("force_n", e.force_n);
+    check_size("sweep_m_s", e.sweep_m_s);
+    check_size("other_sweep_m_s", e.other_sweep_m_s);
+    check_size("spin_rad_s", e.spin_rad_s);
+    check_size("patch_radius_m", e.patch_radius_m);
+    check_size("impedance_n_s_m", e.impedance_n_s_m);
     return finish(e);
   }
 
@@ -157,7 +169,17 @@ class EventReader {
     e.time_s = in_.number("time_s");
     e.position_m = in_.numbers<3>("position_m");
     e.velocity_m_s = in_.numbers<3>("velocity_m_s");
+    check_size("position_m", e.position_m);
+    check_size("velocity_m_s", e.velocity_m_s);
     e.rotation = in_.numbers<4>("rotation");
+  }
+
+  void check_size(std::string_view key, double value, double largest = kLargest) {
+    if (!(std::abs(value) <= largest))
+      in_.fail(key, fmt::format("{:g} is more than any that is played; give {:g} at most", value, largest));
+  }
+  void check_size(std::string_view key, const Vec3& value) {
+    for (const double x : value) check_size(key, x);
   }
 
   template <class T>

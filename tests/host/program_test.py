@@ -4,6 +4,7 @@ import json
 import math
 import os
 import pathlib
+import resource
 import struct
 import subprocess
 import tempfile
@@ -308,6 +309,11 @@ class RenderProgram(unittest.TestCase):
         refuse(lines[0].replace("}]", '}, {"name": "two", "triangles": 4}]') + "".join(lines[1:]), "2 bodies")
         refuse(good.replace('"time_s": 0.0', '"time_s": NaN', 1), "bad.jsonl:2:")
         refuse(good.replace('"rotation"', '"rotations"', 1), "bad.jsonl:2:", "rotation")
+        hit = next(i for i, line in enumerate(lines) if '"impulse"' in line)
+        for key, value in (("impulse_n_s", [1e39, 0, 0]), ("duration_s", 1e6), ("duration_s", -1), ("body", 7), ("triangle", 4000), ("impulse_n_s", [None, 0, 0]), ("time_s", -5)):
+            event = json.loads(lines[hit])
+            event["impulse"][key] = value
+            refuse("".join(lines[:hit]) + json.dumps(event) + "\n" + "".join(lines[hit + 1:]), f"bad.jsonl:{hit + 1}:")
         self.assert_refused(render(scene, "--contacts", self.root / "nowhere.jsonl", "-o", wav), 2, "nowhere.jsonl")
         file.write_text(good)
         self.assert_refused(render(scene, "--contacts", file, "--record", file, "-o", wav), 2, "would overwrite")
@@ -331,6 +337,106 @@ class RenderProgram(unittest.TestCase):
             scene = self.scene("strike.json", strikes=[{"time_s": 0.1, "body": "cube", "impulse_n_s": [0, 0, 1], **change}])
             self.assert_refused(render(scene, "-o", out), 2, "strike.json:", word)
         self.assertFalse(out.exists())
+
+    def test_hostile_scenes_are_one_clear_error_each(self):
+        out = self.root / "never.wav"
+
+        def refuse(text, *words):
+            (self.root / "hostile.json").write_text(text)
+            run = render(self.root / "hostile.json", "-o", out)
+            self.assert_refused(run, 2, "hostile.json", *words)
+            self.assertEqual(run.stderr.count("\n"), 1, run.stderr)  # one error, nothing before it
+            self.assertLess(len(run.stderr), 700)
+            self.assertFalse(out.exists())
+
+        def change(**changes):
+            return self.scene("hostile.json", **changes).read_text()
+
+        def change_body(**changes):
+            return change(bodies=[{"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.15], **changes}])
+
+        good = change()
+        for number in ("1e999", "NaN", "Infinity", "-1e999"):
+            refuse(good.replace("0.15", number), "not JSON")
+        for pose, word in ((None, "null"), ("high", "text"), ([0, 0], "list of 2"), ([0, 0, 1e30], "out of range"), ([0, 0, "1"], "text"), ([0, 0, None], "null")):
+            refuse(change_body(position_m=pose), "hostile.json:", "position_m", word)
+        refuse(change_body(quaternion=[0, 0, 0, 0]), "quaternion", "length 1")
+        refuse(change_body(restitution=-0.1), "restitution", "0 to 1")
+        refuse(change_body(friction=-1), "friction")
+        refuse(change_body(name="a\nb"), "name", "control")
+        refuse(change_body(name="x" * 100000), "name", "200")
+        refuse(change_body(name=""), "name", "empty")
+        refuse(change_body(positon_m=[0, 0, 1]), "positon_m", "position_m")
+        refuse(change_body(position_m=[0, 0, 0.02]), "inside the ground", "raise it")
+        cube = {"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.15]}
+        refuse(change(bodies=[cube, {**cube, "position_m": [1, 0, 0.15]}]), "bodies[1].name", "another name")
+        refuse(change(bodies=[cube, {**cube, "name": "twin"}]), "cube", "twin", "inside each other")
+        refuse(change(bodies=[]), "bodies")
+        for duration in (0, -1, 1e9, "1"):
+            refuse(change(duration_s=duration), "hostile.json:", "duration_s")
+        for rate in (0, -48000, 7999, 192001, 1e9, 44100.5):
+            refuse(change(sample_rate_hz=rate), "hostile.json:", "sample_rate_hz")
+        for ground in ({"young_modulus_pa": -1}, {"poisson_ratio": 0.5}, {"density_kg_m3": 0}, {"density_kg_m3": -2400}, {"friction": -1}):
+            refuse(change(ground=ground), "hostile.json:", "ground." + next(iter(ground)))
+        strike = {"time_s": 0.1, "body": "cube", "triangle": 1, "impulse_n_s": [0, 0, -1]}
+        for wrong in ({"time_s": 5}, {"time_s": -0.1}, {"body": "cub"}, {"triangle": -1}, {"impulse_n_s": [0, 0, 1e300]}, {"duration_s": -1}):
+            refuse(change(strikes=[{**strike, **wrong}]), "hostile.json:", "strikes[0]." + next(iter(wrong)))
+        refuse(change(listener={"path": [[0, 0, 0, 1], [0.2, 0, 0, 1], [0.1, 0, 0, 1]]}), "listener.path", "order of time")
+        refuse(change(listener={"ear_distance_m": -1}), "ear_distance_m")
+        refuse(good + "\0", "zero byte")
+        refuse("[" * 100000, "brackets")
+        refuse("", "not JSON")
+
+    def test_a_crowd_of_bodies_is_refused_in_a_moment_with_the_limit(self):
+        out = self.root / "never.wav"
+        for count, words in ((1001, ["1001 bodies", "may hold 1000"]), (100000, ["100000 bodies", "may hold 1000"]),
+                             (1000000, ["too many for a JSON file", "a scene may hold 1000 bodies"])):
+            bodies = ", ".join('{"name": "b%d", "bank": "cube.h5"}' % i for i in range(count))
+            (self.root / "crowd.json").write_text('{"duration_s": 1, "bodies": [%s]}' % bodies)
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            self.assert_refused(render(self.root / "crowd.json", "-o", out), 2, "crowd.json", *words)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            self.assertLess(after.ru_utime - before.ru_utime, 10.0)
+            self.assertLess(after.ru_maxrss, 600 * 1024)  # KiB, of the largest child so far
+        (self.root / "crowd.json").unlink()
+
+    def test_a_microphone_in_the_middle_of_a_body_hears_a_finite_sound(self):
+        scene = self.scene("inside.json", bodies=[{"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 1]}], listener=None,
+                           strikes=[{"time_s": 0.1, "body": "cube", "triangle": 1, "impulse_n_s": [0, 0, -0.01]}], microphones=[[0, 0, 1], [0, 0, 2]])
+        document = json.loads(scene.read_text())
+        del document["listener"]
+        scene.write_text(json.dumps(document))
+        run = render(scene, "-o", self.root / "inside.wav", "--report", self.root / "inside-report.json", "-q")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        report = json.loads((self.root / "inside-report.json").read_text())
+        self.assertTrue(math.isfinite(report["peak_pa"]))
+        _, _, sound = read_wav(self.root / "inside.wav")
+        # Nothing counts as nearer than 5 cm: 20 times the pressure at 1 m.
+        self.assertAlmostEqual(np.abs(sound[:, 0]).max() / np.abs(sound[:, 1]).max(), 20.0, delta=1.0)
+
+    def test_what_lies_is_silent(self):
+        # Modes of 60 1/s: 100 dB in 0.2 s. The cube falls, rattles and lies after a second at the latest; from 0.3 s later on there is nothing.
+        subprocess.run([BIN / "write_cube_bank", self.root / "damped.h5", "0.3", "60"], check=True)
+        for name, turn, restitution in (("flat", [0, 0, 0], 0.5), ("edge", [30, 0, 0], 0.3), ("corner", [20, 30, 10], 0.6)):
+            scene = self.scene(f"lies-{name}.json", duration_s=2.5, output={"format": "float"},
+                               bodies=[{"name": "cube", "bank": "damped.h5", "position_m": [0, 0, 0.2], "rotation_deg": turn, "restitution": restitution}])
+            run = render(scene, "-o", self.root / "lies.wav", "--trajectory", self.root / "lies.json", "-q")
+            self.assertEqual(run.returncode, 0, run.stderr)
+            data = (self.root / "lies.wav").read_bytes()
+            sound = np.frombuffer(data[data.index(b"data") + 8:], dtype="<f4").reshape(-1, 2)
+            last = max(i["time_s"] for i in json.loads((self.root / "lies.json").read_text())["impulses"])
+            self.assertLess(last, 1.6, name)
+            quiet = np.abs(sound[int((last + 0.3) * 48000):]).max()
+            self.assertLess(quiet, 1e-5 * np.abs(sound).max(), name)
+
+    def test_a_fall_of_half_a_millimetre_is_heard(self):
+        scene = self.scene("slight.json", bodies=[{"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.0505]}], output={"gain": 1.0, "format": "float"})
+        run = render(scene, "-o", self.root / "slight.wav", "--trajectory", self.root / "slight.json.path", "--report", self.root / "slight-report.json", "-q")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        impulses = json.loads((self.root / "slight.json.path").read_text())["impulses"]
+        first = min(i["time_s"] - i["duration_s"] / 2 for i in impulses)
+        self.assertAlmostEqual(first, math.sqrt(2 * 0.0005 / 9.81), delta=2e-4)
+        self.assertGreater(json.loads((self.root / "slight-report.json").read_text())["peak_pa"], 100 * 20e-6)  # 40 dB over the threshold
 
     def test_bad_outputs_are_found_before_the_simulation(self):
         scene = self.scene("outputs.json", duration_s=500)  # would take minutes

@@ -19,7 +19,7 @@ const std::string kImpulse =
     R"({"impulse": {"time_s": 0.5, "body": 0, "triangle": 3, "barycentric": [0.25, 0.25, 0.5], "impulse_n_s": [0, 0, 1e-3], "duration_s": 1e-4}})"
     "\n";
 
-/// A number of any size and sign, often an awkward one.
+/// A number of any size that is read and any sign, often an awkward one.
 double draw(std::mt19937_64& random) {
   switch (random() % 8) {
     case 0:
@@ -29,9 +29,9 @@ double draw(std::mt19937_64& random) {
     case 2:
       return 5e-324;
     case 3:
-      return 1e300;
+      return 1e9;
     default:
-      return std::ldexp(static_cast<double>(random() >> 11) - 0x1p52, -static_cast<int>(random() % 200));
+      return std::ldexp(static_cast<double>(random() >> 11) - 0x1p52, -23 - static_cast<int>(random() % 200));
   }
 }
 
@@ -53,9 +53,14 @@ Event draw_event(std::mt19937_64& random) {
     case 0:
       return Mark{draw_time(random)};
     case 1:
-      return Impulse{
-          draw_time(random),  1, -1, 11, random() % 2 == 0 ? PulseShape::kHertz : PulseShape::kGaussian, inside, draw_vector(random),
-          draw_amount(random)};
+      return Impulse{draw_time(random),
+                     1,
+                     -1,
+                     11,
+                     random() % 2 == 0 ? PulseShape::kHertz : PulseShape::kGaussian,
+                     inside,
+                     draw_vector(random),
+                     std::min(draw_amount(random), 10.0)};
     case 2:
       return Contact{draw_time(random),
                      random() >> 1,
@@ -139,6 +144,23 @@ std::string replace(std::string text, const std::string& from, const std::string
   const auto at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return text.replace(at, from.size(), to);
+}
+
+TEST(Recording, RefusesAmountsThatNothingHas) {
+  const auto refuse = [](const std::string& from, const std::string& to, const std::string& key) {
+    const std::string text = replace(kHeader + kImpulse, from, to);
+    try {
+      parse_recording(text, "run.jsonl");
+      ADD_FAILURE() << to << " was read";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("run.jsonl:2: \"impulse." + key), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("at most"), std::string::npos) << error.what();
+    }
+  };
+  refuse("1e-3]", "1.1e9]", "impulse_n_s");
+  refuse("1e-3]", "-1e39]", "impulse_n_s");
+  refuse("1e-4}", "10.1}", "duration_s");
+  parse_recording(replace(kHeader + kImpulse, "1e-3]", "-1e9]"), "run.jsonl");
 }
 
 TEST(Recording, ComesBackBitForBit) {
