@@ -24,7 +24,7 @@ bool has_physics(const Scene& scene);
 contact::WorldSpec make_world(const Scene& scene);
 
 /// Runs the physics, if any body can move, and adds the strikes. Every body's spec has its bank. `has_contacts`: with records of contacts
-/// that last, which nothing plays yet. `progress` (may be empty) is called with the finished fraction. Throws InputError and SolveError,
+/// that last. `progress` (may be empty) is called with the finished fraction. Throws InputError and SolveError,
 /// which name the scene.
 Course simulate(const Scene& scene, bool has_contacts, const std::function<void(double)>& progress);
 

@@ -57,6 +57,7 @@ Feed::Feed(std::span<const stream::Event> events, std::vector<FedBody> bodies, s
       items_.push_back({std::isnan(due_s) ? kEver : due_s, i});
     } else if (const auto* contact = std::get_if<stream::Contact>(&events[i])) {
       if (find(contact->body) == nullptr) continue;
+      has_contacts_ = true;
       const auto [last, is_first] = contacts.try_emplace({contact->body, contact->id}, contact->time_s);
       items_.push_back({last->second - margin_s_, i});
       last->second = contact->time_s;
@@ -79,7 +80,11 @@ stream::Event Feed::make_event(const Item& item) const {
   stream::Event event = events_[item.event];
   const auto get_number = [this](std::int32_t body) { return bodies_[static_cast<std::size_t>(body)].number; };
   if (auto* impulse = std::get_if<stream::Impulse>(&event)) impulse->body = get_number(impulse->body);
-  if (auto* contact = std::get_if<stream::Contact>(&event)) contact->body = get_number(contact->body);
+  if (auto* contact = std::get_if<stream::Contact>(&event)) {
+    contact->body = get_number(contact->body);
+    const bool is_known = contact->other >= 0 && static_cast<std::size_t>(contact->other) < bodies_.size();
+    contact->other = is_known ? get_number(contact->other) : -1;
+  }
   if (auto* motion = std::get_if<stream::Motion>(&event)) {
     motion->body = get_number(motion->body);
     if (item.is_still) motion->velocity_m_s = {};
@@ -109,6 +114,9 @@ void Feed::hand_on(double until_s, synth::Synthesiser& synthesiser) {
     (void)synthesiser.push(make_event(items_[next_]));  // what cannot be played is counted there
     ++waiting;
   }
+  if (!has_contacts_) return;
+  if (waiting == synthesiser.get_ring_room()) synthesiser.process(nullptr, 0, 0);
+  (void)synthesiser.push(stream::Mark{until_s});
 }
 
 }  // namespace carillon::host

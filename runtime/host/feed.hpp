@@ -43,6 +43,7 @@ class Feed {
   std::vector<Item> items_;                   // in order of due_s
   std::vector<std::vector<double>> times_s_;  // of the motions of each body, then of the listener
   double margin_s_ = 0.0;                     // by which ways are known longer ahead than they need to be
+  bool has_contacts_ = false;
   std::size_t next_ = 0;
 };
 

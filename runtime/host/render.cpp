@@ -41,9 +41,10 @@ double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[
 
 /// What the events say about one body.
 struct BodyCourse {
-  bool is_played = false;  // something happens to it
-  stream::Motion first;    // where it is at the beginning
-  double reach_m = 0.0;    // how far from the first microphone's place it ever gets
+  bool is_played = false;   // something happens to it
+  bool is_touched = false;  // by a contact that lasts
+  stream::Motion first;     // where it is at the beginning
+  double reach_m = 0.0;     // how far from the first microphone's place it ever gets
 };
 
 std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
@@ -62,7 +63,7 @@ std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank:
     if (const auto* impulse = std::get_if<stream::Impulse>(&event); impulse != nullptr && find(impulse->body))
       courses[static_cast<std::size_t>(impulse->body)].is_played = true;
     if (const auto* contact = std::get_if<stream::Contact>(&event); contact != nullptr && find(contact->body))
-      courses[static_cast<std::size_t>(contact->body)].is_played = true;
+      courses[static_cast<std::size_t>(contact->body)].is_played = courses[static_cast<std::size_t>(contact->body)].is_touched = true;
   }
   for (std::size_t i = 0; i < courses.size(); ++i) {
     if (is_placed[i]) continue;
@@ -74,9 +75,11 @@ std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank:
   return courses;
 }
 
-/// What of its effects a body can have: nothing pushes one that is fixed, and microphones stay where they are put.
-synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects, bool is_played) {
-  if (!is_played) return {};
+/// What of its effects a body can have: nothing pushes one that is fixed, only one that is touched needs what contacts do, and microphones
+/// stay where they are put.
+synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects, const BodyCourse& course) {
+  if (!course.is_played) return {};
+  if (!course.is_touched) effects = effects.without({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping});
   if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
   return effects;
@@ -112,7 +115,7 @@ class Changes {
  private:
   static bool is_of(const plan::Change& change, std::size_t body) { return static_cast<std::size_t>(change.body) == body; }
   synth::EffectSet find(std::size_t body, synth::EffectSet effects) const {
-    return find_effects(*scene_, body, effects, (*courses_)[body].is_played);
+    return find_effects(*scene_, body, effects, (*courses_)[body]);
   }
 
   const Scene* scene_;
@@ -125,6 +128,14 @@ class Changes {
 double find_silence_pa(const Scene& scene, std::size_t body, const Plan* plan) {
   const bool is_planned = plan != nullptr && scene.bodies[body].wish.automatic && !scene.bodies[body].wish.on.has(Effect::kModal);
   return is_planned ? plan->planner.calc_silence_pa(static_cast<int>(body)) : synth::BodySettings{}.silence_pa;
+}
+
+synth::Surface make_ground(const Scene& scene) {
+  synth::Surface surface = synth::kGroundSurface;
+  if (!scene.ground) return surface;
+  surface.friction = scene.ground->friction;
+  surface.modulus_pa = scene.ground->young_modulus_pa / (1.0 - scene.ground->poisson_ratio * scene.ground->poisson_ratio);
+  return surface;
 }
 
 /// How far the microphones ever get from where the first of them starts.
@@ -175,6 +186,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                                   .max_bodies = std::max(1, static_cast<int>(fed.size())),
                                   .max_strikes = kMostStrikes,
                                   .max_waypoints = feed.count_waypoints(-1, 0.0),
+                                  .ground = make_ground(scene),
                                   .ticks = options.measures ? &get_ticks : nullptr});
   for (std::size_t i = 0; i < fed.size(); ++i) {
     const double longest_m = std::min(courses[i].reach_m + ears_reach_m, kFarthestHeardM);
@@ -182,6 +194,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                                           .rotation = courses[i].first.rotation,
                                           .effects = changes.find_first(i),
                                           .silence_pa = find_silence_pa(scene, i, options.plan),
+                                          .surface = {.friction = scene.bodies[i].spec.friction},
                                           .longest_m = longest_m,
                                           .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs)});
   }

@@ -90,7 +90,11 @@ synth::EffectSet read_names(config::Object& object, std::string_view key) {
     const auto refuse = [&](const std::string& what) { throw InputError(fmt::format("{}: \"{}\" {}", entry.place, key, what)); };
     if (entry.object) refuse("must be a list of names of effects, and holds an object");
     const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
-    if (!effect || !kPlayableEffects.has(*effect)) {
+    if (effect && !kPlayableEffects.has(*effect)) {
+      refuse(fmt::format("names \"{}\", which is not in this build (CMake option CARILLON_EFFECTS); there are {}", entry.text,
+                         fmt::join(playable, ", ")));
+    }
+    if (!effect) {
       const std::string nearest = config::find_nearest(entry.text, playable);
       refuse(fmt::format("names \"{}\", which is no effect that can be played{}; there are {}", entry.text,
                          nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest), fmt::join(playable, ", ")));

@@ -21,12 +21,24 @@ constexpr EffectSet kOfTheAir{Effect::kModal, Effect::kAccelerationNoise, Effect
 /// Whether a build and a body have an effect: false without a look where the build has not.
 constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
 
+constexpr EffectSet kOfContacts = EffectSet{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}.common(kCompiledEffects);
+
+/// Whether lasting contacts do anything: they act on modes.
+constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::kModal) && !effects.common(kOfContacts).is_empty(); }
+
 /// The middle of the microphones, where those are who hear a body without two ears.
 Vec3 calc_middle(const std::vector<Vec3>& places) {
   Vec3 middle{};
   for (const Vec3& place : places)
     for (std::size_t k = 0; k < 3; ++k) middle[k] += place[k] / static_cast<double>(places.size());
   return middle;
+}
+
+/// The first of a set, or another where it is empty.
+constexpr Effect find_first(EffectSet effects, Effect otherwise) {
+  for (int e = 0; e < kEffectCount; ++e)
+    if (effects.has(static_cast<Effect>(e))) return static_cast<Effect>(e);
+  return otherwise;
 }
 
 std::unique_ptr<Air> make_air(EffectSet effects, const BodyFrame& frame) {
@@ -63,6 +75,7 @@ EffectBytes BodyChange::calc_bytes() const {
     bytes[Effect::kAccelerationNoise] +=
         static_cast<std::int64_t>(sizeof(Clicker) - sizeof(Click) + clicker->click.calc_bytes() + clicker->attitude.get_bytes());
   }
+  if (contacts) bytes[Effect::kRoughness] += static_cast<std::int64_t>(contacts->calc_bytes());
   if (!air) return bytes;
   // What a history holds beyond one without travel time belongs to the travel time.
   const History still(0.0, 1.0, kPeriod);
@@ -107,6 +120,9 @@ std::unique_ptr<BodyChange> Body::make_change(EffectSet from, EffectSet to, std:
         std::make_unique<Clicker>(Clicker{Click(model->get_sphere_radius_m(), model->get_mass_kg(), frame_.rate_hz, frame_.max_strikes),
                                           Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
   }
+  if (needs_contacts(to) && (change->inherits || !needs_contacts(from))) {
+    change->contacts = std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = frame_.surface, .effects = to});
+  }
   const bool sounds = to.has(Effect::kModal) || to.has(Effect::kAccelerationNoise);
   if (to.common(kOfTheAir) != from.common(kOfTheAir) && sounds) change->air = make_air(to, frame_);
   model_ = std::move(model);
@@ -137,6 +153,7 @@ void Body::apply(BodyChange& change, const Track& listener, std::int64_t sample)
       clicker_->attitude.push(turned_s_, rotation_);
     }
   }
+  put_contacts(change);
   if (!change.air) return;
   std::swap(next_air_, change.air);
   next_air_->source.track = &track_;
@@ -145,6 +162,21 @@ void Body::apply(BodyChange& change, const Track& listener, std::int64_t sample)
   for (const auto& history : next_air_->dipole)
     if (history) history->push_silence(sample);
   for (Ear& ear : next_air_->ears) ear.begin(next_air_->source, listener, sample);
+}
+
+/// Contacts begin, change what they do, or fall.
+void Body::put_contacts(BodyChange& change) noexcept {
+  if (kOfContacts.is_empty()) return;
+  if (change.contacts) {
+    std::swap(contacts_, change.contacts);
+    voice_->attach(contacts_.get());
+  } else if (contacts_ && needs_contacts(effects_)) {
+    contacts_->set_effects(effects_);
+  } else if (contacts_ && change.inherits) {  // of the old model
+    change.contacts = std::move(contacts_);
+  } else if (contacts_) {
+    contacts_->release();
+  }
 }
 
 /// Whether the ears of a new air find in its histories all that the old one could have given them.
@@ -163,6 +195,7 @@ bool Body::is_filled(const Air& air, const Track& listener, std::int64_t sample)
 BodyChange* Body::finish_change(const Track& listener, std::int64_t sample) noexcept {
   if (change_ == nullptr) return nullptr;
   const bool sounds = has(effects_, Effect::kModal) || has(effects_, Effect::kAccelerationNoise);
+  if (contacts_ && !needs_contacts(effects_) && !contacts_->is_idle()) return nullptr;  // they fall first
   if (!fading_ && (next_air_ || (!sounds && air_))) {
     // The old air goes on until the new one can take over; with nothing to be heard it does so at once.
     fading_ = next_air_ == nullptr || is_filled(*next_air_, listener, sample);
@@ -171,6 +204,10 @@ BodyChange* Body::finish_change(const Track& listener, std::int64_t sample) noex
   }
   fading_ = false;
   if (next_air_ || !sounds) change_->air = std::exchange(air_, std::move(next_air_));
+  if (contacts_ && !needs_contacts(effects_)) {
+    voice_->attach(nullptr);
+    change_->contacts = std::move(contacts_);
+  }
   if (!has(effects_, Effect::kModal)) change_->voice = std::move(voice_);
   if (!has(effects_, Effect::kAccelerationNoise)) change_->clicker = std::move(clicker_);
   return std::exchange(change_, nullptr);
@@ -228,8 +265,20 @@ bool Body::take(const stream::Impulse& impulse, std::int64_t sample) noexcept {
   return is_taken;
 }
 
-/// The place for what contacts that last do to a body with roughness, rolling or contact damping.
-bool Body::take(const stream::Contact&, std::int64_t) noexcept { return false; }
+bool Body::take(const stream::Contact& contact, const Surface& other, std::int64_t sample) noexcept {
+  if (!needs_contacts(effects_) || !contacts_) return false;
+  wake(sample);
+  stream::Contact own = contact;
+  own.time_s -= static_cast<double>(first_) / frame_.rate_hz;
+  const std::int64_t refused = contacts_->get_counters().refused;
+  const bool is_taken = contacts_->take(own, other);
+  work_.refused += contacts_->get_counters().refused - refused;
+  return is_taken;
+}
+
+void Body::reach(double time_s) noexcept {
+  if (!kOfContacts.is_empty() && contacts_) contacts_->reach(time_s - static_cast<double>(first_) / frame_.rate_hz);
+}
 
 bool Body::take(const stream::Motion& motion) noexcept {
   if (!track_.push({motion.time_s, motion.position_m, motion.velocity_m_s})) return false;
@@ -251,15 +300,25 @@ void Body::make_sound(std::size_t count, BodyScratch& scratch, TickFunction tick
   if (kCompiledEffects.has(Effect::kModal) && voice_) {
     const std::span<float> mono = std::span(scratch.mono).first(count);
     const bool is_idle = voice_->is_idle();
+    Effect acts = Effect::kModal;
     if (is_idle) {
       voice_->skip(static_cast<std::int64_t>(count));
     } else {
       std::fill(mono.begin(), mono.end(), 0.0F);
       const VoiceCounters before = voice_->get_counters();
+      const bool touched = !kOfContacts.is_empty() && contacts_ && !contacts_->is_resting();
+      const std::int64_t contact_samples = touched ? contacts_->get_counters().samples : 0;
       voice_->process(mono);
       const VoiceCounters& after = voice_->get_counters();
       work_.resets += after.resets - before.resets;
       work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
+      if (touched) {
+        const std::int64_t textured = contacts_->get_counters().samples - contact_samples;
+        if (has(effects_, Effect::kRoughness)) work_.units[Effect::kRoughness] += textured;
+        if (has(effects_, Effect::kRolling)) work_.units[Effect::kRolling] += textured;
+        if (has(effects_, Effect::kContactDamping)) work_.units[Effect::kContactDamping] += static_cast<std::int64_t>(count);
+        acts = find_first(effects_.common(kOfContacts), Effect::kModal);
+      }
       for (const float p : mono) work_.peak_pa = std::max(work_.peak_pa, std::abs(p));
     }
     for (Air* air : airs) {
@@ -269,7 +328,7 @@ void Body::make_sound(std::size_t count, BodyScratch& scratch, TickFunction tick
       else
         air->monopole->push(mono);
     }
-    end_part(Effect::kModal);
+    end_part(acts);
   }
   if (kCompiledEffects.has(Effect::kAccelerationNoise) && clicker_) {
     const bool is_idle = clicker_->click.is_idle();

@@ -10,6 +10,7 @@
 
 #include "runtime/stream/events.hpp"
 #include "runtime/synth/click.hpp"
+#include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/ears.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/history.hpp"
@@ -29,9 +30,10 @@ struct BodyFrame {
   double longest_m = 0.0;
   double silence_pa = 1e-10;
   Isa isa = Isa::kBest;
+  Surface surface{};
 };
 
-/// A module of memory that belongs to effects.
+/// Memory that belongs to effects. What lasting contacts need counts as that of roughness here, whichever of the three effects need it.
 using EffectBytes = PerEffect<std::int64_t>;
 
 /// The click of a body with its attitude.
@@ -59,6 +61,7 @@ struct BodyChange {
   std::unique_ptr<Voice> voice;
   std::unique_ptr<Clicker> clicker;
   std::unique_ptr<Air> air;
+  std::unique_ptr<ContactForces> contacts;
   bool inherits = false;                   // voice and clicker go on in place of those there
   std::unique_ptr<Succession> succession;  // for the voice
 
@@ -106,7 +109,8 @@ class Body {
 
   /// `sample`: the first that is not rendered. False when no effect could take it.
   bool take(const stream::Impulse& impulse, std::int64_t sample) noexcept;
-  bool take(const stream::Contact& contact, std::int64_t sample) noexcept;
+  /// `other`: the surface of the other body.
+  bool take(const stream::Contact& contact, const Surface& other, std::int64_t sample) noexcept;
   bool take(const stream::Motion& motion) noexcept;
 
   /// Adds to `mix` what is heard of it in samples `sample` to `sample + count`, all of one period.
@@ -114,6 +118,9 @@ class Body {
 
   /// Nothing sounds, nothing is under way, nothing is to come: until the next event render() would add nothing.
   bool is_asleep() const noexcept;
+  /// Nothing earlier will come. For bodies that are awake, before render().
+  void reach(double time_s) noexcept;
+  const Surface& get_surface() const noexcept { return frame_.surface; }
   const BodyWork& get_work() const { return work_; }
   /// Its modes; nullptr without.
   Voice* get_voice() noexcept { return voice_.get(); }
@@ -122,6 +129,7 @@ class Body {
 
  private:
   void wake(std::int64_t sample) noexcept;
+  void put_contacts(BodyChange& change) noexcept;
   void make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept;
   void hear(Air& air, std::int64_t sample, std::size_t count, const Track& listener, int fade, BodyScratch& scratch, Mix& mix,
             TickFunction ticks) noexcept;
@@ -135,6 +143,7 @@ class Body {
   EffectSet effects_;
   std::unique_ptr<Voice> voice_;
   std::unique_ptr<Clicker> clicker_;
+  std::unique_ptr<ContactForces> contacts_;  // attached to voice_
   std::unique_ptr<Air> air_, next_air_;
   BodyChange* change_ = nullptr;
   bool fading_ = false;        // from air_ to next_air_, in this period

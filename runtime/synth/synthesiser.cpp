@@ -110,7 +110,8 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                                        .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
                                        .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
                                        .silence_pa = settings.silence_pa,
-                                       .isa = settings.isa},
+                                       .isa = settings.isa,
+                                       .surface = settings.surface},
                              settings.position_m, settings.rotation);
   auto change = body->make_change({}, settings.effects);
   Published& published = published_bodies_[static_cast<std::size_t>(number)];
@@ -178,9 +179,16 @@ void Synthesiser::send_change(int number) {
 
 void Synthesiser::publish_bytes(int number) {
   const auto i = static_cast<std::size_t>(number);
-  for (int e = 0; e < kEffectCount; ++e) {
-    published_bodies_[i].bytes[static_cast<std::size_t>(e)].store(owned_[i].bytes[static_cast<Effect>(e)], std::memory_order_relaxed);
+  EffectBytes bytes = owned_[i].bytes;
+  const auto move_contacts_to = [&](Effect effect) { bytes[effect] += std::exchange(bytes[Effect::kRoughness], 0); };
+  if (!owned_[i].effects.has(Effect::kRoughness)) {
+    if (owned_[i].effects.has(Effect::kRolling))
+      move_contacts_to(Effect::kRolling);
+    else if (owned_[i].effects.has(Effect::kContactDamping))
+      move_contacts_to(Effect::kContactDamping);
   }
+  for (int e = 0; e < kEffectCount; ++e)
+    published_bodies_[i].bytes[static_cast<std::size_t>(e)].store(bytes[static_cast<Effect>(e)], std::memory_order_relaxed);
 }
 
 void Synthesiser::remove_body(int body) {
@@ -287,10 +295,17 @@ void Synthesiser::take(const stream::Impulse& impulse) noexcept {
 
 void Synthesiser::take(const stream::Contact& contact) noexcept {
   Body* body = find_body(contact.body);
-  if (body == nullptr || !body->take(contact, sample_)) return;
-  set_awake(contact.body);
-  give_floor(*body);
+  if (body == nullptr) return;
+  const Body* other =
+      contact.other >= 0 && contact.other < options_.max_bodies ? playing_[static_cast<std::size_t>(contact.other)] : nullptr;
+  count(*body, [&] {
+    if (!body->take(contact, other != nullptr ? other->get_surface() : options_.ground, sample_)) return;
+    set_awake(contact.body);
+    give_floor(*body);
+  });
 }
+
+void Synthesiser::take(const stream::Mark& mark) noexcept { reached_s_ = std::max(reached_s_, mark.time_s); }
 
 void Synthesiser::take(const stream::Motion& motion) noexcept {
   Body* body = find_body(motion.body);
@@ -307,6 +322,7 @@ void Synthesiser::take_events() noexcept {
     if (const auto* mark = std::get_if<stream::Mark>(&event)) take(*mark);
     if (const auto* impulse = std::get_if<stream::Impulse>(&event)) take(*impulse);
     if (const auto* contact = std::get_if<stream::Contact>(&event)) take(*contact);
+    if (const auto* mark = std::get_if<stream::Mark>(&event)) take(*mark);
     if (const auto* motion = std::get_if<stream::Motion>(&event)) take(*motion);
     if (const auto* listener = std::get_if<stream::Listener>(&event)) take(*listener);
   }
@@ -384,6 +400,7 @@ void Synthesiser::render(int samples) noexcept {
   for (auto& mix : mix_) std::fill_n(mix.begin(), samples, 0.0);
   for_awake([&](int number, Body& body) {
     if (body.is_asleep()) return false;
+    body.reach(reached_s_);
     count(body, [&] { body.render(sample_, static_cast<std::size_t>(samples), listener_, scratch_, mix_, options_.ticks); });
     publish(number);
     return true;

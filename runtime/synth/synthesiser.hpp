@@ -41,6 +41,7 @@ struct SynthesiserOptions {
   int ring_events = 4096;                                   // that may wait between two calls of process()
   double longest_m = 60.0;                                  // what is further away is not heard
   double budget = std::numeric_limits<double>::infinity();  // set_budget()
+  Surface ground = kGroundSurface;                          // what contacts touch whose other body is none
   /// A counter of time, for what effects cost; nullptr: nothing is measured, and nothing paid for that.
   TickFunction ticks = nullptr;
 };
@@ -50,6 +51,7 @@ struct BodySettings {
   stream::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of the frame of its mesh until then
   EffectSet effects = kUsualEffects;
   double silence_pa = 1e-10;  // VoiceOptions
+  Surface surface{};          // what contacts that last touch
   double longest_m = 0.0;     // as in SynthesiserOptions; 0: what it says there
   int max_waypoints = 0;
   Isa isa = Isa::kBest;
@@ -57,11 +59,14 @@ struct BodySettings {
 
 /// What the effects of one body have done since it was added, and what they hold. An effect that is off keeps its units and holds nothing.
 struct EffectCounters {
-  /// Work: of modal mode-samples, of hertz_pulse pulses, of acceleration_noise samples (of three dipoles), of air_delay samples that an ear
-  /// read with travel time, of doppler those whose travel time changed, of two_ears those of the second microphone and all further.
+  /// Work: of modal mode-samples, of hertz_pulse pulses, of roughness and rolling samples of the texture that both read, contact by
+  /// contact, of contact_damping samples in which a contact is at work, of acceleration_noise samples (of three dipoles), of air_delay
+  /// samples that an ear read with travel time, of doppler those whose travel time changed, of two_ears those of the second microphone and
+  /// all further.
   PerEffect<std::int64_t> units{};
-  /// Of SynthesiserOptions::ticks. What pulses cost is in modal; an ear's time is that of doppler where the way changes, else of air_delay,
-  /// else of what it hears, and of two_ears for the second microphone and all further.
+  /// Of SynthesiserOptions::ticks. What pulses cost is in modal, and what modes cost while a contact is at work is in the first of
+  /// roughness, rolling and contact_damping that the body has, as are their bytes; an ear's time is that of doppler where the way changes,
+  /// else of air_delay, else of what it hears, and of two_ears for the second microphone and all further.
   PerEffect<std::int64_t> ticks{};
   EffectBytes bytes{};  // without the model, which bodies share, and without what a body has that has no effects
 };
@@ -191,6 +196,7 @@ class Synthesiser {
   void watch_marks() noexcept;
   void take(const stream::Impulse& impulse) noexcept;
   void take(const stream::Contact& contact) noexcept;
+  void take(const stream::Mark& mark) noexcept;
   void take(const stream::Motion& motion) noexcept;
   void take(const stream::Listener& listener) noexcept;
   void render(int samples) noexcept;
@@ -221,6 +227,7 @@ class Synthesiser {
   int rendered_ = 0;         // samples in mix_
   int held_ = 0;             // of them not yet handed out: the last
   std::int64_t sample_ = 0;  // rendered so far
+  double reached_s_ = 0.0;   // nothing earlier will come, as the last Mark says
   Budget budget_;
   bool limited_ = false;           // voices have floors
   std::int64_t spent_before_ = 0;  // mode-samples up to the last period

@@ -298,5 +298,93 @@ TEST(BodyEffects, TicksGoToTheEffectsThatWorkAndSleepingBodiesAreNotLookedAt) {
   EXPECT_NEAR(find_peak(out[0], again, again + 4800), find_peak(out[0], 0, 4800), 1e-3);
 }
 
+/// A contact that slides from 0.05 s on, a record a millisecond; without an end.
+std::vector<stream::Contact> make_slide(int body, double end_s) {
+  std::vector<stream::Contact> records;
+  for (int k = 0; k < static_cast<int>(1e3 * (end_s - 0.05)); ++k) {
+    records.push_back({.time_s = 0.05 + 1e-3 * k,
+                       .id = 5,
+                       .body = body,
+                       .triangle = 4,
+                       .state = k == 0 ? stream::ContactState::kBegin : stream::ContactState::kHold,
+                       .barycentric = {0.2, 0.3, 0.5},
+                       .normal = {0.0, 0.0, 1.0},
+                       .slip_m_s = {0.4, 0.0, 0.0},
+                       .force_n = 5.0,
+                       .sweep_m_s = 0.4,
+                       .other_sweep_m_s = 0.1,
+                       .patch_radius_m = 1e-4,
+                       .impedance_n_s_m = 3.0});
+  }
+  return records;
+}
+
+constexpr EffectSet kTouching = kHere.with({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping});
+
+// What is heard of a body that slides is what its voice plays with these forces, 480 samples late and 1 / 3.43 as loud.
+TEST(BodyEffects, ContactsThatLastAreHeardAsTheirForcesSay) {
+  const auto model = make_model({{420.0, 6.0}, {1370.0, 9.0}, {5200.0, 20.0}});
+  Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0.0, 0.0, 0.0}}});
+  std::vector<std::vector<float>> out;
+  play(synthesiser, out, 1280);  // so that its voice begins later than the scene
+  const Surface surface{.roughness_m = 6e-6, .friction = 0.3};
+  const int body = synthesiser.add_body(model, {.position_m = {0.0, 3.43, 0.0}, .effects = kTouching, .surface = surface});
+  Voice voice(model);
+  ContactForces forces(model, {.surface = surface});
+  voice.attach(&forces);
+  for (stream::Contact record : make_slide(body, 0.3)) {
+    EXPECT_TRUE(synthesiser.push(record));
+    record.time_s -= 1280 / kRate;
+    EXPECT_TRUE(forces.take(record, kGroundSurface));
+  }
+  EXPECT_TRUE(synthesiser.push(stream::Mark{1.0}));
+  forces.reach(1.0 - 1280 / kRate);
+  play(synthesiser, out, 12000);
+  std::vector<float> alone(12000);
+  voice.process(alone);
+  const double peak = find_peak(alone, 0, 12000);
+  EXPECT_GT(peak, 1e-6);
+  for (std::size_t n = 1280 + 496; n < out[0].size(); ++n) ASSERT_NEAR(3.43 * out[0][n], alone[n - 1280 - 496], 1e-5 * peak) << n;
+  const EffectCounters counters = synthesiser.get_effect_counters(body);
+  for (const Effect effect : {Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) EXPECT_GT(counters.units[effect], 8000);
+  EXPECT_EQ(counters.bytes[Effect::kRoughness], static_cast<std::int64_t>(forces.calc_bytes()));
+  EXPECT_EQ(counters.bytes[Effect::kRolling], 0);
+}
+
+TEST(BodyEffects, ContactsAreNothingToBodiesWithoutTheirEffects) {
+  const auto model = make_model({{420.0, 6.0}, {1370.0, 9.0}});
+  for (int turn = 0; turn < 3; ++turn) {
+    Synthesiser synthesiser({.rate_hz = kRate});
+    const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}, .effects = turn == 0 ? kHere : kTouching});
+    std::vector<std::vector<float>> out;
+    play(synthesiser, out, 256);
+    if (turn == 1) synthesiser.set_effects(body, kHere);
+    for (const stream::Contact& record : make_slide(body, 0.4)) synthesiser.push(record);
+    synthesiser.push(stream::Mark{10.0});
+    play(synthesiser, out, 12000);
+    const EffectCounters counters = synthesiser.get_effect_counters(body);
+    const bool touches = turn == 2;
+    EXPECT_EQ(counters.units[Effect::kRoughness] > 0, touches);
+    EXPECT_EQ(counters.units[Effect::kContactDamping] > 0, touches);
+    EXPECT_EQ(find_peak(out[0], 0, out[0].size()) > 0.0, touches);
+    synthesiser.collect();
+    EXPECT_EQ(synthesiser.get_effect_counters(body).bytes[Effect::kRoughness] > 0, touches);
+    if (!touches) continue;
+    // It goes on, with rolling alone it is silent (this one slides) but still damps, and then it falls and is freed.
+    synthesiser.set_effects(body, kHere.with({Effect::kRolling, Effect::kContactDamping}));
+    play(synthesiser, out, 2400);
+    synthesiser.collect();
+    EXPECT_EQ(synthesiser.get_effect_counters(body).bytes[Effect::kRoughness], 0);
+    EXPECT_EQ(synthesiser.get_effect_counters(body).bytes[Effect::kRolling], counters.bytes[Effect::kRoughness]);
+    synthesiser.set_effects(body, kHere);
+    play(synthesiser, out, 1200);
+    synthesiser.collect();
+    const EffectCounters after = synthesiser.get_effect_counters(body);
+    EXPECT_EQ(after.bytes[Effect::kRolling], 0);
+    play(synthesiser, out, 1200);
+    EXPECT_EQ(synthesiser.get_effect_counters(body).units[Effect::kContactDamping], after.units[Effect::kContactDamping]);
+  }
+}
+
 }  // namespace
 }  // namespace carillon::synth
