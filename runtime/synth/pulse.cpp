@@ -1,8 +1,8 @@
 // Method:     the answer of a mode to a force f during one sample is the integral of E(1 - u) f(u), E being the mode's answer to an
 //             impulse. E is written as a short Chebyshev series once per mode; then only the moments of f against the Chebyshev polynomials
 //             are needed, the same few numbers for all modes. The moments are Gauss-Legendre sums in theta with x = (1 - cos theta) / 2,
-//             which turns the root singularity of sin^1.5 at both ends of the pulse into a smooth function. Well inside a long pulse, and
-//             for the Gaussian, the sums are taken in time itself.
+//             which turns the root singularity of sin^1.5 at both ends of the pulse into a smooth function; where only one end is near, in
+//             s with x = s^2 from it, which takes a third of the sines; inside a pulse, and for the Gaussian, in time itself.
 // Source:     pulse shapes: Hunt & Crossley 1975; OSG02 section 4. Product integration: Davis & Rabinowitz, Methods of Numerical
 //             Integration, 2.5.6.
 // Deviations: OSG02's Gaussian never begins; here it is cut at four standard deviations, 6e-5 of its area left out, and scaled up to it.
@@ -62,55 +62,110 @@ struct GaussRule {
   }
 };
 
-const GaussRule<24> kRule;    // pieces with an end of the pulse in or near them
-const GaussRule<10> kInside;  // intervals well inside a long pulse
+const GaussRule<24> kRule;    // pieces with both ends of the pulse in or near them
+const GaussRule<16> kEnd;     // with one
+const GaussRule<12> kInside;  // intervals inside a pulse
 constexpr double kShortest = 1e-9;
-constexpr double kLong = 16.0;  // intervals
-constexpr double kNearEnd = 3.0;
+constexpr double kLong = 3.0;  // intervals
+constexpr double kGaussLong = 8.0;
+constexpr double kNearEnd = 1.0;  // no nearer to a rule in time
+constexpr double kFarEnd = 0.75;  // no nearer to a rule of the other end
 
-/// Sum over a rule: the moments of a smooth density over from <= u <= to.
-template <int kPoints, typename Density>
-Moments calc_smooth_moments(const GaussRule<kPoints>& rule, double from, double to, Density density) {
+/// sin(pi x) = 4 x (1 - x) P((x - 1/2)^2) for 0 <= x <= 1, to 1e-14 of it, without a branch: P is the series of the cosine over 1 - 4 z.
+constexpr std::array<double, 10> kSine = [] {
+  std::array<double, 10> p{};
+  double term = 1.0, sum = 0.0, power = 1.0;  // of the cosine's series at z = 1/4
+  for (std::size_t k = 0; k < p.size(); ++k) {
+    sum += term;
+    p[k] = power * sum;
+    power *= 4.0;
+    const double n = 2.0 * static_cast<double>(k);
+    term *= -pi * pi / 4.0 / ((n + 1.0) * (n + 2.0));
+  }
+  return p;
+}();
+
+double calc_sine(double x) {
+  const double z = (x - 0.5) * (x - 0.5);
+  double p = kSine.back();
+  for (std::size_t k = kSine.size() - 1; k-- > 0;) p = p * z + kSine[k];
+  return 4.0 * x * (1.0 - x) * p;
+}
+
+/// Sums of weight T_j(2 u - 1) over points of one interval, all points a step of j at a time.
+template <std::size_t kPoints>
+Moments calc_sums(const std::array<double, kPoints>& u, const std::array<double, kPoints>& weight) {
   Moments moments{};
-  for (int i = 0; i < kPoints; ++i) {
-    const double u = from + (to - from) * rule.node[i];
-    const double weight = rule.weight[i] * (to - from) * density(u);
-    const double x = 2.0 * u - 1.0;
-    double before = 1.0, now = x;
-    moments[0] += weight;
-    for (int j = 1; j < kMoments; ++j) {
-      moments[j] += weight * now;
-      const double next = 2.0 * x * now - before;
-      before = now;
-      now = next;
+  std::array<double, kPoints> twice_x, before, now;
+  for (std::size_t i = 0; i < kPoints; ++i) {
+    before[i] = weight[i];
+    now[i] = weight[i] * (2.0 * u[i] - 1.0);
+    twice_x[i] = 4.0 * u[i] - 2.0;
+    moments[0] += before[i];
+    moments[1] += now[i];
+  }
+  for (std::size_t j = 2; j < kMoments; ++j) {
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      const double next = twice_x[i] * now[i] - before[i];
+      before[i] = now[i];
+      now[i] = next;
     }
+    for (const double x : now) moments[j] += x;
   }
   return moments;
 }
 
+/// The moments of a smooth density over from <= u <= to.
+template <int kPoints, typename Density>
+Moments calc_smooth_moments(const GaussRule<kPoints>& rule, double from, double to, Density density) {
+  std::array<double, kPoints> u, weight;
+  for (int i = 0; i < kPoints; ++i) {
+    u[i] = from + (to - from) * rule.node[i];
+    weight[i] = rule.weight[i] * (to - from) * density(u[i]);
+  }
+  return calc_sums(u, weight);
+}
+
+/// Near one end of the pulse, the other being far: with x = s^2 from that end the force is s^3 times a smooth function. `sign`: 1 from the
+/// beginning on, -1 from the end back; the end lies at u = `origin`.
+Moments calc_end_moments(double origin, double sign, double length) {
+  const double near = std::max(0.0, sign > 0.0 ? -origin : origin - 1.0) / length;
+  const double far = (sign > 0.0 ? 1.0 - origin : origin) / length;
+  const double s_from = std::sqrt(near), s_to = std::sqrt(far);
+  std::array<double, 16> u, weight;
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    const double s = s_from + (s_to - s_from) * kEnd.node[i];
+    const double force = std::max(0.0, calc_sine(s * s));  // beyond the end by a rounding: nothing
+    u[i] = origin + sign * length * s * s;
+    weight[i] = kEnd.weight[i] * (s_to - s_from) * 2.0 * s * kPulseNorm * force * std::sqrt(force);
+  }
+  return calc_sums(u, weight);
+}
+
 Moments calc_hertz_moments(double start, double length) {
-  if (length > kLong && start < -kNearEnd && start + length > 1.0 + kNearEnd) {
+  const double end = start + length;
+  if (start < -kNearEnd && end > 1.0 + kNearEnd) {
     return calc_smooth_moments(kInside, 0.0, 1.0, [&](double u) {
-      const double s = std::sin(pi * (u - start) / length);
+      const double s = calc_sine((u - start) / length);
       return kPulseNorm / length * s * std::sqrt(s);
     });
   }
+  if (start < 1.0 && end > 1.0 + kFarEnd && length > kLong) return calc_end_moments(start, 1.0, length);
+  if (end > 0.0 && start < -kFarEnd && length > kLong) return calc_end_moments(end, -1.0, length);
   const double from = std::clamp(-start / length, 0.0, 1.0);
   const double to = std::clamp((1.0 - start) / length, 0.0, 1.0);
-  Moments moments{};
-  if (!(to > from)) return moments;
+  if (!(to > from)) return {};
   const double theta_from = std::acos(1.0 - 2.0 * from);
   const double theta_to = std::acos(1.0 - 2.0 * to);
-  for (std::size_t i = 0; i < kRule.node.size(); ++i) {
+  std::array<double, 24> u, weight;
+  for (std::size_t i = 0; i < u.size(); ++i) {
     const double theta = theta_from + (theta_to - theta_from) * kRule.node[i];
     const double cosine = std::cos(theta);
     const double force = std::cos(0.5 * pi * cosine);  // sin(pi x)
-    const double weight =
-        kRule.weight[i] * (theta_to - theta_from) * 0.5 * std::sin(theta) * kPulseNorm * force * std::sqrt(std::max(force, 0.0));
-    const Moments t = calc_chebyshev(start + length * 0.5 * (1.0 - cosine));
-    for (int j = 0; j < kMoments; ++j) moments[j] += weight * t[j];
+    u[i] = start + length * 0.5 * (1.0 - cosine);
+    weight[i] = kRule.weight[i] * (theta_to - theta_from) * 0.5 * std::sin(theta) * kPulseNorm * force * std::sqrt(std::max(force, 0.0));
   }
-  return moments;
+  return calc_sums(u, weight);
 }
 
 Moments calc_gauss_moments(double start, double length) {
@@ -120,8 +175,8 @@ Moments calc_gauss_moments(double start, double length) {
     const double x = 2.0 * kCut * ((u - start) / length - 0.5);
     return kGaussNorm / length * std::exp(-0.5 * x * x);
   };
-  return length > kLong && from == 0.0 && to == 1.0 ? calc_smooth_moments(kInside, 0.0, 1.0, density)
-                                                    : calc_smooth_moments(kRule, from, to, density);
+  return length > kGaussLong && from == 0.0 && to == 1.0 ? calc_smooth_moments(kInside, 0.0, 1.0, density)
+                                                         : calc_smooth_moments(kRule, from, to, density);
 }
 
 }  // namespace
