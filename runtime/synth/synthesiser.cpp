@@ -271,7 +271,7 @@ Body* Synthesiser::find_body(std::int32_t number) noexcept {
 }
 
 void Synthesiser::take(const stream::Mark& mark) noexcept {
-  marked_s_ = has_marks_ ? std::max(marked_s_, mark.time_s) : mark.time_s;
+  marked_s_ = std::max(marked_s_, mark.time_s);
   has_marks_ = true;
 }
 
@@ -305,8 +305,6 @@ void Synthesiser::take(const stream::Contact& contact) noexcept {
   });
 }
 
-void Synthesiser::take(const stream::Mark& mark) noexcept { reached_s_ = std::max(reached_s_, mark.time_s); }
-
 void Synthesiser::take(const stream::Motion& motion) noexcept {
   Body* body = find_body(motion.body);
   if (body != nullptr && !body->take(motion)) ++work_.refused;
@@ -322,7 +320,6 @@ void Synthesiser::take_events() noexcept {
     if (const auto* mark = std::get_if<stream::Mark>(&event)) take(*mark);
     if (const auto* impulse = std::get_if<stream::Impulse>(&event)) take(*impulse);
     if (const auto* contact = std::get_if<stream::Contact>(&event)) take(*contact);
-    if (const auto* mark = std::get_if<stream::Mark>(&event)) take(*mark);
     if (const auto* motion = std::get_if<stream::Motion>(&event)) take(*motion);
     if (const auto* listener = std::get_if<stream::Listener>(&event)) take(*listener);
   }
@@ -400,7 +397,7 @@ void Synthesiser::render(int samples) noexcept {
   for (auto& mix : mix_) std::fill_n(mix.begin(), samples, 0.0);
   for_awake([&](int number, Body& body) {
     if (body.is_asleep()) return false;
-    body.reach(reached_s_);
+    body.reach(marked_s_);
     count(body, [&] { body.render(sample_, static_cast<std::size_t>(samples), listener_, scratch_, mix_, options_.ticks); });
     publish(number);
     return true;

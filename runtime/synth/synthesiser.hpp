@@ -196,7 +196,6 @@ class Synthesiser {
   void watch_marks() noexcept;
   void take(const stream::Impulse& impulse) noexcept;
   void take(const stream::Contact& contact) noexcept;
-  void take(const stream::Mark& mark) noexcept;
   void take(const stream::Motion& motion) noexcept;
   void take(const stream::Listener& listener) noexcept;
   void render(int samples) noexcept;
@@ -222,12 +221,11 @@ class Synthesiser {
   Track listener_;
   Mix mix_;
   BodyScratch scratch_;
-  double marked_s_ = 0.0;  // of the last Mark: physics has run so far
+  double marked_s_ = 0.0;  // of the last Mark: nothing earlier will come
   bool has_marks_ = false, is_overtaken_ = false;
   int rendered_ = 0;         // samples in mix_
   int held_ = 0;             // of them not yet handed out: the last
   std::int64_t sample_ = 0;  // rendered so far
-  double reached_s_ = 0.0;   // nothing earlier will come, as the last Mark says
   Budget budget_;
   bool limited_ = false;           // voices have floors
   std::int64_t spent_before_ = 0;  // mode-samples up to the last period
