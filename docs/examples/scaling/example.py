@@ -9,7 +9,7 @@ import stage as tools
 
 # Factors on density, on both elastic constants, and on lengths, from data for density 1 (CS448Z: E = 7e10 Pa, nu = 0.3).
 EDITS = {"aluminium": (2700.0, 1.0, 1.0), "steel": (7850.0, 2e11 / 7e10, 1.0), "twice": (2700.0, 1.0, 2.0)}
-BODIES = {"sphere": [0.2, 0.0, 0.0], "rod": [0.15, 0.0, 0.005]}  # where it is struck
+BODIES = {"sphere": [0.2, 0.0, 0.0], "rod": [0.15, 0.0, 0.005], "slab": [0.29, 0.24, 0.04]}  # where it is struck
 ALPHA1, ALPHA2 = 1e-8, 6.0  # of every job: damping follows the scaled eigenvalue
 
 
@@ -35,15 +35,23 @@ def play(stage):
         unit, _, unit_shapes, unit_vertices = read_bank(stage.out / f"{body}-unit.hdf")
         for name, (density, stiffness, size) in EDITS.items():
             lengths = {f"body.{key}": size * value for key, value in job["body"].items() if key.endswith("_m")}
-            edited = {**lengths, "material.density_kg_m3": density, "material.young_modulus_pa": 7e10 * stiffness, "band_hz": [20, 20000]}
+            edited = {**lengths, "material.density_kg_m3": density, "material.young_modulus_pa": job["material"]["young_modulus_pa"] * stiffness, "band_hz": [20, 20000]}
             stage.solve(f"{body}.json", f"{body}-{name}", edited, quick)
             fresh, decays, shapes, vertices = read_bank(stage.out / f"{body}-{name}.hdf")
+
+            # carillon-bank applies the laws to the file.
+            stage.run("the edit", stage.bin / "carillon-bank", "edit", f"{body}-unit.hdf", f"{body}-{name}-edited.hdf", "--density", density, "--stiffness", stiffness,
+                      "--size", size)
+            by_edit, decays_by_edit, shapes_by_edit, _ = read_bank(stage.out / f"{body}-{name}-edited.hdf")
 
             # The laws. K grows with stiffness and size, M with density and size^3; phi^T M phi = 1 stays.
             scaled = unit * stiffness / density / size**2
             scaled_shapes = unit_shapes / math.sqrt(density * size**3)
             count = min(len(scaled), len(fresh))
             off = abs(scaled[:count] / fresh[:count] - 1).max()
+            off_edit = max(abs(by_edit / scaled - 1).max(), abs(shapes_by_edit - scaled_shapes).max() / abs(scaled_shapes).max(),
+                           abs(decays_by_edit / (0.5 * (ALPHA1 * scaled + ALPHA2)) - 1).max())
+            stage.expect(f"{body}, {name}: carillon-bank edit gives the formulas' bank to 1e-12: {off_edit:.1e}", off_edit < 1e-12)
             off_decay = abs(0.5 * (ALPHA1 * scaled[:count] + ALPHA2) / decays[:count] - 1).max()
             assert numpy.allclose(vertices, size * unit_vertices, rtol=1e-9, atol=1e-12)
             off_shape = 0.0
