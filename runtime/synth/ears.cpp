@@ -1,24 +1,22 @@
 // Method:     the retarded time t' = t - r(t') / c is found by Newton's method at the borders of quanta; between them delay, 1 / r and
-// direction
-//             are cubic in the time of arrival, with their true slopes at both ends. Where nothing moves they stay what they are, and the
-//             32 samples of a quantum are one convolution. The pressure at t' is read with a Kaiser-windowed sinc
-//             from a table of phases. A delay that changes smoothly is a Doppler shift, nothing else is needed.
+//             direction are cubic in the time of arrival, with their true slopes at both ends. The pressure at t' is read with a
+//             Kaiser-windowed sinc from a table of phases (kernels_ears.inl). Where nothing moves they stay what they are, and the 32
+//             samples of a quantum are one convolution. A delay that changes smoothly is a Doppler shift, nothing else is needed.
 // Source:     OCE01 section 4 (delay r / c and 1 / r); Kaiser 1974 (window); docs/equations.md.
 // Deviations: OCE01 splats every sample into two neighbours with a Gaussian, which costs 2 to 9 dB at 10 kHz; this is flat to 0.4 of the
-// rate.
-//             The source is at the centre of mass; the factor 1 / (1 - v/c) of a moving monopole's level (0.05 dB at 2 m/s) is left out,
-//             and of a dipole the near field.
+//             rate. The source is at the centre of mass; the factor 1 / (1 - v/c) of a moving monopole's level (0.05 dB at 2 m/s) is left
+//             out, and of a dipole the near field.
 #include "runtime/synth/ears.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
 namespace carillon::synth {
 namespace {
 
-constexpr int kQuantum = Ear::kQuantum;
 constexpr int kPhases = 512;
 constexpr double kFarthest = 1e12;   // samples; keeps what follows within integers
 constexpr double kKaiserBeta = 9.0;  // stop band -90 dB
@@ -59,50 +57,29 @@ Taps calc_taps(double phase) noexcept {
   return taps;
 }
 
-double read(const float* samples, const Taps& taps) noexcept {
-  constexpr int kLanes = 8;
-  std::array<float, kLanes> sum{};
-#pragma GCC unroll 4
-  for (int tap = 0; tap < kTaps; tap += kLanes) {
-#pragma GCC unroll 8
-    for (int lane = 0; lane < kLanes; ++lane) sum[lane] += taps[tap + lane] * samples[tap + lane];
-  }
-  return static_cast<double>((sum[0] + sum[4]) + (sum[1] + sum[5])) + static_cast<double>((sum[2] + sum[6]) + (sum[3] + sum[7]));
-}
-
 double calc_dot(const Vec3& a, const Vec3& b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/// Cubic between two values with slopes per unit of u, 0 <= u <= 1.
-double interpolate(double a, double slope_a, double b, double slope_b, double u) noexcept {
-  const double v = 1.0 - u;
-  return a + u * u * (3.0 - 2.0 * u) * (b - a) + u * v * (v * slope_a - u * slope_b);
-}
-
-/// As read() for samples in a row that come by one phase, with sums of another order. False when all are silence.
-bool read_row(const History& sent, std::int64_t first, const Taps& taps, std::span<float> row) noexcept {
-  const float* samples = sent.find(first, kTaps + static_cast<std::int64_t>(row.size()) - 1);
-  if (samples == nullptr && row.size() > 1) {  // at one of the ends
-    bool heard = false;
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      row[i] = 0.0F;
-      heard = read_row(sent, first + static_cast<std::int64_t>(i), taps, row.subspan(i, 1)) || heard;
-    }
-    return heard;
-  }
-  if (samples == nullptr) return false;
-  if (row.size() == kQuantum) {
-    std::array<float, kQuantum> sum{};
-    for (int tap = 0; tap < kTaps; ++tap) {
-#pragma GCC unroll 32
-      for (int i = 0; i < kQuantum; ++i) sum[i] += taps[tap] * samples[tap + i];
-    }
-    std::copy(sum.begin(), sum.end(), row.begin());
+/// A quantum or less of what comes by one phase. False when all is silence.
+bool read_row(const Kernels& kernels, const History& sent, std::int64_t first, const Taps& taps, std::span<float> row) noexcept {
+  const std::int64_t count = kTaps + static_cast<std::int64_t>(row.size()) - 1;
+  const float* samples = sent.find(first, count);
+  if (samples != nullptr && row.size() == kQuantum) {
+    kernels.convolve(taps.data(), samples, row.data());
     return true;
   }
-  std::fill(row.begin(), row.end(), 0.0F);
-  for (int tap = 0; tap < kTaps; ++tap) {
-    for (std::size_t i = 0; i < row.size(); ++i) row[i] += taps[tap] * samples[tap + static_cast<int>(i)];
+  // Less than a quantum, or at one of the ends of what was sent: the same sums over a copy with zeros around.
+  std::array<float, kTaps + kQuantum> copy{};
+  bool heard = samples != nullptr;
+  for (std::int64_t i = 0; i < count; ++i) {
+    const float* one = samples != nullptr ? samples + i : sent.find(first + i, 1);
+    if (one == nullptr) continue;
+    copy[static_cast<std::size_t>(i)] = *one;
+    heard = true;
   }
+  if (!heard) return false;
+  std::array<float, kQuantum> whole;
+  kernels.convolve(taps.data(), copy.data(), whole.data());
+  std::copy_n(whole.begin(), row.size(), row.begin());
   return true;
 }
 
@@ -165,8 +142,21 @@ Way calc_way(const Track& source, const Track& listener, const Vec3& offset_m, d
   return way;
 }
 
-Ear::Ear(const Vec3& offset_m, double sample_rate_hz, EffectSet effects)
-    : offset_m_(offset_m), rate_hz_(sample_rate_hz), effects_(effects) {
+Cubic Cubic::make(double a, double slope_a, double b, double slope_b) noexcept {
+  constexpr double kUnit = 1.0 / kQuantum;
+  return {{a, slope_a * kUnit, (3.0 * (b - a) - 2.0 * slope_a - slope_b) * kUnit * kUnit,
+           (2.0 * (a - b) + slope_a + slope_b) * kUnit * kUnit * kUnit}};
+}
+
+void Cubic::evaluate(int first, std::span<double> out) const noexcept {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double x = first + static_cast<int>(i);
+    out[i] = power[0] + x * (power[1] + x * (power[2] + x * power[3]));
+  }
+}
+
+Ear::Ear(const Vec3& offset_m, double sample_rate_hz, EffectSet effects, Isa isa)
+    : offset_m_(offset_m), rate_hz_(sample_rate_hz), effects_(effects), kernels_(&get_kernels(isa)) {
   get_sinc_table();  // built here, not in process()
 }
 
@@ -209,6 +199,13 @@ void Ear::find_ways(const Source& source, const Track& listener, std::int64_t qu
   const bool rests = from_.delay_slope == 0.0 && from_.spreading_slope == 0.0 && source.track->is_still_from(arrival_s - travel_s_) &&
                      listener.is_still_from(arrival_s);
   to_ = rests ? from_ : find_way(source, listener, quantum + 1, travel_s_);
+  const double width_s = kQuantum / rate_hz_;
+  delay_ = Cubic::make(rate_hz_ * from_.delay_s + kLatency, kQuantum * from_.delay_slope, rate_hz_ * to_.delay_s + kLatency,
+                       kQuantum * to_.delay_slope);
+  spreading_ = Cubic::make(from_.spreading_1_m, width_s * from_.spreading_slope, to_.spreading_1_m, width_s * to_.spreading_slope);
+  for (std::size_t k = 0; k < 3; ++k) {
+    direction_[k] = Cubic::make(from_.direction[k], width_s * from_.direction_slope[k], to_.direction[k], width_s * to_.direction_slope[k]);
+  }
 }
 
 int Ear::process(const Source& source, const Track& listener, std::int64_t sample, std::span<double> received_pa) noexcept {
@@ -217,7 +214,7 @@ int Ear::process(const Source& source, const Track& listener, std::int64_t sampl
     if (sample / kQuantum != quantum_) find_ways(source, listener, sample / kQuantum);
     const auto left = static_cast<std::size_t>(kQuantum - sample % kQuantum);
     const auto piece = received_pa.first(std::min(left, received_pa.size()));
-    if (from_.delay_s == to_.delay_s && from_.delay_slope == 0.0 && to_.delay_slope == 0.0) {
+    if (delay_.is_constant()) {
       process_still(source, sample, piece);
     } else {
       process_moving(source, sample, piece);
@@ -230,74 +227,78 @@ int Ear::process(const Source& source, const Track& listener, std::int64_t sampl
 }
 
 void Ear::process_still(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept {
-  const double delay = rate_hz_ * from_.delay_s + kLatency;
+  const double delay = delay_.power[0];
   if (!(delay < kFarthest)) return;
   const double whole = std::ceil(delay);
   const std::int64_t first = sample - static_cast<std::int64_t>(whole) - kTaps / 2 + 1;
-  const auto count = static_cast<int>(received_pa.size());
   if (whole - delay != phase_) {
     phase_ = whole - delay;
     taps_ = calc_taps(phase_);
   }
-  const double width_s = kQuantum / rate_hz_;
-  const auto get_u = [sample](int i) { return static_cast<double>((sample + i) % kQuantum) / kQuantum; };
-  std::array<double, kQuantum> sum{};
+  const auto begin = static_cast<int>(sample % kQuantum);
+  const std::size_t count = received_pa.size();
+  std::array<double, kQuantum> sum{}, factor;
   bool heard = false;
-  for (std::size_t source_part = 0; source_part < 4; ++source_part) {
-    const History* sent = source_part == 0 ? source.monopole : source.dipole[source_part - 1];
+  for (std::size_t part = 0; part < 4; ++part) {
+    const History* sent = part == 0 ? source.monopole : source.dipole[part - 1];
     if (sent == nullptr || sent->is_silent()) continue;
-    std::array<float, kQuantum> part;
-    if (!read_row(*sent, first, taps_, std::span(part).first(received_pa.size()))) continue;
+    std::array<float, kQuantum> row;
+    if (!read_row(*kernels_, *sent, first, taps_, std::span(row).first(count))) continue;
     heard = true;
-    if (source_part == 0) {
-      for (int i = 0; i < count; ++i) sum[i] += static_cast<double>(part[i]);
+    if (part == 0) {
+      for (std::size_t i = 0; i < count; ++i) sum[i] += static_cast<double>(row[i]);
       continue;
     }
-    const std::size_t k = source_part - 1;
-    for (int i = 0; i < count; ++i) {
-      sum[i] += static_cast<double>(part[i]) * interpolate(from_.direction[k], from_.direction_slope[k] * width_s, to_.direction[k],
-                                                           to_.direction_slope[k] * width_s, get_u(i));
-    }
+    direction_[part - 1].evaluate(begin, std::span(factor).first(count));
+    for (std::size_t i = 0; i < count; ++i) sum[i] += static_cast<double>(row[i]) * factor[i];
   }
   if (!heard) return;
-  if (from_.spreading_1_m == to_.spreading_1_m && from_.spreading_slope == 0.0 && to_.spreading_slope == 0.0) {
-    for (int i = 0; i < count; ++i) received_pa[i] += sum[i] * from_.spreading_1_m;
-    return;
-  }
-  for (int i = 0; i < count; ++i) {
-    received_pa[i] += sum[i] * interpolate(from_.spreading_1_m, from_.spreading_slope * width_s, to_.spreading_1_m,
-                                           to_.spreading_slope * width_s, get_u(i));
-  }
+  spreading_.evaluate(begin, std::span(factor).first(count));
+  for (std::size_t i = 0; i < count; ++i) received_pa[i] += sum[i] * factor[i];
 }
 
 void Ear::process_moving(const Source& source, std::int64_t sample, std::span<double> received_pa) const noexcept {
-  const double width_s = kQuantum / rate_hz_;
-  double row_phase = -1.0;
-  Taps taps{};
-  for (std::size_t i = 0; i < received_pa.size(); ++i) {
-    const std::int64_t n = sample + static_cast<std::int64_t>(i);
-    const double u = static_cast<double>(n % kQuantum) / kQuantum;
-    const double delay =
-        rate_hz_ * interpolate(from_.delay_s, from_.delay_slope * width_s, to_.delay_s, to_.delay_slope * width_s, u) + kLatency;
-    if (!(delay < kFarthest)) continue;
-    const double whole = std::ceil(delay);
-    const std::int64_t first = n - static_cast<std::int64_t>(whole) - kTaps / 2 + 1;
-    std::array<const float*, 4> heard{source.monopole ? source.monopole->find(first) : nullptr};
-    for (std::size_t k = 0; k < 3; ++k) heard[k + 1] = source.dipole[k] ? source.dipole[k]->find(first) : nullptr;
-    if (!heard[0] && !heard[1] && !heard[2] && !heard[3]) continue;
-    if (whole - delay != row_phase) {
-      row_phase = whole - delay;
-      taps = calc_taps(row_phase);
-    }
-    double pressure = heard[0] ? read(heard[0], taps) : 0.0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!heard[k + 1]) continue;
-      pressure += read(heard[k + 1], taps) * interpolate(from_.direction[k], from_.direction_slope[k] * width_s, to_.direction[k],
-                                                         to_.direction_slope[k] * width_s, u);
-    }
-    received_pa[i] +=
-        pressure * interpolate(from_.spreading_1_m, from_.spreading_slope * width_s, to_.spreading_1_m, to_.spreading_slope * width_s, u);
+  const auto begin = static_cast<int>(sample % kQuantum);
+  const std::size_t count = received_pa.size();
+  std::array<double, kQuantum> delay, spreading;
+  delay_.evaluate(begin, std::span(delay).first(count));
+  spreading_.evaluate(begin, std::span(spreading).first(count));
+  // Where the taps of each sample lie, and between which phases they are.
+  std::array<std::int64_t, kQuantum> first;
+  std::array<Reading, kQuantum> readings;
+  std::int64_t lowest = std::numeric_limits<std::int64_t>::max(), highest = std::numeric_limits<std::int64_t>::min();
+  const float* table = get_sinc_table().data()->data();
+  for (std::size_t i = 0; i < count; ++i) {
+    readings[i].sources = 0;
+    if (!(delay[i] < kFarthest)) return;
+    auto whole = static_cast<std::int64_t>(delay[i]);
+    whole += static_cast<double>(whole) < delay[i] ? 1 : 0;
+    const double scaled = (static_cast<double>(whole) - delay[i]) * kPhases;
+    const int phase = std::min(static_cast<int>(scaled), kPhases - 1);
+    readings[i].taps = table + phase * kTaps;
+    readings[i].mix = static_cast<float>(scaled - phase);
+    first[i] = sample + static_cast<std::int64_t>(i) - whole - kTaps / 2 + 1;
+    lowest = std::min(lowest, first[i]);
+    highest = std::max(highest, first[i]);
   }
+  for (std::size_t part = 0; part < 4; ++part) {
+    const History* sent = part == 0 ? source.monopole : source.dipole[part - 1];
+    if (sent == nullptr || sent->is_silent()) continue;
+    std::array<double, kQuantum> weight;
+    if (part > 0) direction_[part - 1].evaluate(begin, std::span(weight).first(count));
+    const std::int64_t range = highest - lowest + kTaps;
+    const float* row = range <= sent->get_longest_row() ? sent->find(lowest, range) : nullptr;
+    for (std::size_t i = 0; i < count; ++i) {
+      const float* samples = row != nullptr ? row + (first[i] - lowest) : sent->find(first[i]);
+      if (samples == nullptr) continue;
+      Reading& reading = readings[i];
+      reading.source[reading.sources] = samples;
+      reading.weight[reading.sources++] = part == 0 ? 1.0F : static_cast<float>(weight[i]);
+    }
+  }
+  std::array<float, kQuantum> heard;
+  kernels_->read(readings.data(), static_cast<int>(count), heard.data());
+  for (std::size_t i = 0; i < count; ++i) received_pa[i] += static_cast<double>(heard[i]) * spreading[i];
 }
 
 }  // namespace carillon::synth

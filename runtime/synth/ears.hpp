@@ -8,6 +8,7 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/history.hpp"
+#include "runtime/synth/kernels.hpp"
 #include "runtime/synth/track.hpp"
 
 namespace carillon::synth {
@@ -36,15 +37,26 @@ struct Way {
 /// microphone where it is now, t' + |x_source(t') - x_microphone(t)| / c = t. Speeds below that of sound. Pure; any thread.
 Way calc_way(const Track& source, const Track& listener, const Vec3& offset_m, double time_s) noexcept;
 
+/// A number over a quantum: cubic in the sample.
+struct Cubic {
+  double power[4]{};
+
+  /// Between two values with slopes per quantum.
+  static Cubic make(double a, double slope_a, double b, double slope_b) noexcept;
+  bool is_constant() const noexcept { return power[1] == 0.0 && power[2] == 0.0 && power[3] == 0.0; }
+  /// At samples from `first` on of the quantum.
+  void evaluate(int first, std::span<double> out) const noexcept;
+};
+
 /// One source heard by one microphone. Sample n of the output is what arrives at time (n - kLatency) / rate.
 class Ear {
  public:
-  static constexpr int kLatency = kTaps / 2;  // samples by which the output lags behind
-  static constexpr int kQuantum = 32;         // samples between two ways; cubic in time between
+  static constexpr int kLatency = kTaps / 2;        // samples by which the output lags behind
+  static constexpr int kQuantum = synth::kQuantum;  // samples between two ways; cubic in time between
 
   /// `offset_m`: of the microphone from the listener, in the axes of the world. Of the effects kAirDelay and kDoppler are looked at:
   /// without the first sound takes no time, without the second it takes as long as at the beginning, wherever its source goes.
-  Ear(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler});
+  Ear(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler}, Isa isa = Isa::kBest);
 
   /// Says where the first sample is: without kDoppler its sound takes as long for ever. Without a call it is the first that is processed.
   /// [audio-thread]
@@ -67,8 +79,11 @@ class Ear {
   Vec3 offset_m_{};
   double rate_hz_ = 0.0;
   EffectSet effects_;
+  const Kernels* kernels_ = nullptr;
   std::int64_t quantum_ = -1;  // of which `from_` is the beginning and `to_` the end
   Way from_, to_;
+  Cubic delay_, spreading_;  // between them [samples], [1/m]
+  std::array<Cubic, 3> direction_;
   bool is_placed_ = false;      // first_delay_s_ is known
   double first_delay_s_ = 0.0;  // for ears without kDoppler
   double travel_s_ = 0.0;       // of what arrives at the end of quantum_, whatever this ear's effects make of it

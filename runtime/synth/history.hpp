@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-namespace carillon::synth {
+#include "runtime/synth/kernels.hpp"
 
-inline constexpr int kTaps = 32;  // samples that an ear reads at once
+namespace carillon::synth {
 
 /// The last samples of one source, shared by all microphones. Sample 0 is the first that was pushed; before it there was silence.
 class History {
@@ -34,6 +34,8 @@ class History {
     return samples_.data() + (at < 0 ? at + static_cast<std::int64_t>(size_) : at);
   }
 
+  /// How many samples find() has in a row at most: kTaps + block.
+  std::int64_t get_longest_row() const noexcept { return static_cast<std::int64_t>(twice_); }
   std::int64_t get_size() const noexcept { return static_cast<std::int64_t>(size_); }
   /// Of the next sample. [audio-thread]
   std::int64_t get_position() const noexcept { return position_; }

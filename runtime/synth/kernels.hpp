@@ -141,6 +141,17 @@ struct FilterBank {
   float* copies = nullptr;  // kReach x 2 x kGridSize zeros
 };
 
+inline constexpr int kTaps = 32;  // samples that an ear reads at once
+
+/// One sample of an ear: the sum of weight[k] source[k], read with taps between those of `taps` and the kTaps behind them.
+struct Reading {
+  const float* taps;
+  float mix;  // 0: the first taps, 1: those behind
+  int sources;
+  const float* source[4];  // kTaps each
+  float weight[4];
+};
+
 struct Kernels {
   Isa isa;
   /// Fills the starts of a period, and turns the state to the start of the next.
@@ -165,6 +176,10 @@ struct Kernels {
   /// What a period's input makes in quantum `tile` of the same period, from the period's start on. What is behind the quantum does not
   /// matter, what is yet to come within it must be zero.
   void (*respond)(const ResponseTable& response, const float* input, int tile, float* out) noexcept;
+  /// A quantum of what an ear hears through taps that stay: kTaps + kQuantum - 1 samples to kQuantum.
+  void (*convolve)(const float* taps, const float* samples, float* out) noexcept;
+  /// And through taps that move.
+  void (*read)(const Reading* readings, int count, float* out) noexcept;
 };
 
 /// Best that this processor has. Any thread.

@@ -1,4 +1,4 @@
-// Method:     kernels_body.inl and kernels_driven.inl on AVX2 and FMA: 8 lanes, 16 registers.
+// Method:     kernels_body.inl, kernels_driven.inl and kernels_ears.inl on AVX2 and FMA: 8 lanes, 16 registers.
 // Source:     Intel's intrinsics guide.
 // Deviations: none.
 #include <immintrin.h>
@@ -18,6 +18,11 @@ struct F {
     return {_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at))))};
   }
   void store(float* at) const { _mm256_storeu_ps(at, v); }
+  float sum() const {
+    const __m128 quarter = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+    const __m128 half = _mm_add_ps(quarter, _mm_movehl_ps(quarter, quarter));
+    return _mm_cvtss_f32(_mm_add_ss(half, _mm_shuffle_ps(half, half, 1)));
+  }
   friend F operator+(F a, F b) { return {_mm256_add_ps(a.v, b.v)}; }
   friend F operator-(F a, F b) { return {_mm256_sub_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm256_mul_ps(a.v, b.v)}; }
@@ -49,9 +54,10 @@ using H = F;
 constexpr int kVectors = 2, kColumns = 2, kAhead = 0, kRowSets = 2, kTapSets = 2;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_driven.inl"
+#include "runtime/synth/kernels_ears.inl"
 
 }  // namespace
 
-const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, filter, respond};
+const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, filter, respond, convolve, read};
 
 }  // namespace carillon::synth

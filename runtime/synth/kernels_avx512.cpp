@@ -1,4 +1,4 @@
-// Method:     kernels_body.inl and kernels_driven.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
+// Method:     kernels_body.inl, kernels_driven.inl and kernels_ears.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
 // Source:     Intel's intrinsics guide.
 // Deviations: none.
 #include <immintrin.h>
@@ -18,6 +18,12 @@ struct F {
     return {_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(at))))};
   }
   void store(float* at) const { _mm512_storeu_ps(at, v); }
+  float sum() const {
+    const __m256 lanes = _mm256_add_ps(_mm512_castps512_ps256(v), _mm512_extractf32x8_ps(v, 1));
+    const __m128 quarter = _mm_add_ps(_mm256_castps256_ps128(lanes), _mm256_extractf128_ps(lanes, 1));
+    const __m128 half = _mm_add_ps(quarter, _mm_movehl_ps(quarter, quarter));
+    return _mm_cvtss_f32(_mm_add_ss(half, _mm_shuffle_ps(half, half, 1)));
+  }
   friend F operator+(F a, F b) { return {_mm512_add_ps(a.v, b.v)}; }
   friend F operator-(F a, F b) { return {_mm512_sub_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm512_mul_ps(a.v, b.v)}; }
@@ -57,9 +63,10 @@ struct H {
 constexpr int kVectors = 2, kColumns = 4, kAhead = 512, kRowSets = 2, kTapSets = 4;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_driven.inl"
+#include "runtime/synth/kernels_ears.inl"
 
 }  // namespace
 
-const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, filter, respond};
+const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, filter, respond, convolve, read};
 
 }  // namespace carillon::synth

@@ -14,6 +14,7 @@ struct F {
   static F zero() { return {0.0F}; }
   static F convert(const std::int16_t* at) { return {static_cast<float>(*at)}; }
   void store(float* at) const { *at = v; }
+  float sum() const { return v; }
   friend F operator+(F a, F b) { return {a.v + b.v}; }
   friend F operator-(F a, F b) { return {a.v - b.v}; }
   friend F operator*(F a, F b) { return {a.v * b.v}; }
@@ -42,9 +43,10 @@ using H = F;
 constexpr int kVectors = 8, kColumns = 1, kAhead = 0, kRowSets = 1, kTapSets = 1;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_driven.inl"
+#include "runtime/synth/kernels_ears.inl"
 
 }  // namespace
 
-const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, drive, filter, respond};
+const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, drive, filter, respond, convolve, read};
 
 }  // namespace carillon::synth

@@ -1,6 +1,5 @@
-// Method:     kernels_body.inl and kernels_driven.inl on x86-64 as every such processor has it: 4 lanes, no fused multiply-add.
-// Source:     Intel's intrinsics guide.
-// Deviations: none.
+// Method:     kernels_body.inl, kernels_driven.inl and kernels_ears.inl on x86-64 as every such processor has it: 4 lanes, no fused
+// multiply-add. Source:     Intel's intrinsics guide. Deviations: none.
 #include <immintrin.h>
 
 #include "runtime/synth/kernels.hpp"
@@ -19,6 +18,10 @@ struct F {
     return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(x, x), 16))};
   }
   void store(float* at) const { _mm_storeu_ps(at, v); }
+  float sum() const {
+    const __m128 half = _mm_add_ps(v, _mm_movehl_ps(v, v));
+    return _mm_cvtss_f32(_mm_add_ss(half, _mm_shuffle_ps(half, half, 1)));
+  }
   friend F operator+(F a, F b) { return {_mm_add_ps(a.v, b.v)}; }
   friend F operator-(F a, F b) { return {_mm_sub_ps(a.v, b.v)}; }
   friend F operator*(F a, F b) { return {_mm_mul_ps(a.v, b.v)}; }
@@ -50,9 +53,10 @@ using H = F;
 constexpr int kVectors = 4, kColumns = 1, kAhead = 0, kRowSets = 1, kTapSets = 1;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_driven.inl"
+#include "runtime/synth/kernels_ears.inl"
 
 }  // namespace
 
-const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, filter, respond};
+const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, filter, respond, convolve, read};
 
 }  // namespace carillon::synth

@@ -42,7 +42,16 @@ Waypoint Track::find(double time_s) const noexcept {
   if (count_ == 0) return {.time_s = time_s};
   if (!(time_s > get(0).time_s)) return {time_s, get(0).position_m, {}};
   if (time_s >= get(count_ - 1).time_s) return {time_s, get(count_ - 1).position_m, {}};
-  std::size_t low = 0, high = count_ - 1;  // get(low).time_s < time_s < get(high).time_s or equal
+  std::size_t low = 0, high = count_ - 1;  // get(low).time_s <= time_s < get(high).time_s
+  // Where it would be if they came evenly, as they mostly do.
+  const double place = (time_s - get(0).time_s) / (get(high).time_s - get(0).time_s) * static_cast<double>(high);
+  const std::size_t guess = place < static_cast<double>(high) ? static_cast<std::size_t>(place) : high - 1;
+  if (get(guess).time_s <= time_s) {
+    low = guess;
+    if (get(guess + 1).time_s > time_s) high = guess + 1;
+  } else {
+    high = guess;
+  }
   while (high - low > 1) {
     const std::size_t middle = (low + high) / 2;
     (get(middle).time_s <= time_s ? low : high) = middle;

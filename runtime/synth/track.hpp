@@ -43,7 +43,10 @@ class Track {
   bool is_still_from(double time_s) const noexcept { return rest_begin_s_ <= time_s; }
 
  private:
-  const Waypoint& get(std::size_t i) const { return waypoints_[(first_ + i) % waypoints_.size()]; }
+  const Waypoint& get(std::size_t i) const {  // i <= count_; a division would cost more than all the rest
+    const std::size_t at = first_ + i;
+    return waypoints_[at < waypoints_.size() ? at : at - waypoints_.size()];
+  }
 
   std::vector<Waypoint> waypoints_;  // a ring
   std::size_t first_ = 0, count_ = 0;

@@ -364,6 +364,37 @@ TEST(Ears, ADipoleIsHeardByItsCosine) {
   }
 }
 
+TEST(Ears, EveryInstructionSetHearsTheSame) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+  std::vector<std::vector<float>> sent(4, std::vector<float>(2000));
+  for (std::vector<float>& part : sent)
+    for (float& x : part) x = number(random);
+  const Track listener = make_still({0.0, 0.0, 0.0});
+  for (const Track& path :
+       {make_still({1.0, 0.3, -0.2}), make_path({{0.0, {1.0, 0.0, 0.0}}, {0.02, {1.5, 0.2, 0.1}}, {0.04, {1.2, 0.0, -0.3}}})}) {
+    std::vector<double> plain;
+    for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+      std::vector<History> histories(4, History(10.0, kRate, 77));
+      const Source source{&path, histories.data(), {&histories[1], &histories[2], &histories[3]}};
+      Ear ear({0.0, 0.1, 0.0}, kRate, {Effect::kAirDelay, Effect::kDoppler}, isa);
+      std::vector<double> heard(2000, 0.0);
+      for (std::size_t n = 0; n < heard.size(); n += 77) {
+        const std::size_t count = std::min<std::size_t>(77, heard.size() - n);
+        for (std::size_t k = 0; k < 4; ++k) histories[k].push(std::span<const float>(sent[k]).subspan(n, count));
+        ear.process(source, listener, static_cast<std::int64_t>(n), std::span(heard).subspan(n, count));
+      }
+      if (isa == Isa::kPlain) plain = heard;
+      double size = 0.0;
+      for (std::size_t n = 0; n < heard.size(); ++n) {
+        ASSERT_NEAR(heard[n], plain[n], 2e-6) << get_name(isa) << " " << n;
+        size += heard[n] * heard[n];
+      }
+      EXPECT_GT(size, 100.0);
+    }
+  }
+}
+
 TEST(Ears, MemoryThatCannotBeIsRefused) {
   EXPECT_THROW(History(1e6, kRate, 512), InputError);
   EXPECT_THROW(History(-1.0, kRate, 512), InputError);
