@@ -92,6 +92,25 @@ TEST_P(Bouncing, HitsAsOftenAndWhenTheClosedFormSaysUntilItStaysDown) {
   EXPECT_NEAR(given, kGravity * get_touch_s(last), 0.01 * given + 1.1 * expected.back().speed_m_s * e) << "down to the speed that is left";
 }
 
+TEST(Bouncing, AsOftenWhenItDriftsSideways) {
+  // Without friction the way along the ground changes nothing: no hit is taken for the hop of a mesh that rolls.
+  const bank::Bank ball = make_ball(0.03, 4);
+  for (const double height : {5e-4, 5e-3}) {
+    WorldSpec w = make_ground_world(make_body(ball, {0, 0, 0.03 + height}, 0.7));
+    w.ground->friction = w.bodies[0].friction = 0.0;
+    const Simulation down = simulate(w, 0.5);
+    for (const double speed : {0.05, 0.2, 1.0}) {
+      w.bodies[0].velocity_m_s = {speed, 0.3 * speed, 0};
+      const Simulation sideways = simulate(w, 0.5);
+      ASSERT_EQ(sideways.impulses.size(), down.impulses.size()) << speed << " m/s, from " << height;
+      for (std::size_t n = 0; n < down.impulses.size(); ++n) {
+        EXPECT_NEAR(sideways.impulses[n].time_s, down.impulses[n].time_s, 1e-4);
+        EXPECT_NEAR(sideways.impulses[n].impulse_n_s[2], down.impulses[n].impulse_n_s[2], 0.02 * down.impulses[0].impulse_n_s[2]);
+      }
+    }
+  }
+}
+
 TEST(SlowHit, OfABodyThatDriftsIsHeard) {
   // Without gravity nothing but the hit can come of it: 2 mm/s, a snail's pace.
   const bank::Bank ball = make_ball(0.03, 3), plate = make_box({0.2, 0.2, 0.02});

@@ -146,6 +146,24 @@ TEST(input, nothing_but_files_is_read) {
   }
 }
 
+TEST(input, a_letter_with_sharp_corners_is_meshed_or_refused_with_the_count_it_needs) {
+  // Its corners ask for some 370 nodes. Fewer once made the search go on without end, with ever shorter edges.
+  const std::filesystem::path file = write_text("letter.obj", to_obj(make_letter_n()));
+  for (const long long nodes : {60, 100, 200}) {
+    SurfaceReport report;
+    try {
+      mesh_surface({.surface = file, .nodes = nodes, .facets = true}, report);
+      ADD_FAILURE() << nodes << " nodes were met";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("needs at least about"), std::string::npos) << error.what();
+    }
+  }
+  SurfaceReport report;
+  mesh_surface({.surface = file, .nodes = 450, .facets = true}, report);
+  EXPECT_NEAR(static_cast<double>(report.nodes), 450.0, 45.0);
+  EXPECT_NEAR(report.volume_m3, 0.2 * (2 * 0.2 * 1.0 + 0.3 * 0.45), 1e-6);
+}
+
 TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
   const std::string box = to_off(make_box(1, 1, 1));
   Polygons open = make_box(1, 1, 1);

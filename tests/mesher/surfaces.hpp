@@ -75,6 +75,19 @@ inline Polygons make_torus(double large, double small, int n, int m) {
   return s;
 }
 
+/// The letter N, 1 x 0.7 x 0.2, strokes of 0.2: corners of 27 degrees where the diagonal meets the posts.
+inline Polygons make_letter_n() {
+  const std::vector<std::array<double, 2>> outline = {{0, 0},   {0.2, 0}, {0.2, 0.55}, {0.5, 0}, {0.7, 0},
+                                                      {0.7, 1}, {0.5, 1}, {0.5, 0.45}, {0.2, 1}, {0, 1}};
+  const std::vector<std::array<int, 3>> front = {{0, 1, 2}, {0, 2, 9}, {2, 8, 9}, {2, 7, 8}, {2, 3, 7}, {3, 4, 7}, {4, 5, 7}, {5, 6, 7}};
+  Polygons n;
+  for (const double z : {0.0, 0.2})
+    for (const auto& p : outline) n.points.push_back({p[0], p[1], z});
+  for (const auto& t : front) n.faces.insert(n.faces.end(), {{t[2], t[1], t[0]}, {10 + t[0], 10 + t[1], 10 + t[2]}});
+  for (int i = 0; i < 10; ++i) n.faces.insert(n.faces.end(), {{i, (i + 1) % 10, 10 + (i + 1) % 10}, {i, 10 + (i + 1) % 10, 10 + i}});
+  return n;
+}
+
 /// A prism along z over a polygon around the origin: sides of two triangles, ends as fans.
 inline Polygons make_prism(const std::vector<std::array<double, 2>>& outline, double length) {
   Polygons s;
