@@ -131,6 +131,54 @@ TEST(Budget, IsKeptUnderAHail) {
   }
 }
 
+// Contacts that last drive all modes all the time, and cost several times what ringing costs.
+TEST(Budget, IsKeptWhileBodiesSlide) {
+  constexpr int kBodies = 12;
+  const auto model = Model::make(make_bank(100, 150.0, 18000.0, 12.0, 0.02), {.rate_hz = kRate});
+  const auto play = [&](double budget) {
+    Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}, .budget = budget});
+    Played played;
+    for (int b = 0; b < kBodies; ++b) {
+      const int body = synthesiser.add_body(
+          model, {.position_m = {0.0, 1.0 + 0.4 * b, 0.0},
+                  .effects = EffectSet{Effect::kModal, Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}});
+      for (int i = 0; i <= 50; ++i) {
+        EXPECT_TRUE(synthesiser.push(stream::Contact{.time_s = 0.01 + 0.02 * i,
+                                                     .id = 7,
+                                                     .body = body,
+                                                     .state = i == 0 ? stream::ContactState::kBegin : stream::ContactState::kHold,
+                                                     .normal = {0, 0, 1},
+                                                     .slip_m_s = {0.5, 0, 0},
+                                                     .force_n = 1.0 + b,
+                                                     .sweep_m_s = 0.5,
+                                                     .other_sweep_m_s = 0.3,
+                                                     .patch_radius_m = 2e-4,
+                                                     .impedance_n_s_m = 1.0}));
+      }
+    }
+    EXPECT_TRUE(synthesiser.push(stream::Mark{5.0}));
+    played.sound.resize(48000);
+    for (int done = 0; done < 48000; done += 480) {
+      float* at = played.sound.data() + done;
+      synthesiser.process(&at, 1, 480);
+      played.work.push_back(synthesiser.get_counters().mode_samples);
+    }
+    played.counters = synthesiser.get_counters();
+    return played;
+  };
+  const Played all = play(kUnlimited);
+  const double work = static_cast<double>(all.counters.mode_samples);
+  EXPECT_GT(work, 1.9 * kBodies * 96 * 46000);  // driven: more than ringing alone
+  for (const double share : {0.6, 0.4}) {
+    const Played kept = play(share * work);
+    for (std::size_t i = 30; i < kept.work.size(); i += 10)
+      EXPECT_LT(static_cast<double>(kept.work[i] - kept.work[i - 10]), 0.1 * 1.1 * share * work)
+          << share << " until " << 0.01 * static_cast<double>(i) << " s";
+    EXPECT_LT(static_cast<double>(kept.counters.mode_samples), 1.05 * share * work) << share;
+    EXPECT_GT(calc_energy(kept.sound, std::vector<float>(48000)), 0.5 * calc_energy(all.sound, std::vector<float>(48000))) << share;
+  }
+}
+
 TEST(Budget, MoreOfItIsNearerToAll) {
   const Played all = play_hail(kUnlimited, 20.0, 0.5);
   const double energy = calc_energy(all.sound, std::vector<float>(all.sound.size()));

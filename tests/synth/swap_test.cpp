@@ -262,6 +262,46 @@ TEST(Swap, GoesWithEffectsThatChangeAndSparesThoseWithoutModes) {
   EXPECT_EQ(synthesiser.get_counters().refused, 0);
 }
 
+TEST(Swap, WhatSlidesGoesOnSliding) {
+  const bank::Bank bank = make_three();
+  const auto model = make_model(bank), other = make_model(bank::calc_edited(bank, {.size_scale = 0.9}));
+  Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
+  const EffectSet effects{Effect::kModal, Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};
+  const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}, .effects = effects});
+  for (int i = 0; i <= 100; ++i) {
+    const auto state = i == 0 ? stream::ContactState::kBegin : i == 100 ? stream::ContactState::kEnd : stream::ContactState::kHold;
+    EXPECT_TRUE(synthesiser.push(stream::Contact{.time_s = 0.01 * i,
+                                                 .id = 3,
+                                                 .body = body,
+                                                 .state = state,
+                                                 .normal = {0, 0, 1},
+                                                 .slip_m_s = {0.4, 0, 0},
+                                                 .force_n = 2.0,
+                                                 .other_sweep_m_s = 0.4,
+                                                 .patch_radius_m = 2e-4}));
+  }
+  EXPECT_TRUE(synthesiser.push(stream::Mark{9.0}));
+  std::vector<double> level;
+  for (int i = 0; i < 20; ++i) {
+    if (i >= 10) synthesiser.swap_model(body, i % 2 == 0 ? other : model);
+    double sum = 0.0, peak = 0.0;
+    for (const float p : play(synthesiser, 2400)) {
+      ASSERT_TRUE(std::isfinite(p));
+      sum += static_cast<double>(p) * static_cast<double>(p);
+      peak = std::max(peak, static_cast<double>(std::abs(p)));
+    }
+    level.push_back(std::sqrt(sum / 2400));
+    EXPECT_LT(peak, 8.0 * level.back()) << i;  // noise, and no click in it
+    synthesiser.collect();
+  }
+  double before = 0.0, after = 0.0;
+  for (int i = 5; i < 10; ++i) before += level[static_cast<std::size_t>(i)] / 5;
+  for (int i = 12; i < 20; ++i) after += level[static_cast<std::size_t>(i)] / 8;
+  EXPECT_GT(after, 0.3 * before);
+  EXPECT_LT(after, 3.0 * before);
+  EXPECT_EQ(synthesiser.get_counters().refused, 0);
+}
+
 TEST(Swap, RefusesWhatCannotBe) {
   const bank::Bank bank = make_three();
   Synthesiser synthesiser({.rate_hz = kRate});

@@ -225,6 +225,40 @@ TEST(Synthesiser, ABankThatHasDiedAwayCostsNothing) {
   EXPECT_EQ(*std::max_element(out[0].begin(), out[0].end()), 0.0F);
 }
 
+// Physics stops in the middle of a touch and says nothing more: the sound goes on for the 20 ms that it is patient, then falls silent
+// within 5 ms, but for what rings; and again when physics goes on.
+TEST(Synthesiser, ATouchThatNobodyGoesOnWithFallsSilent) {
+  const auto model = Model::make(testing::make_cube_bank({{800.0, 500.0, 1.0, {0.0, 0.0, 1.0}}, {3100.0, 500.0, 1.0, {0.0, 0.0, 1.0}}}),
+                                 {.rate_hz = kRate});
+  Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0.0, 0.0, 0.0}}});
+  const int body = synthesiser.add_body(model, {.position_m = {0.0, 0.05, 0.0}, .effects = EffectSet{Effect::kModal, Effect::kRoughness}});
+  std::vector<stream::Event> events;
+  for (int i = 0; i <= 20; ++i) {
+    events.emplace_back(stream::Contact{.time_s = 0.01 * i,
+                                        .id = 1,
+                                        .body = body,
+                                        .normal = {0.0, 0.0, 1.0},
+                                        .slip_m_s = {0.5, 0.0, 0.0},
+                                        .force_n = 5.0,
+                                        .other_sweep_m_s = 0.5,
+                                        .patch_radius_m = 2e-4});
+    events.emplace_back(stream::Mark{0.01 * i});
+  }
+  const Channels out = play(synthesiser, events, 28800, [] { return 64; });
+  const auto find_peak = [&](double from_s, double to_s) {
+    float peak = 0.0F;
+    for (auto n = static_cast<std::size_t>(from_s * kRate); n < static_cast<std::size_t>(to_s * kRate); ++n)
+      peak = std::max(peak, std::abs(out[0][n]));
+    return peak;
+  };
+  const float sliding = find_peak(0.1, 0.2);
+  EXPECT_GT(sliding, 0.0F);
+  EXPECT_GT(find_peak(0.2, 0.215), 0.1F * sliding);   // held
+  EXPECT_LT(find_peak(0.26, 0.6), 0.001F * sliding);  // e^-(500 x 0.03) after the last force
+  EXPECT_EQ(find_peak(0.4, 0.6), 0.0F);
+  EXPECT_EQ(synthesiser.get_counters().underruns, 1);
+}
+
 TEST(Synthesiser, CountsHowOftenItOvertakesPhysics) {
   Synthesiser synthesiser({.rate_hz = kRate});
   play(synthesiser, {}, 4800, [] { return 64; });
@@ -308,7 +342,7 @@ TEST(Synthesiser, RefusesWhatMakesNoSense) {
 // Other threads push, and bodies and effects come and go while it plays. (For a data race detector: what is heard is tested above.)
 TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
   Synthesiser synthesiser({.rate_hz = kRate, .max_bodies = 8});
-  const auto model = make_model(16);
+  const auto model = make_model(16), edited = make_model(17);
   std::atomic<bool> stops{false};
   std::vector<std::thread> pushers;
   for (int p = 0; p < 3; ++p) {
@@ -340,6 +374,10 @@ TEST(Synthesiser, TakesEventsFromManyThreadsWhileItPlays) {
     ++turn;
     synthesiser.set_effects(bodies[turn % bodies.size()], kSets[turn % kSets.size()]);
     (void)synthesiser.get_effect_counters(bodies.front());
+    if (!bodies.empty()) {
+      synthesiser.swap_model(bodies.back(), bodies.size() % 2 == 0 ? model : edited);
+      synthesiser.set_budget(bodies.size() % 3 == 0 ? 3.0 * kGroup * kRate : 1e12);
+    }
     if (bodies.size() > 4) {
       synthesiser.remove_body(bodies.front());
       bodies.erase(bodies.begin());
