@@ -46,6 +46,7 @@ bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int a
   const double foreseen = allowed > 0.0 ? extra_ * std::min(1.0, debt_ / (kCredit * allowed)) : 0.0;
   const double room = std::max(0.0, allowed - foreseen - kRepayment * overdrawn);
   planned_ = static_cast<double>(live_groups) * kGroupCost;  // what fades out takes as much for one period more
+  has_room_ = planned_ + extra_ < kReleaseBelow * allowed && debt_ < allowed;
   if (planned_ <= room) {
     if (planned_ < kReleaseBelow * room) threshold_pa_ *= kRelease;
     if (threshold_pa_ < kInaudible) threshold_pa_ = 0.0F;

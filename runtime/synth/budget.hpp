@@ -24,6 +24,9 @@ class Budget {
   /// last periods; what was taken too much is given back over the next ones.
   bool begin(double allowed, double spent, std::int64_t live_groups, int awake_bodies) noexcept;
 
+  /// After begin(): whether a tenth of what is allowed is to spare, all work taken into account.
+  bool has_room() const noexcept { return has_room_; }
+
   /// The groups of one awake body: bounds on their pressure at the ears [Pa], never growing along the list.
   void tell(std::span<const float> bounds_pa) noexcept;
 
@@ -45,6 +48,7 @@ class Budget {
   double allowed_ = std::numeric_limits<double>::infinity();  // in the last period
   double extra_ = 0.0;                                        // what came on top, smoothed
   double debt_ = 0.0;                                         // taken too much so far, mode-samples
+  bool has_room_ = false;
   float strictness_ = 1.0F;
   float threshold_pa_ = 0.0F;                // of the last choice
   std::int64_t room_ = 0;                    // groups that may stay beyond the first of each body

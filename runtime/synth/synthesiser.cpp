@@ -19,6 +19,7 @@ namespace carillon::synth {
 namespace {
 
 constexpr int kMostBodies = 1 << 20;
+constexpr std::int64_t kGiveBackEvery = 8;  // periods: 21 ms at 48 kHz
 constexpr int kMostMicrophones = 256;
 
 SynthesiserOptions check(SynthesiserOptions options) {
@@ -351,7 +352,10 @@ void Synthesiser::keep_budget() noexcept {
     limited_ = false;
     budget_ = Budget();
     for (Body* body : playing_)
-      if (body != nullptr && body->get_voice() != nullptr) body->get_voice()->set_floor(0.0F);
+      if (body != nullptr && body->get_voice() != nullptr) {
+        body->get_voice()->set_floor(0.0F);
+        body->get_voice()->allow_driven(body->get_voice()->get_group_count());
+      }
     return;
   }
   limited_ = true;
@@ -366,6 +370,7 @@ void Synthesiser::keep_budget() noexcept {
   });
   const double allowed = per_s > 0.0 ? per_s * kPeriod / options_.rate_hz : 0.0;
   const bool is_too_much = budget_.begin(allowed, static_cast<double>(spent), groups, awake);
+  const bool gives_back = budget_.has_room() && sample_ / kPeriod % kGiveBackEvery == 0;
   if (is_too_much) {
     for_awake([&](int, Body& body) {
       if (Voice* voice = body.get_voice()) budget_.tell(voice->measure(body.calc_nearness(listener_, sample_)));
@@ -376,6 +381,7 @@ void Synthesiser::keep_budget() noexcept {
   for_awake([&](int, Body& body) {
     Voice* voice = body.get_voice();
     give_floor(body);
+    if (voice != nullptr && gives_back) voice->allow_driven(1);
     if (!is_too_much || voice == nullptr || voice->get_live_group_count() == 0) return true;
     const int stay = budget_.find_limit(voice->get_measured());
     work_.faded += voice->get_live_group_count() - stay;

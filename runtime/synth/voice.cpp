@@ -27,7 +27,7 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
     : model_(std::move(model)), kernels_(&get_kernels(options.isa)), silence_pa_(options.silence_pa) {
   if (!(silence_pa_ > 0.0) || !std::isfinite(silence_pa_)) throw InputError("the pressure of silence must be a positive number of Pa");
   groups_ = static_cast<int>(model_->sound_.size());
-  limit_ = cut_ = groups_;
+  limit_ = cut_ = driven_ = groups_;
   state_.resize(model_->sound_.size());
   starts_.resize(model_->sound_.size());
   damped_.resize(model_->damped_.size());
@@ -122,7 +122,7 @@ void Voice::render(int quanta) noexcept {
     const bool struck = struck_at_all && is_struck(sample);
     const Drive* drive = touched ? contacts_->begin_quantum(sample) : nullptr;
     const bool driven = drive != nullptr && drive->forces, damped = drive != nullptr && drive->damps;
-    if (driven) wake(find_reach(drive->strength_n_s));
+    if (driven) wake(std::min(find_reach(drive->strength_n_s), driven_));
     if (q == made) {  // what rings, up to the next quantum that is struck or touched: that changes the starts after it
       do ++made;
       while (made < quanta && !touched && !struck && !is_struck(start + made * kQuantum));

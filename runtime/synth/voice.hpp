@@ -84,9 +84,12 @@ class Voice {
   std::span<const float> measure(float nearness) noexcept;
   std::span<const float> get_measured() const noexcept { return std::span(bounds_).first(static_cast<std::size_t>(live_)); }
 
-  /// Lets the live groups from `groups` on fade out over the period that begins; strikes may wake them again. At least one stays. At a
-  /// multiple of kPeriod samples only. [audio-thread]
-  void cut(int groups) noexcept { cut_ = std::max(1, groups); }
+  /// Lets the live groups from `groups` on fade out over the period that begins; strikes may wake them again, contacts that last only after
+  /// allow_driven(). At least one stays. At a multiple of kPeriod samples only. [audio-thread]
+  void cut(int groups) noexcept { cut_ = driven_ = std::max(1, groups); }
+
+  /// Lets contacts that last drive so many groups more than they may. [audio-thread]
+  void allow_driven(int more) noexcept { driven_ = std::min(groups_, driven_ + more); }
 
   /// From now on a strike wakes only groups that it could lift to this pressure at 1 m [Pa], those before them in the list, and the first;
   /// 0, as at first: all. [audio-thread]
@@ -105,6 +108,7 @@ class Voice {
   /// Modes that are advanced at this moment, in whole groups.
   int get_live_mode_count() const;
   int get_live_group_count() const { return live_; }
+  int get_group_count() const { return groups_; }
   bool is_awake() const { return live_ > 0 || damped_live_; }
   /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
   bool is_idle() const {
@@ -149,6 +153,7 @@ class Voice {
   int limit_ = 0;   // groups that may be played
   int live_ = 0;    // groups that are; those behind have no energy
   int cut_ = 0;     // groups that stay when the next period begins
+  int driven_ = 0;  // groups that contacts may wake
   float floor_pa_ = 0.0F;
   bool damped_live_ = false;
   bool fading_ = false;       // fade_ holds what goes in this period: what the limit took away, what another model sounded
