@@ -24,6 +24,7 @@ struct BodySpec {
   Vec3 angular_velocity_rad_s{};     // in the world
   double restitution = 0.5;          // 0..1; a contact of two bodies takes the geometric mean of theirs
   double friction = 0.4;             // Coulomb, >= 0; a contact of two bodies takes the geometric mean of theirs
+  double roughness_m = 2e-6;         // rms height of the surface; for whoever plays the contacts, the world does not look at it
 };
 
 /// The floor: the half space z <= height_m. It is hard ground and makes no sound of its own. Its `body` index in impulses is -1.
@@ -34,6 +35,7 @@ struct GroundSpec {
   double restitution = 0.5;
   double friction = 0.5;
   double density_kg_m3 = 2400.0;
+  double roughness_m = 20e-6;  // likewise; concrete, smoothly trowelled
 };
 
 struct WorldSpec {

@@ -50,6 +50,7 @@ Feed::Feed(std::span<const stream::Event> events, std::vector<FedBody> bodies, s
   };
   std::map<std::pair<std::int32_t, std::uint64_t>, double> contacts;  // time of the last record
   for (std::size_t i = 0; i < events.size(); ++i) {
+    end_s_ = std::max(end_s_, stream::get_time_s(events[i]));
     if (const auto* impulse = std::get_if<stream::Impulse>(&events[i])) {
       const FedBody* body = find(impulse->body);
       if (body == nullptr) continue;
@@ -116,7 +117,7 @@ void Feed::hand_on(double until_s, synth::Synthesiser& synthesiser) {
   }
   if (!has_contacts_) return;
   if (waiting == synthesiser.get_ring_room()) synthesiser.process(nullptr, 0, 0);
-  (void)synthesiser.push(stream::Mark{until_s});
+  (void)synthesiser.push(stream::Mark{std::min(until_s, end_s_)});
 }
 
 }  // namespace carillon::host

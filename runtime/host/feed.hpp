@@ -44,6 +44,7 @@ class Feed {
   std::vector<std::vector<double>> times_s_;  // of the motions of each body, then of the listener
   double margin_s_ = 0.0;                     // by which ways are known longer ahead than they need to be
   bool has_contacts_ = false;
+  double end_s_ = -1e300;  // when the last thing happens
   std::size_t next_ = 0;
 };
 

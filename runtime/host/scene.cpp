@@ -26,6 +26,7 @@ constexpr std::size_t kMostMicrophones = 16;
 constexpr std::size_t kMostStrikes = 100000;
 constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
+constexpr double kRoughestM = 1e-3;  // what is higher is no roughness but a shape
 
 using Quaternion = std::array<double, 4>;
 
@@ -160,6 +161,7 @@ SceneBody parse_body(config::Object& object, const plan::Wish& wish) {
   }
   spec.restitution = read_within(object, "restitution", spec.restitution, 0.0, 1.0);
   spec.friction = read_within(object, "friction", spec.friction, 0.0, 10.0);
+  spec.roughness_m = read_within(object, "roughness_m", spec.roughness_m, 0.0, kRoughestM);
   body.wish = object.has("effects") ? read_effects(object) : wish;
   object.finish();
   return body;
@@ -173,6 +175,7 @@ contact::GroundSpec parse_ground(config::Object& object) {
   ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1e-3, 1e6);
   ground.restitution = read_within(object, "restitution", ground.restitution, 0.0, 1.0);
   ground.friction = read_within(object, "friction", ground.friction, 0.0, 10.0);
+  ground.roughness_m = read_within(object, "roughness_m", ground.roughness_m, 0.0, kRoughestM);
   object.finish();
   return ground;
 }

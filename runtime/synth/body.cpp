@@ -95,6 +95,7 @@ EffectBytes BodyChange::calc_bytes() const {
 Body::Body(std::shared_ptr<const Model> model, BodyFrame frame, const Vec3& position_m, const stream::Quaternion& rotation)
     : model_(std::move(model)), frame_(std::move(frame)), track_(static_cast<std::size_t>(frame_.max_waypoints)), rotation_(rotation) {
   track_.push({.position_m = position_m});
+  surface_ = frame_.surface;
 }
 
 void Body::check(EffectSet effects, const Model& model) {
@@ -120,6 +121,7 @@ std::unique_ptr<BodyChange> Body::make_change(EffectSet from, EffectSet to, std:
         std::make_unique<Clicker>(Clicker{Click(model->get_sphere_radius_m(), model->get_mass_kg(), frame_.rate_hz, frame_.max_strikes),
                                           Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
   }
+  change->modulus_pa = frame_.surface.modulus_pa > 0.0 ? frame_.surface.modulus_pa : model->get_plane_strain_modulus_pa();
   if (needs_contacts(to) && (change->inherits || !needs_contacts(from))) {
     change->contacts = std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = frame_.surface, .effects = to});
   }
@@ -153,6 +155,7 @@ void Body::apply(BodyChange& change, const Track& listener, std::int64_t sample)
       clicker_->attitude.push(turned_s_, rotation_);
     }
   }
+  surface_.modulus_pa = change.modulus_pa;
   put_contacts(change);
   if (!change.air) return;
   std::swap(next_air_, change.air);
@@ -168,6 +171,7 @@ void Body::apply(BodyChange& change, const Track& listener, std::int64_t sample)
 void Body::put_contacts(BodyChange& change) noexcept {
   if (kOfContacts.is_empty()) return;
   if (change.contacts) {
+    if (contacts_ && change.inherits) change.contacts->take_over(*contacts_);
     std::swap(contacts_, change.contacts);
     voice_->attach(contacts_.get());
   } else if (contacts_ && needs_contacts(effects_)) {

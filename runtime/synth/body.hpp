@@ -62,7 +62,8 @@ struct BodyChange {
   std::unique_ptr<Clicker> clicker;
   std::unique_ptr<Air> air;
   std::unique_ptr<ContactForces> contacts;
-  bool inherits = false;                   // voice and clicker go on in place of those there
+  double modulus_pa = 0.0;                 // of the surface
+  bool inherits = false;                   // voice, contacts and clicker go on in place of those there
   std::unique_ptr<Succession> succession;  // for the voice
 
   EffectBytes calc_bytes() const;
@@ -120,7 +121,7 @@ class Body {
   bool is_asleep() const noexcept;
   /// Nothing earlier will come. For bodies that are awake, before render().
   void reach(double time_s) noexcept;
-  const Surface& get_surface() const noexcept { return frame_.surface; }
+  const Surface& get_surface() const noexcept { return surface_; }  // as others feel it
   const BodyWork& get_work() const { return work_; }
   /// Its modes; nullptr without.
   Voice* get_voice() noexcept { return voice_.get(); }
@@ -144,6 +145,7 @@ class Body {
   std::unique_ptr<Voice> voice_;
   std::unique_ptr<Clicker> clicker_;
   std::unique_ptr<ContactForces> contacts_;  // attached to voice_
+  Surface surface_;                          // with the modulus of the model
   std::unique_ptr<Air> air_, next_air_;
   BodyChange* change_ = nullptr;
   bool fading_ = false;        // from air_ to next_air_, in this period

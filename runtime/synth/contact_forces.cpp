@@ -1,14 +1,16 @@
 // Method:     every border of two quanta, each contact's values are found on the line between its records; from them its direction, gains
 //             and damping. In between, the force is worked out sample by sample and handed to the modes through the contact's rows at
 //             both borders, blended, so that nothing steps when the place or the direction changes.
-// Source:     K. Johnson, Contact Mechanics (1985), 4.2: k = dF/d delta = 2 E* a. Stiffness that falls to load over height where
-//             roughness carries: B. Persson, Phys. Rev. Lett. 99 (2007) 125502 (there F / (0.4 h_rms); here the largest height takes the
-//             place of 0.4 h_rms, which makes it a bound). Coulomb 1785.
-// Deviations: the bodies do not give way to the roughness as wholes (rolling noise theory divides by the sum of their receptances).
+// Source:     K. Johnson, Contact Mechanics (1985), 4.2: k = dF/d delta = 2 E* a. Rough surfaces: B. Persson, Phys. Rev. Lett. 99 (2007)
+//             125502: load ~ exp(-separation / u0). Coulomb 1785.
+// Deviations: Persson's u0 is 0.4 h_rms or more for bodies that cannot give way; here it is h_rms, so that peaks stay within some tens of
+//             loads. The weight is taken for what presses: of what something else presses the ride is too slow. The other body's and this
+//             body's modes do not give way to the heights.
 #include "runtime/synth/contact_forces.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "runtime/config/error.hpp"
 
@@ -18,9 +20,10 @@ namespace {
 constexpr double kRiseS = 5e-3;
 constexpr double kPatienceS = 20e-3;
 constexpr double kLongestS = 50e-3;
-constexpr double kAtRest = 0.2e-3, kMoving = 10e-3;  // m/s
-constexpr double kSticking = 1e-3;                   // m/s; below, the direction of friction fades
-constexpr double kStronger = 2.0;                    // a new contact takes the place of one that presses less than half as much
+constexpr double kAtRest = 0.2e-3, kMoving = 2e-3;  // m/s
+constexpr double kGravity = 9.81;                   // m/s^2
+constexpr double kSticking = 1e-3;                  // m/s; below, the direction of friction fades
+constexpr double kStronger = 2.0;                   // a new contact takes the place of one that presses less than half as much
 
 double calc_smooth_step(double x) noexcept {
   x = std::clamp(x, 0.0, 1.0);
@@ -38,15 +41,21 @@ std::uint64_t make_seed(std::uint64_t contact, std::int32_t body) noexcept {
 
 double blend(double a, double b, double share) noexcept { return a + share * (b - a); }
 
-bool is_amount(double x) { return std::isfinite(x) && x >= 0.0; }
+bool is_amount(double x) noexcept { return std::isfinite(x) && x >= 0.0; }
 
 }  // namespace
+
+const char* find_fault(const Surface& surface) noexcept {
+  if (!is_amount(surface.roughness_m)) return "the roughness is negative or not finite";
+  if (!is_amount(surface.friction)) return "the friction is negative or not finite";
+  if (!is_amount(surface.modulus_pa)) return "the modulus is negative or not finite";
+  return nullptr;
+}
 
 ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOptions options)
     : model_(std::move(model)), surface_(options.surface), effects_(options.effects) {
   if (model_ == nullptr) throw InputError("contacts need a model");
-  if (!is_amount(surface_.roughness_m) || !is_amount(surface_.friction) || !is_amount(surface_.modulus_pa))
-    throw InputError("roughness, friction and modulus of a surface must be numbers of at least 0");
+  if (const char* fault = find_fault(surface_); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
   if (options.max_contacts < 1 || options.max_contacts > kMostContacts)
     throw InputError("a body needs room for 1 to " + std::to_string(kMostContacts) + " contacts");
   if (options.max_records < 2 || options.max_records > 1 << 20)
@@ -114,7 +123,7 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
 
 bool ContactForces::take(const stream::Contact& contact, const Surface& other) noexcept {
   if (stream::find_fault(stream::Event(contact)) != nullptr || static_cast<std::size_t>(contact.triangle) >= model_->triangles_.size() ||
-      !is_amount(other.roughness_m) || !is_amount(other.friction) || !is_amount(other.modulus_pa)) {
+      find_fault(other) != nullptr) {
     ++counters_.refused;
     return false;
   }
@@ -127,8 +136,8 @@ bool ContactForces::take(const stream::Contact& contact, const Surface& other) n
     *slot = Slot{};
     slot->id = contact.id;
     slot->friction = std::sqrt(surface_.friction * other.friction);
-    const double compliance = 1.0 / surface_.modulus_pa + 1.0 / other.modulus_pa;
-    slot->modulus_pa = surface_.modulus_pa > 0.0 && other.modulus_pa > 0.0 ? 1.0 / compliance : 0.0;
+    slot->other_modulus_pa = other.modulus_pa;
+    find_modulus(*slot);
     slot->texture.start(surface_.roughness_m, make_seed(contact.id, contact.body));
     slot->other_texture.start(other.roughness_m, make_seed(contact.id, contact.other));
     slot->used = true;
@@ -158,6 +167,40 @@ bool ContactForces::take(const stream::Contact& contact, const Surface& other) n
 
 void ContactForces::reach(double time_s) noexcept {
   if (std::isfinite(time_s)) reached_ = std::max(reached_, time_s * rate_hz_);
+}
+
+/// E* of the pair; nothing touches what has no stiffness.
+void ContactForces::find_modulus(Slot& slot) const noexcept {
+  const double own = surface_.modulus_pa, other = slot.other_modulus_pa;
+  slot.modulus_pa = own > 0.0 && other > 0.0 ? 1.0 / (1.0 / own + 1.0 / other) : 0.0;
+}
+
+void ContactForces::find_rows(Node& node) const noexcept {
+  const auto& triangle = model_->triangles_[static_cast<std::size_t>(node.values.triangle)];
+  for (std::size_t i = 0; i < kStrikeRows; ++i) node.row[i] = model_->get_row(triangle[i / 3], static_cast<int>(i % 3));
+}
+
+void ContactForces::take_over(ContactForces& other) noexcept {
+  slots_.swap(other.slots_);
+  records_.swap(other.records_);
+  std::swap(free_, other.free_);
+  std::swap(live_, other.live_);
+  reached_ = other.reached_;
+  looked_ = other.looked_;
+  counters_ = other.counters_;
+  const auto fits = [this](const Record& record) { return static_cast<std::size_t>(record.triangle) < model_->triangles_.size(); };
+  for (Slot& slot : slots_) {
+    if (!slot.used) continue;
+    bool all = fits(slot.from) && (!slot.has_to || fits(slot.to)) && fits(slot.node.values);
+    for (std::int32_t i = slot.head; i >= 0; i = records_[static_cast<std::size_t>(i)].next)
+      all = all && fits(records_[static_cast<std::size_t>(i)]);
+    if (!all) {
+      free(slot);
+      continue;
+    }
+    find_modulus(slot);
+    if (slot.acts) find_rows(slot.node);
+  }
 }
 
 void ContactForces::release() noexcept {
@@ -249,23 +292,29 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
   const double rough = effects_.has(Effect::kRoughness) ? sliding : 0.0;
   const double along = rough + (effects_.has(Effect::kRolling) ? 1.0 - sliding : 0.0);
   if (along > 0.0) {
-    // A body that slides without being swept, as a spinning top, still moves against the other.
     node.motion = calc_motion(values.sweep_m_s);
     node.other_motion = calc_motion(values.other_sweep_m_s);
-    node.stiffness_n_m = 2.0 * slot.modulus_pa * values.patch_m;
-    node.gains = slot.texture.calc_gains(values.sweep_m_s, values.patch_m, rate_hz_);
-    node.other_gains = slot.other_texture.calc_gains(values.other_sweep_m_s, values.patch_m, rate_hz_);
     // The heights of a surface that is not swept do not count, and count in full before they are heard.
-    node.peak_m = calc_smooth_step(values.sweep_m_s / kAtRest) * node.gains.peak_m +
-                  calc_smooth_step(values.other_sweep_m_s / kAtRest) * node.other_gains.peak_m;
+    const double own = calc_smooth_step(values.sweep_m_s / kAtRest), other = calc_smooth_step(values.other_sweep_m_s / kAtRest);
+    const double stiffness = 2.0 * slot.modulus_pa * values.patch_m, own_m = slot.texture.get_roughness_m(),
+                 other_m = slot.other_texture.get_roughness_m();
+    const double spring_m = stiffness > 0.0 ? values.force_n / stiffness : 0.0;
+    const double at_first_m = spring_m + std::hypot(own * own_m, other * other_m);
+    const double ride_rad_s = at_first_m > 0.0 ? std::sqrt(kGravity / at_first_m) : 0.0;
+    node.gains = slot.texture.calc_gains(values.sweep_m_s, values.patch_m, ride_rad_s, rate_hz_);
+    node.other_gains = slot.other_texture.calc_gains(values.other_sweep_m_s, values.patch_m, ride_rad_s, rate_hz_);
+    node.give_m = stiffness > 0.0 ? spring_m + std::hypot(own * node.gains.rms_m, other * node.other_gains.rms_m) : 0.0;
+    if (node.give_m > 0.0) {
+      const double s = std::hypot(node.motion * node.gains.rms_m, node.other_motion * node.other_gains.rms_m) / node.give_m;
+      node.spread = 0.5 * s * s;
+    }
   }
   const double drag = rough * slot.friction / (slip + kSticking);
   const double brake = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
-  const auto& triangle = model_->triangles_[static_cast<std::size_t>(values.triangle)];
+  find_rows(node);
   for (int corner = 0; corner < 3; ++corner) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(corner * 3 + axis), c = static_cast<std::size_t>(corner), k = static_cast<std::size_t>(axis);
-      node.row[i] = model_->get_row(triangle[c], axis);
       node.force[i] = static_cast<float>(values.barycentric[c] * (along * values.normal[k] - drag * values.slip_m_s[k]));
       node.brake[i] = static_cast<float>(values.barycentric[c] * brake * values.normal[k]);
     }
@@ -282,9 +331,11 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
     std::copy(nodes[end]->row.begin(), nodes[end]->row.end(), push[end].row);
     std::copy(nodes[end]->force.begin(), nodes[end]->force.end(), push[end].force);
     std::copy(nodes[end]->brake.begin(), nodes[end]->brake.end(), push[end].brake);
-    for (const float x : push[end].brake) drive_.damps = drive_.damps || x != 0.0F;
     std::fill(std::begin(push[end].signal), std::end(push[end].signal), 0.0F);
   }
+  bool damps = false;
+  for (std::size_t i = 0; i < kStrikeRows; ++i) damps = damps || from.brake[i] != 0.0F || to.brake[i] != 0.0F;
+  drive_.damps = drive_.damps || damps;
   push[0].forces = push[1].forces = false;
   const bool moves = from.motion > 0.0 || to.motion > 0.0, other_moves = from.other_motion > 0.0 || to.other_motion > 0.0;
   if (!(moves || other_moves) || !(from.values.force_n > 0.0 || to.values.force_n > 0.0)) return;
@@ -299,12 +350,10 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
   for (std::size_t n = 0; n <= kQuantum; ++n) {
     const double share = static_cast<double>(n) / kQuantum;
     const double load = blend(from.values.force_n, to.values.force_n, share);
-    const double stiffness = blend(from.stiffness_n_m, to.stiffness_n_m, share);
-    const double peak = blend(from.peak_m, to.peak_m, share);
+    const double give = blend(from.give_m, to.give_m, share), spread = blend(from.spread, to.spread, share);
     const double moved = blend(from.motion, to.motion, share) * static_cast<double>(height[n]) +
                          blend(from.other_motion, to.other_motion, share) * static_cast<double>(other_height[n]);
-    const double sum = load + stiffness * peak;
-    const double force = sum > 0.0 ? blend(from.level, to.level, share) * stiffness * load / sum * moved : 0.0;
+    const double force = give > 0.0 ? blend(from.level, to.level, share) * load * std::expm1(moved / give - spread) : 0.0;
     push[0].signal[n] = static_cast<float>(force * (1.0 - share));
     push[1].signal[n] = static_cast<float>(force * share);
     largest = std::max(largest, std::abs(force));

@@ -27,6 +27,9 @@ struct Surface {
   double modulus_pa = 0.0;    // E / (1 - nu^2); 0: that of the model's bank
 };
 
+/// What is wrong with a surface, as part of a sentence; nullptr: nothing.
+const char* find_fault(const Surface& surface) noexcept;
+
 /// The ground of scenes: concrete, smoothly trowelled.
 inline constexpr Surface kGroundSurface{.roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2)};
 
@@ -50,11 +53,13 @@ struct ContactCounters {
 /// samples and go linearly between. A gap of more than 50 ms is held and changed in its last 50 ms. A contact rises and falls within 5 ms
 /// beside what its records say. When its last record, and the last mark (reach), are 20 ms old it falls as if it had ended: an underrun.
 ///
-/// Force: both surfaces' heights h, read along the way of the contact over each, press the contact's spring: f = k F / (F + k p) h, with
-/// the stiffness k = 2 E* a, the load F and the largest height p that h can have, so that |f| < F: the contact never pulls. The load itself
-/// changes slowly and is left out. While one surface slides on the other (its share is slip over the larger sweep) friction follows,
-/// -mu f along the slip. What moves at less than 0.2 mm/s is at rest and gives no force at all.
-/// Damping: the impedance Z of the other body at the point takes Z (phi.n)^2 / 2 [1/s] of each mode (docs/decisions/contact-sound.md).
+/// Force: the heights h of both surfaces, read along the way of the contact over each, press two springs in series: the contact's,
+/// k = 2 E* a, and the one of the rough skin, load over height: with u = F / k + h_rms the force is F exp(h / u), which never pulls.
+/// Without its mean and the load F, which change slowly and are left out, that is f = F (exp(h / u - s^2 / 2) - 1), s = h_rms / u. What is
+/// slower than sqrt(g / u), where a body that its weight presses on u bounces, does not press: the body rides over it. While one surface
+/// slides on the other (its share is slip over the larger sweep) friction follows, -mu f along the slip. What moves at less than 0.2 mm/s
+/// is at rest and gives no force at all. Damping: the impedance Z of the other body at the point takes Z (phi.n)^2 / 2 [1/s] of each mode
+/// (docs/decisions/contact-sound.md).
 ///
 /// Memory is taken in the constructor only. One thread at a time.
 class ContactForces {
@@ -71,6 +76,10 @@ class ContactForces {
 
   /// From the next quantum on, without a step. [audio-thread]
   void set_effects(EffectSet effects) noexcept { effects_ = effects; }
+
+  /// Goes on in place of another one of the same options, of a voice that goes on likewise; that one is of no more use afterwards. Contacts
+  /// on triangles that the model has not are cut off. [audio-thread]
+  void take_over(ContactForces& other) noexcept;
 
   /// Ends all contacts, within 5 ms. [audio-thread]
   void release() noexcept;
@@ -107,10 +116,10 @@ class ContactForces {
   /// A contact at the border of two quanta.
   struct Node {
     Record values;
-    double level = 0.0;  // 0..1: its rise and its fall
-    double stiffness_n_m = 0.0;
+    double level = 0.0;                       // 0..1: its rise and its fall
     double motion = 0.0, other_motion = 0.0;  // 0..1: whether it moves over each surface
-    double peak_m = 0.0;                      // no height is beyond it
+    double give_m = 0.0;                      // u: load over stiffness
+    double spread = 0.0;                      // s^2 / 2
     Texture::Gains gains, other_gains;
     std::array<float, kStrikeRows> force{}, brake{};
     std::array<const std::int16_t*, kStrikeRows> row{};
@@ -123,7 +132,7 @@ class ContactForces {
     Record to;
     bool has_to = false;
     double level = 0.0;
-    double friction = 0.0, modulus_pa = 0.0;
+    double friction = 0.0, modulus_pa = 0.0, other_modulus_pa = 0.0;
     Texture texture, other_texture;
     Node node;  // at the start of the next quantum
   };
@@ -131,6 +140,8 @@ class ContactForces {
   Slot* find_place(const stream::Contact& contact) noexcept;
   std::int32_t take_free(Slot& slot) noexcept;
   void free(Slot& slot) noexcept;
+  void find_modulus(Slot& slot) const noexcept;
+  void find_rows(Node& node) const noexcept;
   bool find_values(Slot& slot, double time, Record& values) noexcept;
   Node make_node(const Slot& slot, const Record& values) const noexcept;
   void add_push(Slot& slot, const Node& from, const Node& to) noexcept;

@@ -1,14 +1,15 @@
 // Method:     the profile is a sum of octaves. All octaves read one table at their own scale and from a random place: a sum of cosines with
 //             random phases and wavelengths in 1/2 .. 1, so that an octave has nothing outside its band. The table holds the coefficients
 //             of the cubic B-spline through that sum, with 8 points or more a wavelength (images below -67 dB), so that a height is four
-//             products and never beyond the largest coefficient. Where the contact is on the table is a fixed-point number of 64 bits:
+//             products. Where the contact is on the table is a fixed-point number of 64 bits:
 //             that of the next octave is the same, shifted by one.
 //             An octave that would reach beyond the Nyquist frequency fades out before.
 // Source:     B. Persson, O. Albohr, U. Tartaglino, A. Volokitin and E. Tosatti, J. Phys.: Condens. Matter 17 (2005) R1: most surfaces are
 //             self-affine with a Hurst exponent near 0.8 below a roll-off wavelength; the spectrum of a line over such a surface falls as
 //             q^-(1 + 2 H). The roll-off is the cut-off of ISO 4288:1996. A patch of radius a lets heights of wave number q through as
 //             1 / sqrt(1 + pi/4 (q a)^3): P. Remington, J. Sound Vib. 46 (1976) 419, for wheels on rails.
-// Deviations: between two cut-offs of the standard the roll-off jumps. The filter of the patch is taken at the middle of each octave.
+// Deviations: between two cut-offs of the standard the roll-off jumps. Filters are taken at the middle of each octave, and without their
+//             phase.
 #include "runtime/synth/texture.hpp"
 
 #include <algorithm>
@@ -59,7 +60,6 @@ void transform(std::vector<std::complex<double>>& x) {
 
 struct Tables {
   std::array<float, kPoints + 3> coefficient;  // the first three again at the end
-  double peak = 0.0;
 
   Tables() {
     std::vector<std::complex<double>> x(kPoints);
@@ -75,9 +75,7 @@ struct Tables {
     for (int n = 0; n < kPoints + 3; ++n) {
       const double value = x[static_cast<std::size_t>(n % kPoints)].real() / std::sqrt(power);
       coefficient[static_cast<std::size_t>(n)] = static_cast<float>(value);
-      peak = std::max(peak, std::abs(value));
     }
-    peak *= 1.0 + 1e-5;  // what is rounded in a height
   }
 };
 
@@ -99,8 +97,6 @@ std::uint64_t to_place(double turns) noexcept { return static_cast<std::uint64_t
 
 void Texture::make_tables() { get_tables(); }
 
-double Texture::get_crest() noexcept { return get_tables().peak; }
-
 double Texture::calc_cutoff_m(double roughness_m) noexcept {
   // The standard goes by the mean deviation, sqrt(2 / pi) of the rms height where heights are normally distributed.
   const double mean_m = std::sqrt(2.0 / pi) * roughness_m;
@@ -114,25 +110,27 @@ void Texture::start(double roughness_m, std::uint64_t seed) noexcept {
   for (std::uint64_t& offset : offset_) offset = scramble(seed);
 }
 
-Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, double rate_hz) const noexcept {
+Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, double give_rad_s, double rate_hz) const noexcept {
   static const double kShare = std::sqrt(1.0 - std::pow(2.0, -2.0 * kHurst));  // so that the squares of all octaves sum to 1
   static const double kStep = std::pow(2.0, -kHurst);
   Gains gains;
   if (!(roughness_m_ > 0.0)) return gains;
-  double amplitude = kShare, longest_m = cutoff_m_, sum = 0.0;
+  double amplitude = kShare, longest_m = cutoff_m_, square = 0.0;
   for (float& height : gains.height_m) {
     const double highest = 2.0 * std::abs(speed_m_s) / (longest_m * rate_hz);  // frequency, of the rate
     if (highest >= kFadeTo) break;                                             // and so are all shorter ones
-    const double qa = 2.0 * pi * std::numbers::sqrt2 / longest_m * patch_radius_m;
+    const double wave_number = 2.0 * pi * std::numbers::sqrt2 / longest_m;     // the middle of the octave
+    const double qa = wave_number * patch_radius_m, omega = wave_number * std::abs(speed_m_s);
     double gain = 1.0 / std::sqrt(1.0 + 0.25 * pi * qa * qa * qa);
     gain *= 1.0 - calc_smooth_step((highest - kFadeFrom) / (kFadeTo - kFadeFrom));
+    if (give_rad_s > 0.0) gain *= omega * omega / (omega * omega + give_rad_s * give_rad_s);
     gain = std::max(0.0, (gain * amplitude - kLeast) / (1.0 - kLeast));
     height = static_cast<float>(roughness_m_ * gain);
-    sum += static_cast<double>(height);
+    square += static_cast<double>(height) * static_cast<double>(height);
     amplitude *= kStep;
     longest_m *= 0.5;
   }
-  gains.peak_m = sum * get_crest();
+  gains.rms_m = std::sqrt(square);
   return gains;
 }
 

@@ -2,7 +2,7 @@
 //
 //   Texture texture;
 //   texture.start(2e-6, seed);
-//   const auto gains = texture.calc_gains(0.3, 40e-6, 48000.0);
+//   const auto gains = texture.calc_gains(0.3, 40e-6, 0.0, 48000.0);
 //   texture.render(0.3, 0.3, gains, gains, height);
 #pragma once
 
@@ -24,20 +24,18 @@ class Texture {
   /// How much of each octave counts at one instant.
   struct Gains {
     std::array<float, kOctaves> height_m{};  // rms
-    double peak_m = 0.0;                     // no height is beyond it
+    double rms_m = 0.0;                      // of all of them together
   };
 
   /// Makes what all surfaces share, when it is not there yet: 128 KiB. [main-thread]
   static void make_tables();
-  /// No height of a texture with these gains is beyond their sum times this.
-  static double get_crest() noexcept;
-
   /// At the start of a path. roughness_m: rms height [m] of the profile as it is measured, without wavelengths beyond get_cutoff_m(); 0 or
   /// less: smooth.
   void start(double roughness_m, std::uint64_t seed) noexcept;
 
-  /// For a contact that goes over the surface with speed_m_s and touches it with a patch of this radius.
-  Gains calc_gains(double speed_m_s, double patch_radius_m, double rate_hz) const noexcept;
+  /// For a contact that goes over the surface with speed_m_s and touches it with a patch of this radius; what moves slower than give_rad_s
+  /// is not felt, as the bodies give way to it: a high pass of the second order.
+  Gains calc_gains(double speed_m_s, double patch_radius_m, double give_rad_s, double rate_hz) const noexcept;
 
   /// Heights [m] at the samples 0 to kQuantum, while speed and gains change linearly from the first to the last; the path goes on by
   /// kQuantum samples.
@@ -47,6 +45,7 @@ class Texture {
   /// The longest wavelength [m] of a profile of this roughness: the cut-off with which it is measured (ISO 4288:1996, Table 1).
   static double calc_cutoff_m(double roughness_m) noexcept;
   double get_cutoff_m() const noexcept { return cutoff_m_; }
+  double get_roughness_m() const noexcept { return roughness_m_; }
 
  private:
   double roughness_m_ = 0.0;

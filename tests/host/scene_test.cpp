@@ -129,6 +129,18 @@ TEST(Scene, ABodyMayHaveEffectsOfItsOwn) {
   EXPECT_TRUE(scene.bodies[2].wish.automatic);
 }
 
+TEST(Scene, SurfacesAreAsRoughAsTheySay) {
+  const Scene usual = parse("{\"duration_s\": 2, \"ground\": {}, " + kBody + "}");
+  EXPECT_EQ(usual.bodies[0].spec.roughness_m, 2e-6);
+  EXPECT_EQ(usual.ground->roughness_m, 20e-6);
+  const Scene scene = parse(R"({"duration_s": 2, "ground": {"roughness_m": 0}, "bodies": [
+    {"name": "a", "bank": "a.h5", "roughness_m": 5e-7}]})");
+  EXPECT_EQ(scene.bodies[0].spec.roughness_m, 5e-7);
+  EXPECT_EQ(scene.ground->roughness_m, 0.0);
+  EXPECT_THROW(parse(R"({"duration_s": 2, "bodies": [{"name": "a", "bank": "a.h5", "roughness_m": 0.01}]})"), InputError);
+  EXPECT_THROW(parse(R"({"duration_s": 2, "ground": {"roughness_m": -1e-6}, "bodies": [{"name": "a", "bank": "a.h5"}]})"), InputError);
+}
+
 TEST(Scene, TheLeftEarIsOnTheLeft) {
   Listener listener;
   listener.position_m = {1.0, 2.0, 3.0};
