@@ -208,6 +208,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   std::vector<std::array<float, kBlock>> blocks(channels);
   std::vector<float*> out;
   for (auto& block : blocks) out.push_back(block.data());
+  const double began = get_cpu_seconds();
   const auto first_tick = get_ticks();
   const auto first_time = std::chrono::steady_clock::now();
   for (std::size_t start = 0; start < samples; start += kBlock) {
@@ -221,6 +222,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     }
     if (options.progress) options.progress(static_cast<double>(start + count) / static_cast<double>(samples));
   }
+  sound.seconds_playing_cpu = get_cpu_seconds() - began;
   if (options.measures) {
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - first_time;
     sound.seconds_per_tick = seconds.count() / std::max(1.0, static_cast<double>(get_ticks() - first_tick));

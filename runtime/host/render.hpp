@@ -30,6 +30,7 @@ struct Sound {
   std::vector<synth::EffectCounters> effect_counters;  // per body, at the end
   double seconds_per_tick = 0.0;                       // of the counters' ticks; 0 where they were not asked for
   double seconds_cpu = 0.0;
+  double seconds_playing_cpu = 0.0;  // of them for what is done block by block
 };
 
 struct RenderOptions {

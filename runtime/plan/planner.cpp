@@ -294,7 +294,9 @@ void Planner::State::apply(const stream::Contact& contact) {
          {.rule = goes ? Rule::kSlip : Rule::kNoSlip, .value = speed, .limit = kCreepMs});
     return goes;
   };
-  const bool slides = offer(Effect::kRoughness, slip), rolls = offer(Effect::kRolling, sweep);
+  // Of the movement over the surfaces so much is slip (docs/decisions/contact-sound.md); the rest is rolling.
+  const double sliding = sweep > slip ? slip / sweep : 1.0;
+  const bool slides = offer(Effect::kRoughness, std::min(slip, sweep)), rolls = offer(Effect::kRolling, sweep * (1.0 - sliding));
   if (slides || rolls) {
     call(body, Effect::kModal, 1.0, contact.time_s, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
     body.sounds_until_s = std::max(body.sounds_until_s, contact.time_s + kHoldS);

@@ -37,8 +37,8 @@ inline constexpr double kThumpShare = 0.259;
 /// Not heard: 20 dB below the reference of hearing, and at least 90 dB below the loudest strike so far.
 inline constexpr double kInaudibleDb = -20.0;
 inline constexpr double kBelowLoudestDb = 90.0;
-/// Slower than this nothing slides or rolls.
-inline constexpr double kCreepMs = 1e-3;
+/// Slower than this nothing slides or rolls: synth::ContactForces gives no force then.
+inline constexpr double kCreepMs = 2e-4;
 /// An effect is on this long before it is needed, so that a change that is still on its way to the ears is over; and stays on for so long
 /// after.
 inline constexpr double kLeadS = 0.05;

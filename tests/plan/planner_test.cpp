@@ -276,9 +276,9 @@ TEST(Planner, ContactsThatLastCallForWhatTheyDo) {
     return find_effects(play(stage.facts, events), 1.0);
   };
   EXPECT_EQ(touch({}, false), EffectSet{}) << "a body that lies still makes no sound";
-  EXPECT_TRUE(touch({.slip_m_s = {0.05, 0, 0}}, false).has(Effect::kRoughness));
-  EXPECT_TRUE(touch({.slip_m_s = {0.05, 0, 0}}, false).has(Effect::kModal));
-  EXPECT_FALSE(touch({.slip_m_s = {0.0005, 0, 0}}, false).has(Effect::kRoughness));
+  EXPECT_TRUE(touch({.slip_m_s = {0.05, 0, 0}, .other_sweep_m_s = 0.05}, false).has(Effect::kRoughness));
+  EXPECT_TRUE(touch({.slip_m_s = {0.05, 0, 0}, .other_sweep_m_s = 0.05}, false).has(Effect::kModal));
+  EXPECT_FALSE(touch({.slip_m_s = {0.0001, 0, 0}, .other_sweep_m_s = 0.0001}, false).has(Effect::kRoughness));
   EXPECT_TRUE(touch({.sweep_m_s = 0.3, .spin_rad_s = 10.0}, false).has(Effect::kRolling));
   EXPECT_FALSE(touch({.sweep_m_s = 0.3, .spin_rad_s = 10.0}, false).has(Effect::kRoughness));
   // A dashpot z adds z phi^2 / 2 to the decay d = 20 / s of a mode of phi = 1; e = sqrt(2e-5) of the decay can be told.
