@@ -71,9 +71,13 @@ double calc_level_db(double exposure_pa2_s) noexcept {
 }
 
 BankLevels::BankLevels(const bank::Bank& bank, double rate_hz) : bank_(&bank), highest_hz_(std::min(kHighestHz, 0.5 * rate_hz)) {
+  double lowest_hz = 0.0;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const double freq = bank.freq_hz(m), omega = 2.0 * pi * freq, d = bank.decay_per_s[m];
-    if (!(freq >= kLowestHz && freq < highest_hz_)) continue;
+    if (!(freq >= kLowestHz && freq < 0.5 * rate_hz)) continue;
+    if (pushed_.empty()) lowest_hz = freq;
+    pushed_.push_back({m, bank.radiation_gain[m] / (omega * omega)});
+    if (!(freq < highest_hz_)) continue;
     const double slow = d > omega ? d - std::sqrt((d - omega) * (d + omega)) : d;
     modes_.push_back({static_cast<int>(m), freq, std::max(slow, 1e-9), std::abs(bank.radiation_gain[m]), calc_a_weight(freq)});
   }
@@ -86,6 +90,13 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz) : bank_(&bank), h
     const double freq = kLowestHz * std::exp(step * (band + 0.5)), x = 2.0 * pi * freq * turn;
     const double transfer = gain * x / std::hypot(2.0 - x * x, 2.0 * x) * calc_a_weight(freq);
     click_.push_back({freq, 2.0 * transfer * transfer * freq * step});
+  }
+  const double top = std::min(highest_hz_, 0.7 * lowest_hz);
+  const double width = std::log(std::max(top / kLowestHz, 1.0)) / kBands;
+  for (int band = 0; band < kBands && width > 0.0; ++band) {
+    const double freq = kLowestHz * std::exp(width * (band + 0.5));
+    const double transfer = 2.0 * pi * freq * calc_a_weight(freq);
+    push_.push_back({freq, 2.0 * transfer * transfer * freq * width});
   }
 }
 
@@ -103,6 +114,25 @@ bool BankLevels::calc_projections(std::int32_t triangle, const stream::Vec3& bar
     projections[i] = std::abs(sum);
   }
   return true;
+}
+
+double BankLevels::calc_pushed_pa2_s(std::int32_t triangle, const stream::Vec3& barycentric, const stream::Vec3& impulse_n_s,
+                                     stream::PulseShape shape, double duration_s) const {
+  if (triangle < 0 || static_cast<std::size_t>(triangle) >= bank_->triangles.size()) return 0.0;
+  const auto& corners = bank_->triangles[static_cast<std::size_t>(triangle)];
+  double sum = 0.0;
+  for (const PushedMode& mode : pushed_) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const bank::Vec3 phi = bank_->shape_at(static_cast<std::size_t>(corners[corner]), mode.index);
+      sum += mode.gain_s2 * barycentric[corner] * (phi[0] * impulse_n_s[0] + phi[1] * impulse_n_s[1] + phi[2] * impulse_n_s[2]);
+    }
+  }
+  double exposure = 0.0;
+  for (const Band& band : push_) {
+    const double pulse = calc_pulse_spectrum(shape, band.freq_hz * duration_s);
+    exposure += band.pa2_s * pulse * pulse;
+  }
+  return exposure * sum * sum;
 }
 
 ClickLevels BankLevels::calc_click_levels(double impulse_n_s, stream::PulseShape shape, double duration_s) const {

@@ -53,6 +53,15 @@ class BankLevels {
   bool calc_projections(std::int32_t triangle, const stream::Vec3& barycentric, const stream::Vec3& direction,
                         std::vector<double>& projections) const;
 
+  /// A-weighted exposure at 1 m [Pa^2 s] of what a push moves below its lowest mode, where modes follow the force without ringing: their
+  /// pressure is the slope of the force times the sum of g (phi . J) / omega^2, from kLowestHz to 0.7 of the lowest. It is all that is
+  /// heard of modes beyond hearing. 0 when there is no such triangle.
+  double calc_pushed_pa2_s(std::int32_t triangle, const stream::Vec3& barycentric, const stream::Vec3& impulse_n_s,
+                           stream::PulseShape shape, double duration_s) const;
+
+  /// Whether there is any mode from kLowestHz to half the rate.
+  bool can_ring() const { return !pushed_.empty(); }
+
   /// The acceleration noise of an impulse [N s] at 1 m, on the side where it is loudest: a sphere of the outer volume and the mass
   /// (docs/decisions/acceleration-noise.md), from kLowestHz to the lower of kHighestHz and half the rate.
   ClickLevels calc_click_levels(double impulse_n_s, stream::PulseShape shape, double duration_s) const;
@@ -65,6 +74,12 @@ class BankLevels {
     double freq_hz, pa2_s;  // of a unit impulse without length
   };
   std::vector<Band> click_;
+  struct PushedMode {
+    std::size_t index = 0;
+    double gain_s2 = 0.0;  // over omega^2
+  };
+  std::vector<PushedMode> pushed_;
+  std::vector<Band> push_;  // of a unit sum
 };
 
 /// The modal sound of one strike, at 1 m, A-weighted.

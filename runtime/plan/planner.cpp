@@ -147,12 +147,12 @@ void Planner::State::find_possible(std::size_t number) {
     }
   }
   if (of.fixed && listener.is_still()) refuse(body, Effect::kDoppler, {.rule = Rule::kStill});
-  if (body.bank->get_modes().empty()) {
+  if (!body.bank->can_ring()) {
     for (const Effect effect : {Effect::kModal, Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) {
       refuse(body, effect, {.rule = Rule::kNoModes});
     }
   }
-  const bool silent = body.bank->get_modes().empty() && of.fixed;
+  const bool silent = !body.bank->can_ring() && of.fixed;
   if (silent || (!facts.moves && !of.struck)) {
     for_each_effect([&](Effect effect) {
       if (body.possible.has(effect)) refuse(body, effect, {.rule = silent ? Rule::kNoModes : Rule::kNotStruck});
@@ -220,7 +220,9 @@ void Planner::State::apply(const stream::Impulse& impulse) {
   const double distance = find_ways(body, impulse.time_s), spreading = 1.0 / (distance * distance);
   const ClickLevels click =
       of.fixed ? ClickLevels{} : body.bank->calc_click_levels(calc_norm(impulse.impulse_n_s), impulse.shape, impulse.duration_s);
-  const double heard = levels.modal_pa2_s * spreading, clicked = click.pa2_s * spreading;
+  const double pushed =
+      body.bank->calc_pushed_pa2_s(impulse.triangle, impulse.barycentric, impulse.impulse_n_s, impulse.shape, impulse.duration_s);
+  const double heard = (levels.modal_pa2_s + pushed) * spreading, clicked = click.pa2_s * spreading;
   loudest_pa2_s = std::max(loudest_pa2_s, heard + clicked);
   body.ring_pa2_s = std::max(heard, body.ring_pa2_s * std::pow(10.0, -6.0 * std::max(0.0, impulse.time_s - body.ring_s)));
   body.ring_s = impulse.time_s;
@@ -233,7 +235,8 @@ void Planner::State::apply(const stream::Impulse& impulse) {
   double end_s = kNever;
   if (modal_db > limit_db) {
     // Each mode until its part of what is just not heard is all that is left of it.
-    const double quiet_pa = kReferencePa * std::pow(10.0, limit_db / 20.0) * distance / std::sqrt(static_cast<double>(amplitude_pa.size()));
+    const double quiet_pa =
+        kReferencePa * std::pow(10.0, limit_db / 20.0) * distance / std::sqrt(std::max(1.0, static_cast<double>(amplitude_pa.size())));
     double rung_s = 0.0;
     const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
     for (std::size_t m = 0; m < modes.size(); ++m) {
@@ -248,7 +251,11 @@ void Planner::State::apply(const stream::Impulse& impulse) {
     end_s = std::max(end_s, impulse.time_s + half_s);
     body.plan.effects[index(Effect::kModal)].cost_us +=
         1e-3 * (rung_s * facts.rate_hz * costs.mode_sample_ns + static_cast<double>(modes.size()) * costs.strike_mode_ns);
-    call(body, Effect::kModal, 1.0 + heard, end_s + travel_s, {.rule = Rule::kHeard, .value = modal_db, .distance_m = distance});
+    const double share = weigh(heard);
+    const bool counts = share > kTellableShare || of.wish.off.has(Effect::kAccelerationNoise);
+    call(body, Effect::kModal, counts ? 1.0 + heard : share, end_s + travel_s,
+         counts ? Reason{.rule = Rule::kHeard, .value = modal_db, .distance_m = distance}
+                : Reason{.rule = Rule::kChange, .value = to_db(share), .limit = to_db(kTellableShare)});
     if (levels.mean_hz > body.mean_hz) body.mean_hz = levels.mean_hz;
   } else {
     call(body, Effect::kModal, 0.0, kNever, {.rule = Rule::kTooQuiet, .value = modal_db, .limit = limit_db});
@@ -478,7 +485,7 @@ BodyPlan Planner::get_plan(int number) const {
 
 double Planner::calc_silence_pa(int number) const {
   constexpr double kStandardPa = 1e-10;  // of VoiceOptions
-  constexpr double kMargin = 0.25;       // of what is not heard: bodies come nearer, and modes add up
+  constexpr double kMargin = 0.5;        // of what is not heard: bodies come nearer, and modes add up
   const State::Body& body = state_->bodies.at(static_cast<std::size_t>(number));
   if (!(state_->loudest_pa2_s > 0.0)) return kStandardPa;
   const double quiet_pa = kReferencePa * std::pow(10.0, state_->calc_inaudible_db() / 20.0);
@@ -496,7 +503,7 @@ std::string describe(const Reason& r) {
     case Rule::kNotStruck:
       return "nothing happens to the body";
     case Rule::kNoModes:
-      return "no mode between 20 Hz and 20 kHz";
+      return "no mode between 20 Hz and half the sample rate";
     case Rule::kTooQuiet:
       return fmt::format("{:.1f} dB(A), below {:.1f} dB(A) nobody hears it", r.value, r.limit);
     case Rule::kHeard:

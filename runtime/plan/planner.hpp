@@ -34,9 +34,10 @@ inline constexpr double kTellableShare = 1e-5;
 /// (Jesteadt, Wier & Green 1977).
 inline constexpr double kThumpHz = 300.0;
 inline constexpr double kThumpShare = 0.259;
-/// Not heard: 20 dB below the reference of hearing, and at least 90 dB below the loudest strike so far.
-inline constexpr double kInaudibleDb = -20.0;
-inline constexpr double kBelowLoudestDb = 90.0;
+/// Not heard: what is below 0 dB(A), the threshold of the best ears (ISO 389-7 has -6 dB at its lowest, 2.4 dB at 1 kHz), and 70 dB below
+/// the loudest strike so far as well, since files are played louder than life: at 90 dB(A) that is 20 dB(A), less than a quiet room has.
+inline constexpr double kInaudibleDb = 0.0;
+inline constexpr double kBelowLoudestDb = 70.0;
 /// Slower than this nothing slides or rolls: synth::ContactForces gives no force then.
 inline constexpr double kCreepMs = 2e-4;
 /// An effect is on this long before it is needed, so that a change that is still on its way to the ears is over; and stays on for so long
