@@ -75,17 +75,8 @@ std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank:
   return courses;
 }
 
-/// What of its effects a body can have: nothing pushes one that is fixed, only one that is touched needs what contacts do, and microphones
-/// stay where they are put.
-synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects, const BodyCourse& course) {
-  if (!course.is_played) return {};
-  if (!course.is_touched) effects = effects.without({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping});
-  if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
-  if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
-  return effects;
-}
-
-/// The changes of a plan, made when their time has come.
+/// The changes of a plan, made when their time has come. A body to which nothing happens has no effects, one that no contact touches for
+/// long none of those of contacts.
 class Changes {
  public:
   Changes(const Scene& scene, const std::vector<BodyCourse>& courses, const Plan* plan) : scene_(&scene), courses_(&courses) {
@@ -115,7 +106,10 @@ class Changes {
  private:
   static bool is_of(const plan::Change& change, std::size_t body) { return static_cast<std::size_t>(change.body) == body; }
   synth::EffectSet find(std::size_t body, synth::EffectSet effects) const {
-    return find_effects(*scene_, body, effects, (*courses_)[body]);
+    const BodyCourse& course = (*courses_)[body];
+    if (!course.is_played) return {};
+    if (!course.is_touched) effects = effects.without({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping});
+    return find_effects(*scene_, body, effects);
   }
 
   const Scene* scene_;
@@ -128,15 +122,6 @@ class Changes {
 double find_silence_pa(const Scene& scene, std::size_t body, const Plan* plan) {
   const bool is_planned = plan != nullptr && scene.bodies[body].wish.automatic && !scene.bodies[body].wish.on.has(Effect::kModal);
   return is_planned ? plan->planner.calc_silence_pa(static_cast<int>(body)) : synth::BodySettings{}.silence_pa;
-}
-
-synth::Surface make_ground(const Scene& scene) {
-  synth::Surface surface = synth::kGroundSurface;
-  if (!scene.ground) return surface;
-  surface.roughness_m = scene.ground->roughness_m;
-  surface.friction = scene.ground->friction;
-  surface.modulus_pa = scene.ground->young_modulus_pa / (1.0 - scene.ground->poisson_ratio * scene.ground->poisson_ratio);
-  return surface;
 }
 
 /// How far the microphones ever get from where the first of them starts.
@@ -237,6 +222,21 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   }
   sound.seconds_cpu = get_cpu_seconds() - started;
   return sound;
+}
+
+synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects) {
+  if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
+  if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
+  return effects;
+}
+
+synth::Surface make_ground(const Scene& scene) {
+  synth::Surface surface = synth::kGroundSurface;
+  if (!scene.ground) return surface;
+  surface.roughness_m = scene.ground->roughness_m;
+  surface.friction = scene.ground->friction;
+  surface.modulus_pa = scene.ground->young_modulus_pa / (1.0 - scene.ground->poisson_ratio * scene.ground->poisson_ratio);
+  return surface;
 }
 
 double calc_peak_pa(const Sound& sound) {

@@ -45,6 +45,12 @@ struct RenderOptions {
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
                  const RenderOptions& options);
 
+/// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put.
+synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects);
+
+/// The ground as those feel it who slide on it.
+synth::Surface make_ground(const Scene& scene);
+
 /// Largest absolute pressure of all channels [Pa].
 double calc_peak_pa(const Sound& sound);
 

@@ -19,10 +19,13 @@
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
+#include "runtime/host/planning.hpp"
 #include "runtime/host/pose.hpp"
+#include "runtime/host/render.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/host/strikes.hpp"
 #include "runtime/live/device.hpp"
+#include "runtime/radiation/gains.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/synthesiser.hpp"
@@ -30,17 +33,23 @@
 namespace carillon::live {
 namespace {
 
-constexpr double kSliceS = 0.01;  // of CPU time for physics, between two looks at the ring
+constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
+constexpr double kChangeS = 0.03;  // by which a change of effects is sent before the events that call for it
+/// Physics must be known so far ahead that the planner can decide.
+constexpr double kPlanningS = plan::kLeadS + plan::kTickS + kChangeS;
 
 /// Physics and strikes of a scene as one stream, in order of time.
 class Course {
  public:
-  Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks) : strikes_(host::make_impulses(scene, banks)) {
+  /// The planner watches what is to be played as soon as it is known.
+  Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks, plan::Planner& planner)
+      : strikes_(host::make_impulses(scene, banks)), planner_(&planner) {
     std::stable_sort(strikes_.begin(), strikes_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+    for (const stream::Impulse& strike : strikes_) planner.watch(strike);
     if (!host::has_physics(scene)) return;
     try {
-      world_ = std::make_unique<contact::World>(host::make_world(scene),
-                                                contact::WorldOptions{.end_s = scene.duration_s, .lasting_contacts = false});
+      world_ = std::make_unique<contact::World>(
+          host::make_world(scene), contact::WorldOptions{.end_s = scene.duration_s, .lasting_contacts = planner.needs_contacts()});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     }
@@ -50,7 +59,10 @@ class Course {
   /// Goes on towards a time, for a slice of CPU time.
   void advance(double until_s) {
     if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return;
-    time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) { waiting_.push_back(event); });
+    time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) {
+      waiting_.push_back(event);
+      planner_->watch(event);
+    });
   }
   /// Up to where it is known what happens.
   double get_time_s() const { return world_ == nullptr || time_s_ >= end_s_ ? std::numeric_limits<double>::infinity() : time_s_; }
@@ -74,6 +86,7 @@ class Course {
 
  private:
   std::vector<stream::Impulse> strikes_;
+  plan::Planner* planner_;
   std::size_t next_ = 0;
   std::unique_ptr<contact::World> world_;
   std::deque<stream::Event> waiting_;
@@ -112,26 +125,46 @@ void play(const PlayerOptions& options) {
                                   .listener_m = microphones.centre.find(0.0).position_m,
                                   .max_bodies = static_cast<int>(scene.bodies.size()),
                                   .max_waypoints = 1024,
-                                  .ring_events = 1 << 14});
+                                  .ring_events = 1 << 14,
+                                  .ground = host::make_ground(scene)});
   synthesiser.set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
+  plan::Planner planner(host::make_facts(scene, microphones, host::has_physics(scene)));
+  const bool plans = options.look_ahead_s >= kPlanningS;
   std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
-  for (const host::SceneBody& body : scene.bodies) {
-    auto& model = models[body.spec.bank];
-    if (model == nullptr) model = synth::Model::make(*body.spec.bank, {.rate_hz = rate_hz});
-    synthesiser.add_body(model, {.position_m = host::calc_world_point(body.spec.initial, body.spec.bank->rigid.centre_m)});
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const contact::BodySpec& spec = scene.bodies[i].spec;
+    auto& model = models[spec.bank];
+    if (model == nullptr)
+      model = synth::Model::make(*spec.bank, {.rate_hz = rate_hz, .sphere_radius_m = radiation::calc_sphere_radius_m(*spec.bank)});
+    // Without time to plan a body has all that it might call for.
+    const synth::EffectSet effects = plans ? synth::EffectSet{} : planner.get_possible(static_cast<int>(i));
+    synthesiser.add_body(model, {.position_m = host::calc_world_point(spec.initial, spec.bank->rigid.centre_m),
+                                 .rotation = spec.initial.rotation,
+                                 .effects = host::find_effects(scene, i, effects),
+                                 .surface = {.roughness_m = spec.roughness_m, .friction = spec.friction}});
   }
-  Course course(scene, body_banks);
+  Course course(scene, body_banks, planner);
+  const auto change_effects = [&](double known_s) {
+    if (!plans) return;
+    synthesiser.collect();
+    for (const plan::Change& change : planner.advance(known_s)) {
+      synthesiser.set_effects(change.body, host::find_effects(scene, static_cast<std::size_t>(change.body), change.effects));
+    }
+  };
+  const double hold_back_s = plans ? kChangeS : 0.0;
   Walk walk(microphones.centre);
   Device device(synthesiser, {.name = options.device, .rate_hz = rate_hz, .frames = options.frames});
   while (course.get_time_s() < options.look_ahead_s) course.advance(options.look_ahead_s);
-  course.hand_on(options.look_ahead_s, synthesiser);
+  change_effects(options.look_ahead_s);
+  course.hand_on(options.look_ahead_s - hold_back_s, synthesiser);
   walk.hand_on(options.look_ahead_s, synthesiser);
   device.start();
   synth::LoadKeeper keeper;
   for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
     const double until = now + options.look_ahead_s;
     course.advance(until);
-    course.hand_on(until, synthesiser);
+    change_effects(std::min(course.get_time_s(), until));
+    course.hand_on(until - hold_back_s, synthesiser);
     walk.hand_on(until, synthesiser);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
     if (course.get_time_s() >= until) std::this_thread::sleep_for(std::chrono::milliseconds(2));

@@ -40,7 +40,7 @@ LAW = {
     "runtime/abi": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth"], []),
     "runtime/contact": (["runtime/config", "runtime/bank", "runtime/stream"], ["fmt", "simbody"]),
     "runtime/host": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
-    "runtime/live": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/synth", "runtime/plan", "runtime/contact", "runtime/host"], ["fmt", "cli", "portaudio"]),
+    "runtime/live": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact", "runtime/host"], ["fmt", "cli", "portaudio"]),
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
