@@ -62,6 +62,11 @@ struct Planner::State {
     std::array<double, synth::kEffectCount> share{};  // the loudest call so far
     std::array<Reason, synth::kEffectCount> reason;   // of that call
     std::array<Reason, synth::kEffectCount> call;     // of the last one
+    struct Lasting {
+      std::uint64_t id = 0;
+      double share = 0.0;  // of its damping, were all modes sounding
+    };
+    std::vector<Lasting> lasting;  // contacts that have not ended; of those that lie still no records come
     EffectSet now;
     bool decided = false;
     BodyPlan plan;
@@ -97,6 +102,7 @@ struct Planner::State {
   void apply(const Pending& pending);
   void apply(const stream::Impulse& impulse);
   void apply(const stream::Contact& contact);
+  void damp(Body& body, double share, double time_s);
   EffectSet decide(const BodyFacts& of, Body& body, double time_s) const;
   void add_costs(Body& body);
 };
@@ -291,6 +297,7 @@ void Planner::State::apply(const stream::Impulse& impulse) {
 
 void Planner::State::apply(const stream::Contact& contact) {
   Body& body = bodies[static_cast<std::size_t>(contact.body)];
+  std::erase_if(body.lasting, [&](const Body::Lasting& one) { return one.id == contact.id; });
   if (contact.state == stream::ContactState::kEnd) return;
   const double slip = calc_norm(contact.slip_m_s);
   const double sweep = std::max(contact.sweep_m_s, contact.other_sweep_m_s);
@@ -310,17 +317,23 @@ void Planner::State::apply(const stream::Contact& contact) {
     if (body.mean_hz == 0.0) body.mean_hz = 4000.0;  // where a mean frequency is not known the ear is at its best
     look(body, contact.time_s);
   }
-  if (contact.time_s > body.sounds_until_s || !(contact.impedance_n_s_m > 0.0)) return;
+  if (!(contact.impedance_n_s_m > 0.0) || !body.possible.has(Effect::kContactDamping)) return;
   // A dashpot z at the point adds z (phi . n)^2 / 2 to a decay; a decay that is wrong by the part e changes an exposure by e^2 / 2.
   if (!body.bank->calc_projections(contact.triangle, contact.barycentric, contact.normal, projection)) return;
-  double most = 0.0;
+  double most = 0.0, sounding = 0.0;
   const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
   for (std::size_t m = 0; m < modes.size(); ++m) {
-    if (!slides && !rolls && body.quiet_s[m] < contact.time_s) continue;
-    most = std::max(most, 0.5 * contact.impedance_n_s_m * projection[m] * projection[m] / modes[m].decay_per_s);
+    const double part = 0.5 * contact.impedance_n_s_m * projection[m] * projection[m] / modes[m].decay_per_s;
+    most = std::max(most, part);
+    if (slides || rolls || body.quiet_s[m] >= contact.time_s) sounding = std::max(sounding, part);
   }
-  const double share = std::min(1.0, 0.5 * most * most);
-  call(body, Effect::kContactDamping, share, contact.time_s,
+  const auto calc_share = [](double part) { return std::min(1.0, 0.5 * part * part); };
+  body.lasting.push_back({contact.id, calc_share(most)});
+  if (contact.time_s <= body.sounds_until_s) damp(body, calc_share(sounding), contact.time_s);
+}
+
+void Planner::State::damp(Body& body, double share, double time_s) {
+  call(body, Effect::kContactDamping, share, time_s,
        {.rule = Rule::kChange, .value = 10.0 * std::log10(std::max(share, 1e-30)), .limit = 10.0 * std::log10(kTellableShare)});
 }
 
@@ -426,6 +439,9 @@ std::vector<Change> Planner::advance(double known_s) {
     for (std::size_t i = 0; i < s.bodies.size(); ++i) {
       State::Body& body = s.bodies[i];
       if (!s.listener.is_still()) s.look(body, seen_s);
+      if (seen_s <= body.sounds_until_s) {
+        for (const State::Body::Lasting& one : body.lasting) s.damp(body, one.share, seen_s);
+      }
       const BodyFacts& of = s.facts.bodies[i];
       const EffectSet set = s.decide(of, body, time_s);
       if (set != body.now || !body.decided) {

@@ -172,6 +172,50 @@ class RenderProgram(unittest.TestCase):
         self.assertLess(ratio, 0.01 * 2 * (1 + 0.07 * 3.5) * a.sum())
         self.assert_refused(render(self.scene("kind.json", radiation="sfere"), "-o", self.root / "x.wav"), 2, "radiation", "sphere")
 
+    def test_a_plan_says_what_every_body_calls_for_and_makes_no_sound(self):
+        bodies = [{"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.15], "rotation_deg": [20, 30, 0]},
+                  {"name": "shelf", "bank": "cube.h5", "fixed": True, "position_m": [3, 0, 0.5], "effects": {"on": ["acceleration_noise"]}}]
+        scene = self.scene("plan.json", bodies=bodies)
+        run = render(scene, "--plan", "-q")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        rows = {}
+        for line in run.stdout.splitlines():
+            if not line.startswith(" "):
+                name = line.split(",")[0].split(":")[0]
+            else:
+                rows[name, line.split()[0]] = line
+        for effect, words in {"modal": "heard with", "doppler": "changes while it sounds", "hertz_pulse": "would differ by"}.items():
+            self.assertIn(words, rows["cube", effect])
+            self.assertRegex(rows["cube", effect], r"^  \w+ +on ")
+        for body, effect, words in (("cube", "rolling", "mm/s"), ("shelf", "modal", "nothing happens"), ("shelf", "doppler", "neither the body nor the listener moves"),
+                                    ("shelf", "acceleration_noise", "the scene says so")):
+            self.assertIn(words, rows[body, effect])
+        self.assert_refused(render(scene, "--plan", "-o", self.root / "x.wav"), 2, "--plan", "no sound")
+        run = render(scene)
+        self.assertEqual(run.returncode, 2)
+        self.assertIn("--output is required", run.stderr)
+        self.assertFalse((self.root / "x.wav").exists())
+
+    def test_what_is_off_has_done_nothing(self):
+        bodies = [{"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.15], "rotation_deg": [20, 30, 0]},
+                  {"name": "far", "bank": "cube.h5", "fixed": True, "position_m": [5, 0, 3]}]
+        scene = self.scene("off.json", bodies=bodies, effects={"off": ["doppler", "acceleration_noise", "contact_damping"]})
+        run = render(scene, "-o", self.root / "off.wav", "--report", self.root / "off-report.json", "-q")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        report = json.loads((self.root / "off-report.json").read_text())
+        on = 0
+        for body in report["per_body"]:
+            self.assertEqual(len(body["effects"]), 9)
+            for name, effect in body["effects"].items():
+                if effect["on_s"] == 0.0:
+                    self.assertEqual((effect["units"], effect["measured_us_per_s"]), (0, 0), f"{body['name']} {name}")
+                on += effect["on_s"] > 0.0 and effect["units"] > 0
+        self.assertGreaterEqual(on, 3)
+        cube, far = (body["effects"] for body in report["per_body"])
+        self.assertEqual([far[name]["on_s"] for name in far], [0.0] * 9)
+        self.assertEqual(cube["doppler"]["why"], "the scene says so")
+        self.assertTrue(any(change["effect"] == "modal" and change["on"] for change in report["changes"]))
+
     def test_every_microphone_has_its_channel_and_walks_and_effects_are_played(self):
         for name, channels in (("microphones", 5), ("walk", 2)):
             (self.root / f"{name}.json").write_text((SOURCE / f"tests/host/scenes/{name}.json").read_text())

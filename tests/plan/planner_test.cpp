@@ -288,6 +288,22 @@ TEST(Planner, ContactsThatLastCallForWhatTheyDo) {
   EXPECT_FALSE(touch({.impedance_n_s_m = 1e3}, false).has(Effect::kContactDamping)) << "of a body that is silent";
 }
 
+TEST(Planner, WhatLiesDampsUntilItIsLifted) {
+  // Of a contact at rest no more records come; it damps all the same, until its end.
+  Stage stage;
+  stage.facts.moves = true;
+  stage.body().fixed = false;
+  stream::Contact contact{
+      .time_s = 0.5, .id = 7, .triangle = 3, .normal = {0, 0, 1}, .force_n = 2.0, .patch_radius_m = 1e-4, .impedance_n_s_m = 5.0};
+  std::vector<stream::Event> events{make_strike(0.4, 3.0), contact};
+  EXPECT_TRUE(find_effects(play(stage.facts, events), 1.0).has(Effect::kContactDamping));
+  contact.time_s = 0.6;
+  contact.state = stream::ContactState::kEnd;
+  events.emplace_back(contact);
+  EXPECT_TRUE(find_effects(play(stage.facts, events), 0.6).has(Effect::kContactDamping));
+  EXPECT_FALSE(find_effects(play(stage.facts, events), 1.0).has(Effect::kContactDamping));
+}
+
 TEST(Planner, ADecayThatIsALittleWrongChangesTheSoundAsTheRuleSays) {
   // The exposure of e^{-t} - e^{-(1 + e) t} against that of e^{-t}: e^2 / 2.
   const double e = 0.01;
