@@ -66,7 +66,8 @@ void Budget::decide() noexcept {
   for (last_bin_ = kBins - 1; last_bin_ > 0 && count_[static_cast<std::size_t>(last_bin_)] <= last_room_; --last_bin_)
     last_room_ -= count_[static_cast<std::size_t>(last_bin_)];
   constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
-  threshold_pa_ = std::bit_cast<float>(last_bin_ << kShift);
+  // Where only first groups ring there is nothing to choose among, and no reason to let strikes wake more.
+  threshold_pa_ = std::max(kRelease * threshold_pa_, std::bit_cast<float>(last_bin_ << kShift));
 }
 
 int Budget::find_limit(std::span<const float> bounds_pa) noexcept {
