@@ -32,7 +32,6 @@ inline F fma(F a, F b, F c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
 inline F less(F c, F a, F b) { return {_mm256_fnmadd_ps(a.v, b.v, c.v)}; }  // c - a b
 
 struct D {
-  static constexpr int kWidth = 8;
   __m256d lo, hi;
   static D load(const double* at) { return {_mm256_loadu_pd(at), _mm256_loadu_pd(at + 4)}; }
   static D all(double x) { return {_mm256_set1_pd(x), _mm256_set1_pd(x)}; }

@@ -33,7 +33,6 @@ inline F fma(F a, F b, F c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
 inline F less(F c, F a, F b) { return {_mm512_fnmadd_ps(a.v, b.v, c.v)}; }  // c - a b
 
 struct D {
-  static constexpr int kWidth = 16;
   __m512d lo, hi;
   static D load(const double* at) { return {_mm512_loadu_pd(at), _mm512_loadu_pd(at + 8)}; }
   static D all(double x) { return {_mm512_set1_pd(x), _mm512_set1_pd(x)}; }

@@ -24,7 +24,6 @@ inline F fma(F a, F b, F c) { return {a.v * b.v + c.v}; }
 inline F less(F c, F a, F b) { return {c.v - a.v * b.v}; }  // c - a b
 
 struct D {
-  static constexpr int kWidth = 1;
   double v;
   static D load(const double* at) { return {*at}; }
   static D all(double x) { return {x}; }

@@ -31,7 +31,6 @@ inline F fma(F a, F b, F c) { return {_mm_add_ps(_mm_mul_ps(a.v, b.v), c.v)}; }
 inline F less(F c, F a, F b) { return {_mm_sub_ps(c.v, _mm_mul_ps(a.v, b.v))}; }  // c - a b
 
 struct D {
-  static constexpr int kWidth = 4;
   __m128d lo, hi;
   static D load(const double* at) { return {_mm_loadu_pd(at), _mm_loadu_pd(at + 2)}; }
   static D all(double x) { return {_mm_set1_pd(x), _mm_set1_pd(x)}; }
