@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/contact/resting.hpp"
+
 namespace carillon::contact {
 namespace {
 
@@ -104,14 +106,19 @@ void record(const Engine& engine, const Snapshot& now, const Group& g, Spot& spo
   }
   spot.recorded_s = now.time_s;
   const Point va = calc_velocity(now, g.a, g.where), vb = calc_velocity(now, g.b, g.where), u = va - vb;
-  const Point slip = u - dot(u, g.normal) * g.normal;
+  Point slip = u - dot(u, g.normal) * g.normal;
+  // Below kCreep friction holds: what is left there is the engine's creep and no slip. Above, without a jump.
+  const Point creep = std::min(1.0, kCreep * kCreep / std::max(dot(slip, slip), 1e-30)) * slip;
+  slip -= creep;
+  // How much of the place's speed is that of b's surface: the creep belongs to the sweep over the other one.
+  const double share = dot(u, u) > 0.0 ? std::clamp(dot(va - g.carried, u) / dot(u, u), 0.0, 1.0) : 0.0;
   Point turn = now.mobiles[g.a].spin - (g.b >= 0 ? now.mobiles[g.b].spin : Point(0));
   turn -= dot(turn, g.normal) * g.normal;
   const auto calc_sweep = [&](const Point& surface) {
-    const Point w = spot.velocity - surface;
+    const Point w = g.carried + spot.drift - surface;
     return (w - dot(w, g.normal) * g.normal).norm();
   };
-  const double sweep_a = calc_sweep(va), sweep_b = calc_sweep(vb);
+  const double sweep_a = calc_sweep(va - share * creep), sweep_b = calc_sweep(vb + (1.0 - share) * creep);
   const double patch = calc_patch(engine, g, spot.radius_m, g.push_n);
   for (const int side : {0, 1}) {
     const int body = side == 0 ? g.a : g.b, other = side == 0 ? g.b : g.a;
@@ -172,7 +179,6 @@ void LastingContacts::update(const Engine& engine, const std::vector<int>& membe
       spot.a = g.a;
       spot.b = g.b;
       spot.where = g.where;
-      spot.velocity = g.carried;
       spot.features = g.features;
       spot.quiet_s = spot.seen_s = now.time_s;
       spots_.push_back(spot);
@@ -181,7 +187,7 @@ void LastingContacts::update(const Engine& engine, const std::vector<int>& membe
     Spot& spot = *nearest;
     const double dt = now.time_s - spot.seen_s;
     const Point velocity = spot.features == g.features ? g.carried : Point((g.where - spot.where) / dt);
-    spot.velocity += dt / (dt + kSmooth) * (velocity - spot.velocity);
+    spot.drift += dt / (dt + kSmooth) * (velocity - g.carried - spot.drift);
     spot.where = g.where;
     spot.features = g.features;
     spot.seen_s = now.time_s;

@@ -17,7 +17,7 @@ struct Spot {
   std::uint64_t id = 0;
   int a = 0, b = -1;
   SimTK::Vec3 where{0};
-  SimTK::Vec3 velocity{0};                   // of the place itself, smoothed
+  SimTK::Vec3 drift{0};                      // velocity of the place over the surface whose corners carry, smoothed
   std::vector<std::array<int, 3>> features;  // that carry there
   double quiet_s = 0.0;                      // time of the first touch, or of the last impact since
   double seen_s = 0.0;                       // when it last touched

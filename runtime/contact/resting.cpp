@@ -12,7 +12,6 @@ namespace carillon::contact {
 namespace {
 
 constexpr double kFullDepth = 4e-6;  // m; a fifth of the depth under the body's own weight
-constexpr double kCreep = 2e-3;      // m/s
 constexpr double kSlowSpin = 0.05;   // rad/s; below this the rolling resistance fades
 
 }  // namespace

@@ -9,6 +9,8 @@
 
 namespace carillon::contact {
 
+constexpr double kCreep = 2e-3;  // m/s; slower than this what friction holds may creep
+
 /// One point that rests, with the stiffness of its share of the contact.
 struct RestingPoint {
   TouchPoint touch;
