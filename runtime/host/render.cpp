@@ -225,6 +225,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
 }
 
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects) {
+  effects = effects.common(synth::kCompiledEffects);
   if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
   return effects;

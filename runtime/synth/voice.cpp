@@ -17,6 +17,8 @@
 namespace carillon::synth {
 namespace {
 
+/// Whether this build has any effect of contacts that last.
+constexpr bool kHasContacts = !kCompiledEffects.common({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}).is_empty();
 constexpr std::int64_t kCullEvery = 8;  // periods
 
 bool is_finite(const stream::Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
@@ -104,9 +106,9 @@ void Voice::render(int quanta) noexcept {
     cut_ = groups_;
     if (start / kPeriod % kCullEvery == 0 && is_awake()) cull();
   }
-  silent_ = !is_awake() && !fading_ && pulses_.empty() && (contacts_ == nullptr || contacts_->is_resting());
+  silent_ = !is_awake() && !fading_ && pulses_.empty() && (!kHasContacts || contacts_ == nullptr || contacts_->is_resting());
   if (silent_) return;
-  const bool touched = contacts_ != nullptr && !contacts_->is_idle();
+  const bool touched = kHasContacts && contacts_ != nullptr && !contacts_->is_idle();
   std::fill(block_.begin(), block_.begin() + rendered_, 0.0F);
   bool struck_at_all = false;
   for (int q = 0; q < quanta; ++q) struck_at_all = struck_at_all || is_struck(start + q * kQuantum);

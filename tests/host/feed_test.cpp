@@ -1,0 +1,98 @@
+#include "runtime/host/feed.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tests/synth/cube_bank.hpp"
+
+namespace carillon::host {
+namespace {
+
+constexpr double kRate = 48000.0;
+
+stream::Impulse make_impulse(std::int32_t body, double time_s, double duration_s = 1e-3) {
+  return {.time_s = time_s, .body = body, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = duration_s};
+}
+
+void play(synth::Synthesiser& synthesiser, Feed& feed, double until_s) {
+  std::array<float, synth::kPeriod> left{}, right{};
+  const std::array<float*, 2> out{left.data(), right.data()};
+  for (int period = 0; period * synth::kPeriod < until_s * kRate; ++period) {
+    feed.hand_on((period + 1) * synth::kPeriod / kRate, synthesiser);
+    synthesiser.process(out.data(), 2, synth::kPeriod);
+  }
+}
+
+// Thousands of events at once go through a ring of four; a strike is never late, a body that moves is never refused.
+TEST(Feed, HandsOnMoreThanTheRingHolds) {
+  const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 20.0}}), {.rate_hz = kRate});
+  synth::Synthesiser synthesiser({.rate_hz = kRate, .max_strikes = 3000, .ring_events = 4});
+  std::vector<stream::Event> events;
+  for (int b = 0; b < 3; ++b) {
+    synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
+    for (int i = 0; i < 50; ++i) events.emplace_back(stream::Motion{2e-3 * i, b, {1e-3 * i, 1.0, 0.0}, {0.5, 0.0, 0.0}});
+    for (int i = 0; i < 700; ++i) events.emplace_back(make_impulse(b, 0.03));
+    for (int i = 0; i < 100; ++i) events.emplace_back(make_impulse(b, 0.01 + 5e-4 * i, 0.01));
+  }
+  events.emplace_back(make_impulse(3, 0.01));  // of nobody
+  events.emplace_back(make_impulse(-1, 0.01));
+  events.emplace_back(make_impulse(1, std::numeric_limits<double>::quiet_NaN()));
+  Feed feed(events, {{.number = 0, .moves = true}, {.number = 1, .moves = true}, {.number = 2, .moves = true}}, {});
+  play(synthesiser, feed, 0.2);
+  const synth::SynthesiserCounters counters = synthesiser.get_counters();
+  EXPECT_EQ(counters.overflows, 0);
+  EXPECT_EQ(counters.strikes, 3 * 800);
+  EXPECT_EQ(counters.late, 0);
+  EXPECT_EQ(counters.refused, 0);
+  EXPECT_EQ(counters.faults, 1);
+}
+
+// A body whose sound needs a second to arrive, with a waypoint a millisecond: the synthesiser must remember a second of them, and no more.
+TEST(Feed, KnowsHowManyWaypointsAreUnderWay) {
+  std::vector<stream::Event> events;
+  for (int i = 0; i < 5000; ++i) events.emplace_back(stream::Motion{1e-3 * i, 0, {0.0, 343.0, 0.0}, {}});
+  events.emplace_back(stream::Motion{0.5, 1, {}, {}});
+  const std::vector<stream::Listener> walk{{.time_s = 0.0}, {.time_s = 1.0}, {.time_s = 2.0}};
+  const Feed feed(events, {{.number = 0, .moves = true}, {.number = 1, .moves = true}}, walk);
+  EXPECT_GE(feed.count_waypoints(0, 1.0), 1002);
+  EXPECT_LE(feed.count_waypoints(0, 1.0), 1200);
+  EXPECT_LE(feed.count_waypoints(0, 0.0), 200);
+  EXPECT_LE(feed.count_waypoints(1, 1.0), 5);
+  EXPECT_LE(feed.count_waypoints(-1, 0.0), 6);
+}
+
+// With as many waypoints as the feed says, a body that circles far away sounds as with all of them.
+TEST(Feed, SoManyWaypointsAreEnough) {
+  const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 0.5}}), {.rate_hz = kRate});
+  std::vector<stream::Event> events;
+  for (int i = 0; i < 1500; ++i) {
+    const double t = 1e-3 * i;
+    events.emplace_back(
+        stream::Motion{t, 0, {3.0 * std::cos(t), 100.0 + 3.0 * std::sin(t), 0.0}, {-3.0 * std::sin(t), 3.0 * std::cos(t), 0.0}});
+  }
+  for (int i = 0; i < 20; ++i) events.emplace_back(make_impulse(0, 0.05 + 0.06 * i));
+  const auto render = [&](int waypoints) {
+    Feed feed(events, {{.number = 0, .moves = true}}, {});
+    synth::Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{}}});
+    synthesiser.add_body(model, {.position_m = {3.0, 100.0, 0.0},
+                                 .longest_m = 110.0,
+                                 .max_waypoints = waypoints > 0 ? waypoints : feed.count_waypoints(0, 110.0 / 343.0)});
+    std::vector<float> sound(72000);
+    for (std::size_t at = 0; at + synth::kPeriod <= sound.size(); at += synth::kPeriod) {
+      feed.hand_on(static_cast<double>(at + synth::kPeriod) / kRate, synthesiser);
+      float* out = sound.data() + at;
+      synthesiser.process(&out, 1, synth::kPeriod);
+    }
+    return sound;
+  };
+  const std::vector<float> all = render(10000);
+  EXPECT_EQ(render(0), all);
+  EXPECT_NE(render(300), all);
+}
+
+}  // namespace
+}  // namespace carillon::host
