@@ -351,6 +351,35 @@ TEST(BodyEffects, ContactsThatLastAreHeardAsTheirForcesSay) {
   EXPECT_EQ(counters.bytes[Effect::kRolling], 0);
 }
 
+TEST(BodyEffects, ContactsWithAnotherBodyTouchItsSurface) {
+  // What is heard depends on the other body's roughness, and goes on when the model changes.
+  const std::vector<testing::InventedMode> modes{{420.0, 6.0}, {1370.0, 9.0}, {5200.0, 20.0}};
+  const auto model = make_model(modes);
+  const auto hear = [&](double other_m, bool swaps) {
+    Synthesiser synthesiser({.rate_hz = kRate});
+    const int body = synthesiser.add_body(model, {.position_m = {0.0, 2.0, 0.0}, .effects = kTouching});
+    const int other = synthesiser.add_body(model, {.effects = {}, .surface = {.roughness_m = other_m}});
+    std::vector<float> heard(24000), right(24000);
+    for (stream::Contact record : make_slide(body, 0.5)) {
+      record.other = other;
+      synthesiser.push(record);
+    }
+    synthesiser.push(stream::Mark{0.5});
+    for (int n = 0; n < 24000; n += 480) {
+      if (swaps && n == 12000) synthesiser.swap_model(body, make_model(modes));
+      const std::array<float*, 2> out{heard.data() + n, right.data() + n};
+      synthesiser.process(out.data(), 2, 480);
+    }
+    double late = 0.0;
+    for (int n = 18000; n < 22000; ++n)
+      late += static_cast<double>(heard[static_cast<std::size_t>(n)]) * heard[static_cast<std::size_t>(n)];
+    return std::sqrt(late);
+  };
+  EXPECT_GT(hear(2e-6, false), 0.0);
+  EXPECT_NE(hear(20e-6, false), hear(2e-6, false));
+  EXPECT_NEAR(hear(2e-6, true) / hear(2e-6, false), 1.0, 1e-3) << "another model of the same modes";
+}
+
 TEST(BodyEffects, ContactsAreNothingToBodiesWithoutTheirEffects) {
   const auto model = make_model({{420.0, 6.0}, {1370.0, 9.0}});
   for (int turn = 0; turn < 3; ++turn) {
