@@ -130,6 +130,8 @@ carillon_options make_default() {
   options.longest_m = ours.longest_m;
   options.max_waypoints = ours.max_waypoints;
   options.budget = ours.budget;
+  options.ground_roughness_m = ours.ground.roughness_m;
+  options.ground_friction = ours.ground.friction;
   return options;
 }
 
@@ -157,6 +159,8 @@ carillon_body_options make_default() {
   options.rotation[0] = 1.0;
   options.longest_m = ours.longest_m;
   options.silence_pa = ours.silence_pa;
+  options.roughness_m = ours.surface.roughness_m;
+  options.friction = ours.surface.friction;
   return options;
 }
 
@@ -310,6 +314,8 @@ carillon_status carillon_create(const carillon_options* options, carillon_synth*
                                    .ring_events = given->ring_events,
                                    .longest_m = given->longest_m,
                                    .budget = given->budget};
+    ours.ground.roughness_m = given->ground_roughness_m;
+    ours.ground.friction = given->ground_friction;
     if (given->microphones_m != nullptr) {
       ours.microphones_m.clear();
       for (int32_t m = 0; m < given->microphone_count; ++m) ours.microphones_m.push_back(to_vector(given->microphones_m[m]));
@@ -349,6 +355,7 @@ carillon_status carillon_add_body_with(carillon_synth* synth, const carillon_mod
                                                        .rotation = to_quaternion(ours->rotation),
                                                        .effects = to_effects(ours->effects),
                                                        .silence_pa = ours->silence_pa,
+                                                       .surface = {.roughness_m = ours->roughness_m, .friction = ours->friction},
                                                        .longest_m = ours->longest_m,
                                                        .max_waypoints = ours->max_waypoints});
   });

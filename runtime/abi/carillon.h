@@ -110,11 +110,13 @@ typedef struct carillon_options {
   double listener_m[3];
   const double (*microphones_m)[3]; /* from the listener, axes of the world; NULL: two ears 20 cm apart along x */
   int32_t microphone_count;
-  int32_t max_waypoints; /* of a body's way that are remembered */
-  double budget;         /* carillon_set_budget */
+  int32_t max_waypoints;     /* of a body's way that are remembered */
+  double budget;             /* carillon_set_budget */
+  double ground_roughness_m; /* rms height of what contacts touch whose other body is none */
+  double ground_friction;    /* Coulomb */
 } carillon_options;
 
-/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m, 64 waypoints, no limit to the work. */
+/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m, 64 waypoints, no limit to the work, smooth concrete. */
 #define carillon_options_init(options) carillon_options_init_sized((options), sizeof(carillon_options))
 CARILLON_API void carillon_options_init_sized(carillon_options* options, size_t size);
 
@@ -149,9 +151,12 @@ typedef struct carillon_body_options {
   double silence_pa;     /* a body below this at 1 m sleeps */
   int32_t max_waypoints; /* 0: as in carillon_options */
   int32_t reserved;
+  double roughness_m; /* rms height of the surface, for CARILLON_ROUGHNESS and CARILLON_ROLLING */
+  double friction;    /* Coulomb; a contact of two takes the geometric mean of theirs */
 } carillon_body_options;
 
-/* At the origin, not turned, the usual effects: all but CARILLON_ACCELERATION_NOISE that this library can play. */
+/* At the origin, not turned, fine machined metal, the usual effects: all that this library can play but those of contacts that last, which
+   take memory, and CARILLON_ACCELERATION_NOISE. */
 #define carillon_body_options_init(options) carillon_body_options_init_sized((options), sizeof(carillon_body_options))
 CARILLON_API void carillon_body_options_init_sized(carillon_body_options* options, size_t size);
 /* [main] carillon_add_body with all that can be chosen. */

@@ -31,6 +31,7 @@ SynthesiserOptions check(SynthesiserOptions options) {
       if (!std::isfinite(x)) refuse("microphones at finite places");
   for (const double x : options.listener_m)
     if (!std::isfinite(x)) refuse("a listener at a finite place");
+  if (const char* fault = find_fault(options.ground); fault != nullptr) throw InputError(std::string("ground: ") + fault);
   if (options.max_bodies < 1 || options.max_bodies > kMostBodies) refuse("room for one to 1,048,576 bodies");
   if (options.max_strikes < 1 || options.max_waypoints < 2 || options.ring_events < 1) refuse("room for strikes, waypoints and events");
   if (!(options.longest_m > 0.0 && options.longest_m < 1e5)) refuse("a longest distance below 100 km");
@@ -98,6 +99,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
     throw InputError("a body must be at a finite place, turned by a unit quaternion");
   if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0)
     throw InputError("a body needs a longest distance below 100 km and room for waypoints");
+  if (const char* fault = find_fault(settings.surface); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
   collect();
   const auto free = std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; });
   if (free == owned_.end())

@@ -202,6 +202,51 @@ static void check_contacts(const carillon_model* model) {
   carillon_destroy(synth);
 }
 
+/* The peak of a body that slides over ground as rough as itself. */
+static float slide(const carillon_model* model, uint32_t effects, double roughness_m) {
+  carillon_options options;
+  carillon_body_options body_options;
+  carillon_synth* synth;
+  carillon_contact contact;
+  int32_t body;
+  int i;
+  float peak;
+  carillon_options_init(&options);
+  options.ground_roughness_m = roughness_m;
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  carillon_body_options_init(&body_options);
+  body_options.position_m[1] = 1;
+  body_options.effects |= effects;
+  body_options.roughness_m = roughness_m;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &body, message, sizeof message) == CARILLON_OK);
+  carillon_contact_init(&contact);
+  contact.body = body;
+  contact.id = 7;
+  contact.normal[0] = 0;
+  contact.normal[1] = 0;
+  contact.normal[2] = 1;
+  contact.force_n = 2;
+  contact.patch_radius_m = 1e-4;
+  contact.slip_m_s[0] = contact.sweep_m_s = contact.other_sweep_m_s = 0.3;
+  for (i = 0; i <= 20; ++i) {
+    contact.state = i == 0 ? CARILLON_CONTACT_BEGIN : i == 20 ? CARILLON_CONTACT_END : CARILLON_CONTACT_HOLD;
+    contact.time_s = 0.01 * i;
+    CHECK(carillon_push_contact(synth, &contact) == CARILLON_OK);
+  }
+  CHECK(carillon_push_mark(synth, 0.5) == CARILLON_OK);
+  peak = play(synth, 200);
+  carillon_destroy(synth);
+  return peak;
+}
+
+static void check_surfaces(const carillon_model* model) {
+  const float rough = slide(model, CARILLON_ROUGHNESS, 5e-6);
+  CHECK(rough > 0);
+  CHECK(slide(model, CARILLON_ROUGHNESS, 5e-9) < 0.5F * rough);
+  CHECK(slide(model, CARILLON_ROUGHNESS, 0) == 0);
+  CHECK(slide(model, 0, 5e-6) == 0);
+}
+
 static void check_bodies(const carillon_bank* bank, const carillon_model* model) {
   carillon_options options;
   carillon_synth* synth;
@@ -238,6 +283,10 @@ static void check_bodies(const carillon_bank* bank, const carillon_model* model)
   body_options.rotation[0] = 1;
   body_options.silence_pa = -1;
   CHECK(carillon_add_body_with(synth, model, &body_options, &second, message, sizeof message) == CARILLON_BAD_INPUT);
+  body_options.silence_pa = 1e-10;
+  body_options.roughness_m = -1e-6;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &second, message, sizeof message) == CARILLON_BAD_INPUT &&
+        strstr(message, "roughness") != NULL);
   body_options.size = 0;
   CHECK(carillon_add_body_with(synth, model, &body_options, &second, NULL, 0) == CARILLON_BAD_ARGUMENT);
   CHECK(carillon_add_body_with(NULL, NULL, NULL, NULL, NULL, 0) == CARILLON_BAD_ARGUMENT);
@@ -381,6 +430,7 @@ int main(int argc, char** argv) {
   carillon_bank_close(bank); /* the model stays */
   check_synth(model);
   check_contacts(model);
+  check_surfaces(model);
   carillon_model_release(model);
   return failures == 0 ? 0 : 1;
 }
