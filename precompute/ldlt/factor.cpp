@@ -37,7 +37,8 @@ struct Factor::State {
   Workspace workspace;
   double sigma = 0;
   double norm = 0;
-  double backward_error = 0;
+  bool needs_refinement = false;
+  double backward_error = 0;  // of the solves as they are made
   bool is_allocated = false;
 
   /// Runs work, whose only SystemError is want of memory, and says how much is needed. Collective.
@@ -47,7 +48,7 @@ struct Factor::State {
   double calc_norm() const;
   /// y = (K - sigma M) x on this rank's rows. Collective.
   void apply(Vec x, Vec y, Vec scratch) const;
-  double measure_backward_error();
+  double measure_backward_error(bool is_refined);
   /// X <- A^-1 X with the factorisation alone. Collective.
   void solve(double* x, int stride, int columns);
   /// The same, and one step of iterative refinement. Collective.
@@ -90,7 +91,7 @@ void Factor::State::apply(Vec x, Vec y, Vec scratch) const {
   check(VecAXPY(y, -sigma, scratch));
 }
 
-double Factor::State::measure_backward_error() {
+double Factor::State::measure_backward_error(bool is_refined) {
   petsc::VecHandle x;
   petsc::VecHandle b;
   petsc::VecHandle scratch;
@@ -106,7 +107,11 @@ double Factor::State::measure_backward_error() {
   apply(x, b, scratch);
   check(VecCopy(b, x));
   check(VecGetArray(x, &values));
-  solve_columns(plan, numbers, workspace, values, std::max<PetscInt>(last - first, 1), 1);
+  const int stride = std::max<int>(static_cast<int>(last - first), 1);
+  if (is_refined)
+    solve_refined(values, stride, 1);
+  else
+    solve(values, stride, 1);
   check(VecRestoreArray(x, &values));
   double b_norm = 0;
   double x_norm = 0;
@@ -145,8 +150,11 @@ bool Factor::factorise(double sigma) {
   });
   s.backward_error = std::numeric_limits<double>::infinity();
   if (!s.numbers.is_complete || s.numbers.smallest <= kVanishedPivot * s.norm) return false;
-  s.backward_error = s.measure_backward_error();
-  return s.backward_error <= kWorstBackwardError;
+  s.backward_error = s.measure_backward_error(false);
+  s.needs_refinement = s.backward_error > kRefinedBackwardError;
+  if (s.backward_error > kWorstBackwardError) return false;
+  if (s.needs_refinement) s.backward_error = s.measure_backward_error(true);
+  return true;
 }
 
 std::int64_t Factor::get_negative_pivots() const { return state_->numbers.negative; }
@@ -186,10 +194,10 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
 }
 
 void Factor::solve(double* x, int stride, int columns) {
-  if (state_->backward_error <= kRefinedBackwardError)
-    state_->solve(x, stride, columns);
-  else
+  if (state_->needs_refinement)
     state_->solve_refined(x, stride, columns);
+  else
+    state_->solve(x, stride, columns);
 }
 
 }  // namespace carillon::ldlt

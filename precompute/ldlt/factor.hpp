@@ -41,13 +41,15 @@ class Factor {
 
   const Analysis& get_analysis() const;
 
-  /// Factorises K - sigma M. False if it cannot be trusted: a pivot vanished (sigma hits an eigenvalue) or the measured backward error is
-  /// above 1e-10; move sigma a little, or take another solver. Throws SystemError, naming the need in GB, when memory runs out.
+  /// Factorises K - sigma M. False if it cannot be trusted: a pivot vanished (sigma hits an eigenvalue) or the measured backward error of
+  /// the factorisation alone is above 1e-10; move sigma a little, or take another solver. Throws SystemError, naming the need in GB, when
+  /// memory runs out.
   [[nodiscard]] bool factorise(double sigma);
 
   /// The number of eigenvalues below the sigma of the last factorise (Sylvester's law of inertia).
   std::int64_t get_negative_pivots() const;
-  /// max|b - A x| / (||A||_inf max|x| + max|b|) of a random solve with the last factorisation.
+  /// max|b - A x| / (||A||_inf max|x| + max|b|) of a random solve with the last factorisation, refined where solves are.
+  /// Of one that cannot be trusted, without refinement.
   double get_backward_error() const;
   /// Largest magnitude in L: how far pivoting inside the blocks let the numbers grow.
   double get_growth() const;
