@@ -15,6 +15,7 @@
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/radiation/gains.hpp"
+#include "runtime/synth/texture.hpp"
 
 namespace carillon::host {
 namespace {
@@ -162,6 +163,9 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     body_models.push_back(model);
     sound.body_modes.push_back(model->get_mode_count());
     sound.modes += model->get_mode_count();
+    // Once a process, and not while the sound plays.
+    if (effects.has(Effect::kRoughness) || effects.has(Effect::kRolling) || effects.has(Effect::kContactDamping))
+      synth::Texture::make_tables();
     const double lead_s = effects.has(Effect::kAccelerationNoise) ? model->get_sphere_radius_m() / synth::kSoundSpeedMs : 0.0;
     fed[i] = {.number = static_cast<int>(i), .moves = !effects.is_empty() && !scene.bodies[i].spec.fixed, .lead_s = lead_s};
   }
