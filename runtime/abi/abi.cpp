@@ -1,3 +1,4 @@
+// The whole C interface, a short function for each of carillon.h; longer than most files.
 // Method:     opaque handles around the C++ classes; exceptions end here and become a status and a message.
 // Source:     none.
 // Deviations: none.

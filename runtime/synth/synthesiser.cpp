@@ -1,3 +1,4 @@
+// One scene on two threads: what the main thread hands over, the audio thread takes here; longer than most files.
 // Method:     time is cut into periods of kPeriod samples from the first one; a host's block is served from as many whole quanta as it asks
 //             for, never across a period. Events are taken from the ring before each piece is made, and act at their own times. Bodies come
 //             and go at periods, and effects change, handed over by two queues with one writer and one reader. Of bodies that sleep only a

@@ -1,3 +1,4 @@
+// Forces, damping, rest and times of one class on one set of records; longer than most files.
 // Bodies under contacts that last: against quadrature, against the dense equation of motion, and what they promise.
 #include "runtime/synth/contact_forces.hpp"
 
