@@ -43,8 +43,6 @@ LAW = {
     "runtime/live": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact", "runtime/host"], ["fmt", "cli", "portaudio"]),
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
-    "jobs/process": (["runtime/config"], ["fmt"]),
-    "jobs/outcome": (["runtime/config"], ["fmt"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
     "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),
