@@ -28,6 +28,7 @@ LIBRARIES = {
     "cgal": ["CGAL/", "boost/"],
     "xml": ["pugixml.hpp"],
     "zlib": ["zlib.h"],
+    "sqlite": ["sqlite3.h"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
@@ -43,6 +44,9 @@ LAW = {
     "runtime/live": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact", "runtime/host"], ["fmt", "cli", "portaudio"]),
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
+    "jobs/process": (["runtime/config"], ["fmt"]),
+    "jobs/store": (["runtime/config", "jobs/spec"], ["fmt", "json", "openssl"]),
+    "jobs/registry": (["runtime/config", "jobs/process", "jobs/store"], ["fmt", "sqlite", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
     "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),

@@ -1,0 +1,69 @@
+// The small JSON files of a job's folder: what was asked for, where it stands, how far it is. All are written whole
+// (temporary file, fsync, rename) but progress.jsonl, which carillon-precompute appends to.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "jobs/store/id.hpp"
+
+namespace carillon::store {
+
+/// What a job may use. 0: not given (ranks and memory are then predicted by whoever starts it; time is unlimited).
+struct Resources {
+  int ranks = 0;
+  double memory_gb = 0.0;  // of the whole job, 1e9 bytes
+  double time_limit_s = 0.0;
+};
+
+/// request.json: the parts of the id, and what is not part of it.
+struct Request {
+  std::string id;            // 64 hex digits
+  std::string job;           // canonical text of the resolved job, without paths
+  std::string input_kind;    // "mesh", "surface", or "" when the body is a shape
+  std::string input_format;  // "msh", "vtu", "mesh", "tetgen", "hdf", or the ending of a surface, "obj"
+  std::string input_sha256;  // 64 hex digits; of a TetGen pair, of both
+  std::string solver;        // the line of carillon-precompute --version
+  Resources resources;
+  std::string engine = "local";  // "local" or "slurm"
+  std::string job_file;    // where it was submitted from first: store::to_text() of an absolute path; "#7" follows for line 7 of a manifest
+  std::string input_file;  // the mesh or surface as it was named, to_text() of an absolute path
+  std::string user;
+  double submitted_unix_s = 0.0;
+};
+
+/// state.json: the part of a job's state that neither the bank nor the last outcome tells. Kept by jobs/registry, which is made again from
+/// it.
+struct Standing {
+  std::string state = "queued";  // "queued", "waiting", "failed", "cancelled"
+  std::string reason;            // one sentence for people
+  int attempts = 0;              // so far
+  int failures = 0;              // of them, those that count against the retries
+};
+
+/// The last line of progress.jsonl that is whole.
+struct Progress {
+  std::string phase;
+  double percent = 0.0;
+  long long modes_done = -1;  // -1: not known
+  long long modes_wanted = -1;
+  double seconds_left = -1.0;  // -1: not known
+  double seconds = 0.0;        // since the start
+};
+
+/// Each throws InputError for a damaged file and returns none where there is no file.
+std::optional<Request> read_request(const std::filesystem::path& folder);
+std::optional<Standing> read_standing(const std::filesystem::path& folder);
+/// Reads only the end of the file; a line that is cut or no JSON is passed over. Never throws for content.
+std::optional<Progress> read_progress(const std::filesystem::path& folder);
+
+/// `folder`/request.json and so on. SystemError when the disk refuses.
+void write_request(const std::filesystem::path& folder, const Request& request);
+void write_standing(const std::filesystem::path& folder, const Standing& standing);
+
+/// Bytes of a path as text that JSON and SQLite take: valid UTF-8 stays, any other byte (and a backslash before an x) becomes "\xNN".
+std::string to_text(const std::filesystem::path& path);
+std::filesystem::path from_text(const std::string& text);
+
+}  // namespace carillon::store
