@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 #include <signal.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -144,18 +145,25 @@ int end_with_environment(std::string_view entry, double patience_s) {
 }
 
 std::optional<Lock> Lock::take(const fs::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-  if (descriptor < 0) {
-    throw SystemError(fmt::format("{}: cannot make this lock: {}; check the folder's rights and the space on the disk", file.string(),
-                                  std::strerror(errno)));
+  const auto refuse = [&](const char* what) {
+    throw SystemError(fmt::format("{}: cannot {}: {}; check the folder's rights, the space on the disk and that its file system has locks",
+                                  file.string(), what, std::strerror(errno)));
+  };
+  for (;;) {
+    const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (descriptor < 0) refuse("make this lock");
+    Lock lock(descriptor);
+    while (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+      if (errno == EINTR) continue;
+      if (errno == EWOULDBLOCK) return std::nullopt;
+      refuse("lock this file");
+    }
+    struct stat mine {
+    }, named{};
+    if (::fstat(descriptor, &mine) != 0) refuse("look at this file");
+    // The one who held it may have removed the file, or its folder.
+    if (::stat(file.c_str(), &named) == 0 && named.st_ino == mine.st_ino && named.st_dev == mine.st_dev) return lock;
   }
-  Lock lock(descriptor);
-  while (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-    if (errno == EINTR) continue;
-    if (errno == EWOULDBLOCK) return std::nullopt;
-    throw SystemError(fmt::format("{}: cannot lock: {}; choose a file system with locks", file.string(), std::strerror(errno)));
-  }
-  return lock;
 }
 
 bool Lock::is_held(const fs::path& file) {

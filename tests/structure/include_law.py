@@ -45,6 +45,7 @@ LAW = {
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
     "jobs/process": (["runtime/config"], ["fmt"]),
+    "jobs/outcome": (["runtime/config", "jobs/process"], ["fmt"]),
     "jobs/store": (["runtime/config", "jobs/spec"], ["fmt", "json", "openssl"]),
     "jobs/registry": (["runtime/config", "jobs/process", "jobs/store"], ["fmt", "sqlite", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),

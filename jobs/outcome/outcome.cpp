@@ -1,0 +1,126 @@
+#include "jobs/outcome/outcome.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <utility>
+
+#include "runtime/config/document.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::outcome {
+namespace {
+
+constexpr std::array<std::pair<Cause, const char*>, 15> kWords{{{Cause::done, "done"},
+                                                                {Cause::bad_input, "bad-input"},
+                                                                {Cause::no_solution, "no-solution"},
+                                                                {Cause::memory, "memory"},
+                                                                {Cause::disk_full, "disk-full"},
+                                                                {Cause::system, "system"},
+                                                                {Cause::checkpointed, "checkpointed"},
+                                                                {Cause::stopped, "stopped"},
+                                                                {Cause::time_limit, "time-limit"},
+                                                                {Cause::killed, "killed"},
+                                                                {Cause::crashed, "crashed"},
+                                                                {Cause::node_lost, "node-lost"},
+                                                                {Cause::hung, "hung"},
+                                                                {Cause::bad_bank, "bad-bank"},
+                                                                {Cause::no_program, "no-program"}}};
+
+double finite(double value) { return std::isfinite(value) ? value : 0.0; }
+
+}  // namespace
+
+std::string to_text(Cause cause) {
+  for (const auto& [known, word] : kWords) {
+    if (known == cause) return word;
+  }
+  return "system";
+}
+
+std::optional<Cause> find_cause(std::string_view word) {
+  for (const auto& [cause, known] : kWords) {
+    if (word == known) return cause;
+  }
+  return std::nullopt;
+}
+
+void write_outcome(const std::filesystem::path& work, const Outcome& o) {
+  config::write_file(
+      work / "outcome.json",
+      fmt::format("{{\n  \"token\": {},\n  \"cause\": \"{}\",\n  \"reason\": {},\n  \"exit_code\": {},\n  \"ranks\": {},\n"
+                  "  \"seconds\": {:.3f},\n  \"peak_memory_gb\": {:.6f},\n  \"memory_need_gb\": {:.6f},\n  \"percent\": {:.3f},\n"
+                  "  \"is_further\": {},\n  \"host\": {},\n  \"started\": {},\n  \"ended\": {}\n}}\n",
+                  config::quote(o.token), to_text(o.cause), config::quote(o.reason), o.exit_code, o.ranks, finite(o.seconds),
+                  finite(o.peak_memory_gb), finite(o.memory_need_gb), finite(o.percent), o.is_further, config::quote(o.host),
+                  config::quote(o.started), config::quote(o.ended)));
+}
+
+std::optional<Outcome> read_outcome(const std::filesystem::path& work) {
+  try {
+    config::Object root = config::read_document(work / "outcome.json").root();
+    const std::optional<Cause> cause = find_cause(root.string("cause"));
+    if (!cause) return std::nullopt;
+    Outcome o;
+    o.token = root.string("token");
+    o.cause = *cause;
+    o.reason = root.string("reason");
+    o.exit_code = static_cast<int>(root.integer("exit_code", -1, 1000));
+    o.ranks = static_cast<int>(root.integer("ranks", 0, 1 << 24));
+    o.seconds = root.number("seconds");
+    o.peak_memory_gb = root.number("peak_memory_gb");
+    o.memory_need_gb = root.number("memory_need_gb");
+    o.percent = root.number("percent");
+    o.is_further = root.boolean_or("is_further", false);
+    o.host = root.string("host");
+    o.started = root.string("started");
+    o.ended = root.string("ended");
+    return o;
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+Outcome make_killed(const std::string& token) {
+  Outcome o;
+  o.token = token;
+  o.cause = Cause::killed;
+  o.reason = "killed: the process of the attempt is gone and left no word (kill -9, or the machine went down)";
+  return o;
+}
+
+void write_attempt(const std::filesystem::path& work, const Attempt& a) {
+  config::write_file(work / "attempt.json",
+                     fmt::format("{{\n  \"token\": {},\n  \"host\": {},\n  \"boot\": {},\n  \"pid\": {},\n  \"start_ticks\": {},\n"
+                                 "  \"ranks\": {},\n  \"memory_gb\": {:.6f},\n  \"started\": {}\n}}\n",
+                                 config::quote(a.token), config::quote(a.process.host), config::quote(a.process.boot), a.process.pid,
+                                 a.process.start_ticks, a.ranks, finite(a.memory_gb), config::quote(a.started)));
+}
+
+std::optional<Attempt> read_attempt(const std::filesystem::path& work) {
+  try {
+    config::Object root = config::read_document(work / "attempt.json").root();
+    Attempt a;
+    a.token = root.string("token");
+    a.process.host = root.string("host");
+    a.process.boot = root.string("boot");
+    a.process.pid = static_cast<int>(root.integer("pid", 0, 1LL << 30));
+    a.process.start_ticks = static_cast<std::uint64_t>(root.integer("start_ticks", 0, 1LL << 62));
+    a.ranks = static_cast<int>(root.integer("ranks", 0, 1 << 24));
+    a.memory_gb = root.number("memory_gb");
+    a.started = root.string("started");
+    return a;
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+std::string find_utc() {
+  std::time_t now = std::time(nullptr);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
+}
+
+}  // namespace carillon::outcome
