@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
-#include <vector>
 
 #include "precompute/io/interrupt.hpp"
 #include "precompute/io/run_job.hpp"
@@ -51,50 +52,77 @@ void print_start(const petsc::Session& session, bool quiet) {
                "apt-get install libopenblas0-serial\n");
 }
 
+/// What the command line asks for.
+struct CommandLine {
+  CLI::App app{
+      "Computes the vibration modes of a solid body and writes them as a mode bank.\n"
+      "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json\n"
+      "Options of PETSc and SLEPc follow after --: carillon-precompute JOB.json -- -eps_type krylovschur",
+      "carillon-precompute"};
+  std::string job;
+  io::RunOptions options;
+  std::optional<CLI::ParseError> error;
+
+  CommandLine(int argc, char** argv) {
+    app.add_option("JOB", job, "job file (JSON with // comments)")->required();
+    app.add_flag("-q,--quiet", options.quiet, "no progress on standard output");
+    app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
+    // What follows "--" is for PETSc and SLEPc.
+    const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
+    options.solver_options.assign(argv + std::min(own + 1, argc), argv + argc);
+    try {
+      app.parse(own, argv);
+    } catch (const CLI::ParseError& caught) {
+      error = caught;
+    }
+  }
+
+  bool only_asks() const { return error && error->get_exit_code() == 0; }  // --help or --version
+};
+
+/// Whether this process speaks for all that its launcher started. MPI, which would know, has not started yet.
+bool is_first_of_all() {
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"}) {
+    if (const char* rank = std::getenv(name); rank != nullptr) return std::string_view(rank) == "0";
+  }
+  return true;
+}
+
+int run(const petsc::Session& session, const CommandLine& words) {
+  io::end_on_signals(session.rank());
+  petsc::pin_blas_threads();
+  MPI_Comm failures = MPI_COMM_NULL;
+  MPI_Comm_dup(MPI_COMM_WORLD, &failures);
+  int code = 0;
+  try {
+    print_start(session, words.options.quiet);
+    petsc::reserve_blas_memory(PETSC_COMM_WORLD);
+    const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, words.job, words.options);
+    if (session.rank() == 0 && !words.options.quiet) fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
+  } catch (const InputError& error) {
+    code = fail(failures, session.rank(), kExitInput, error.what());
+  } catch (const SolveError& error) {
+    code = fail(failures, session.rank(), kExitSolve, error.what());
+  } catch (const std::bad_alloc&) {
+    code = fail(failures, session.rank(), kExitSystem, "out of memory; use a coarser mesh or a machine with more");
+  } catch (const std::exception& error) {
+    code = fail(failures, session.rank(), kExitSystem, error.what());
+  }
+  MPI_Comm_free(&failures);
+  return code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  petsc::restart_with_fitting_kernels(argv);
   try {
-    // What follows "--" is for PETSc and SLEPc.
-    const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
-    const std::vector<std::string> solver_options(argv + std::min(own + 1, argc), argv + argc);
-    const petsc::Session session(argc, argv, solver_options);
-    io::end_on_signals(session.rank());
-    petsc::pin_blas_threads();
-    MPI_Comm failures = MPI_COMM_NULL;
-    MPI_Comm_dup(MPI_COMM_WORLD, &failures);
-    CLI::App app(
-        "Computes the vibration modes of a solid body and writes them as a mode bank.\n"
-        "Start it on several ranks with: mpirun -np N carillon-precompute JOB.json\n"
-        "Options of PETSc and SLEPc follow after --: carillon-precompute JOB.json -- -eps_type krylovschur",
-        "carillon-precompute");
-    std::string job;
-    bool quiet = false;
-    app.add_option("JOB", job, "job file (JSON with // comments)")->required();
-    app.add_flag("-q,--quiet", quiet, "no progress on standard output");
-    app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
-    int code = 0;
-    try {
-      app.parse(own, argv);
-      print_start(session, quiet);
-      petsc::reserve_blas_memory(PETSC_COMM_WORLD);
-      const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, job, quiet, solver_options);
-      if (session.rank() == 0 && !quiet) fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
-    } catch (const CLI::ParseError& error) {
-      code = error.get_exit_code() == 0 ? 0 : kExitInput;
-      if (session.rank() == 0) app.exit(error);
-    } catch (const InputError& error) {
-      code = fail(failures, session.rank(), kExitInput, error.what());
-    } catch (const SolveError& error) {
-      code = fail(failures, session.rank(), kExitSolve, error.what());
-    } catch (const std::bad_alloc&) {
-      code = fail(failures, session.rank(), kExitSystem, "out of memory; use a coarser mesh or a machine with more");
-    } catch (const std::exception& error) {
-      code = fail(failures, session.rank(), kExitSystem, error.what());
-    }
-    MPI_Comm_free(&failures);
-    return code;
+    const CommandLine words(argc, argv);
+    if (words.only_asks()) return is_first_of_all() ? words.app.exit(*words.error) : 0;
+    petsc::restart_with_fitting_kernels(argv);
+    const petsc::Session session(argc, argv, words.options.solver_options);
+    if (!words.error) return run(session, words);
+    if (session.rank() == 0) words.app.exit(*words.error);
+    return kExitInput;
   } catch (const std::exception& error) {
     fmt::print(stderr, "carillon-precompute: error: {}\n", error.what());
     return kExitSystem;

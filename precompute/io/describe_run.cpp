@@ -182,7 +182,7 @@ Json::Value describe_run(const Run& run, const Setting& setting, const Body& bod
   }
   root["phase_seconds"] = describe_phases(run, solved.modes);
   for (const std::int64_t bytes : peak_bytes) root["peak_bytes_by_rank"].append(Json::Int64(bytes));
-  root["solver_options"] = make_list(run.solver_options);
+  root["solver_options"] = make_list(run.options.solver_options);
   root["chosen"]["element"] = spec::to_text(setting.element);
   root["chosen"]["tolerance"] = setting.tolerance;
   root["mesh"] = describe_mesh(body, setting);

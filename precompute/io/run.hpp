@@ -4,16 +4,16 @@
 #include <mpi.h>
 
 #include <string>
-#include <vector>
 
 #include "jobs/spec/job_spec.hpp"
+#include "precompute/io/run_options.hpp"
 #include "precompute/io/run_record.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::io {
 
 struct Run {
-  Run(MPI_Comm communicator, bool quiet) : comm(communicator), stations(communicator, quiet) {
+  Run(MPI_Comm communicator, const RunOptions& wishes) : comm(communicator), options(wishes), stations(communicator, wishes.quiet) {
     MPI_Comm_rank(comm, &rank);
     MPI_Comm_size(comm, &ranks);
   }
@@ -21,8 +21,8 @@ struct Run {
   MPI_Comm comm;
   int rank = 0;
   int ranks = 1;
-  spec::JobSpec job;                        // the same on every rank
-  std::vector<std::string> solver_options;  // of PETSc and SLEPc, as the user gave them
+  spec::JobSpec job;  // the same on every rank
+  RunOptions options;
   Stations stations;
 };
 

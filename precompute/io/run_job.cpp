@@ -116,9 +116,8 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
 
 }  // namespace
 
-RunSummary run_job(MPI_Comm comm, const fs::path& job_file, bool quiet, const std::vector<std::string>& solver_options) {
-  Run run(comm, quiet);
-  run.solver_options = solver_options;
+RunSummary run_job(MPI_Comm comm, const fs::path& job_file, const RunOptions& options) {
+  Run run(comm, options);
   run.job = read_shared_job(run, job_file);
   check_job(run);
   AccurateBody found;

@@ -5,7 +5,8 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
+
+#include "precompute/io/run_options.hpp"
 
 namespace carillon::io {
 
@@ -18,9 +19,9 @@ struct RunSummary {
 
 /// Reads the job on rank 0 and carries it out on all ranks: mesh, partition, assembly, modes, error bars, bank. Writes the bank and, beside
 /// it, <bank>.resolved.json, each whole or not at all; whether they can be written is found out before the solve.
-/// solver_options: words for PETSc and SLEPc ("-eps_ncv", "200"); one that the solve does not use is an error, before anything is written.
-/// Progress goes to standard output and warnings to standard error, both on rank 0; quiet leaves the progress away.
-/// Collective. Throws the same on every rank: InputError, SolveError, SystemError.
-RunSummary run_job(MPI_Comm comm, const std::filesystem::path& job_file, bool quiet, const std::vector<std::string>& solver_options = {});
+/// A word of options.solver_options that the solve does not use is an error, before anything is written. Progress goes to standard output
+/// and warnings to standard error, both on rank 0; quiet leaves the progress away. Collective. Throws the same on every rank: InputError,
+/// SolveError, SystemError.
+RunSummary run_job(MPI_Comm comm, const std::filesystem::path& job_file, const RunOptions& options);
 
 }  // namespace carillon::io

@@ -122,7 +122,7 @@ eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, 
 std::string list_changes(const Run& run) {
   std::string text;
   bool counts = false;
-  for (const std::string& word : run.solver_options) {
+  for (const std::string& word : run.options.solver_options) {
     const bool is_name = word.size() > 1 && word[0] == '-' && std::isdigit(static_cast<unsigned char>(word[1])) == 0;
     if (is_name) counts = word.find("_view") == std::string::npos && word.find("_monitor") == std::string::npos;
     if (counts) text += (text.empty() ? "" : " ") + word;

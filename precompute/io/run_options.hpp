@@ -1,0 +1,20 @@
+// What the command line says about a run, beside the job.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace carillon::io {
+
+struct RunOptions {
+  bool quiet = false;                       // no progress on standard output
+  std::vector<std::string> solver_options;  // words for PETSc and SLEPc ("-eps_ncv", "200")
+  std::filesystem::path checkpoint;         // resumed from where it fits, and saved to; empty: none
+  double checkpoint_every_s = 300;          // seconds between two saves of it
+  std::filesystem::path progress;           // progress as JSON lines is appended here; empty: nowhere
+  bool validate = false;                    // check and predict, do not solve
+  bool json = false;                        // what is printed at the end is JSON
+};
+
+}  // namespace carillon::io
