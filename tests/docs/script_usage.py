@@ -7,8 +7,8 @@ import tempfile
 
 deploy = pathlib.Path(sys.argv[1]) / "deploy"
 with tempfile.TemporaryDirectory() as folder:
-    for name in ("demo", "test", "install"):
-        link = pathlib.Path(folder) / f"a link to {name}"
+    for name in ("demo", "test", "install", "slurm/cluster"):
+        link = pathlib.Path(folder) / f"a link to {name.replace('/', ' ')}"
         link.symlink_to(deploy / name)
         done = subprocess.run([link, "--help"], cwd=folder, capture_output=True, text=True, timeout=20)
         assert done.returncode == 0 and f"deploy/{name}" in done.stdout, (name, done)
