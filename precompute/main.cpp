@@ -64,8 +64,10 @@ struct CommandLine {
   std::optional<CLI::ParseError> error;
 
   CommandLine(int argc, char** argv) {
+    const CLI::Validator named([](const std::string& file) { return file.empty() ? "the name of the file is empty" : ""; }, "FILE");
     app.add_option("JOB", job, "job file (JSON with // comments)")->required();
     app.add_flag("-q,--quiet", options.quiet, "no progress on standard output");
+    app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
     app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);

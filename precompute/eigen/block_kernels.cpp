@@ -11,6 +11,8 @@
 #include <cstring>
 #include <vector>
 
+#include "precompute/petsc/work.hpp"
+
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -290,18 +292,21 @@ constexpr int kNarrow = 32;  // Wider blocks are BLAS's own ground.
 
 void multiply_transposed(const Columns& a, const Columns& b, double* small, int small_stride) {
   if (a.count == 0 || b.count == 0) return;
+  petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * b.count);
   if (b.count <= kNarrow && has_avx512()) return multiply_transposed_avx512(a, b, small, small_stride);
   call_gemm("T", a.count, b.count, a.rows, 1.0, a.values, a.stride, b.values, b.stride, 0.0, small, small_stride);
 }
 
 void subtract_product(const Columns& a, const double* small, int small_stride, const Columns& b) {
   if (a.count == 0 || b.count == 0) return;
+  petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * b.count);
   if (b.count <= kNarrow && has_avx512()) return subtract_product_avx512(a, small, small_stride, b);
   call_gemm("N", a.rows, b.count, a.count, -1.0, a.values, a.stride, small, small_stride, 1.0, b.values, b.stride);
 }
 
 void combine_columns(const Columns& a, const double* small, int kept) {
   if (a.count == 0 || kept == 0) return;
+  petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * kept);
   if (has_avx512()) return combine_columns_avx512(a, small, kept);
   std::vector<double> panel(static_cast<std::size_t>(kRowsCombined) * static_cast<std::size_t>(a.count));
   for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsCombined) {

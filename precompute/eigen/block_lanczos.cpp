@@ -27,6 +27,7 @@
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 
 // What petscblaslapack.h leaves out.
 extern "C" {
@@ -47,6 +48,7 @@ constexpr double kDependent = 1e-11;       // and smallest that Cholesky QR is t
 constexpr double kTaken = 1e-2;            // A projection that takes more of a column's square is done once more.
 constexpr double kAngle = 1e-7;            // Ritz vectors must be told apart from their neighbours to this angle,
 constexpr double kSmallest = 1e-14;        // as far as residuals, relative to theta, can say.
+constexpr double kEigenFlops = 9;          // of n^3: a symmetric eigenproblem with its vectors (Golub, Van Loan, 8.3)
 constexpr int kNearest = 32;               // Converged pairs that the others are cleared of at the end.
 constexpr double kSame = 1e-9;             // Closer Ritz values are one.
 constexpr double kSeen = 1e-3;             // A Ritz value with this error is no phantom.
@@ -460,6 +462,7 @@ Iteration::Ritz Iteration::calc_ritz() {
     std::vector<PetscBLASInt> integer_work(static_cast<std::size_t>(integers));
     dsyevd_("V", "L", &size, ritz.vectors.data(), &size, ritz.theta.data(), work.data(), &work_size, integer_work.data(), &integers, &info);
     failed = info;
+    petsc::add_flops(kEigenFlops * static_cast<double>(size) * size * size);
     for (std::size_t i = 0; i < n; ++i)
       std::copy_n(ritz.vectors.data() + i * n + n - static_cast<std::size_t>(width_), width_,
                   last.data() + i * static_cast<std::size_t>(width_));

@@ -7,12 +7,15 @@
 #include <petscblaslapack.h>
 
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::eigen {
 namespace {
 
 using petsc::check;
+
+constexpr double kEigenFlops = 14;  // of n^3: both matrices reduced, eigenvalues and vectors (Golub, Van Loan, 8.3 and 8.7)
 
 // The whole matrix, column-major, on every rank.
 std::vector<double> gather_dense(Mat matrix, PetscInt n) {
@@ -50,6 +53,7 @@ DensePairs solve_dense(Mat stiffness, Mat mass) {
   PetscBLASInt work_size = 64 * std::max(size, 1) + 3 * size;
   std::vector<double> work(static_cast<std::size_t>(work_size));
   LAPACKsygv_(&type, "V", "L", &size, k.data(), &size, m.data(), &size, pairs.lambda.data(), work.data(), &work_size, &info);
+  petsc::add_flops(kEigenFlops * static_cast<double>(n) * n * n);
   if (info != 0) {
     throw SolveError(fmt::format("The dense eigensolver failed (LAPACK dsygv: {}){}", info,
                                  info > n ? ": the mass matrix is not positive definite. Look for elements without volume." : "."));

@@ -10,6 +10,7 @@
 #include "precompute/eigen/memory.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::eigen {
@@ -21,16 +22,23 @@ InertiaCounter::InertiaCounter(const Problem& problem, const Options& options, S
   uses_mumps_ = options.factorisation == Factorisation::kMumps;
 }
 
-void InertiaCounter::make_factor() {
+const ShiftedFactor& InertiaCounter::analyse() {
+  const petsc::WorkScope scope(petsc::WorkPhase::kFactor);
   const Timer timer(seconds_.analyse);
   factor_ = uses_mumps_ ? make_mumps_factor(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position)
                         : make_ldlt_factor(problem_.stiffness, problem_.mass);
-  check_memory(comm_, factor_->get_peak_bytes(), options_.memory_limit_bytes, "The factorisation of K - sigma M");
   statistics_.solver = factor_->get_solver();
   statistics_.ordering = factor_->get_ordering();
+  return *factor_;
+}
+
+void InertiaCounter::make_factor() {
+  analyse();
+  check_memory(comm_, factor_->get_peak_bytes(), options_.memory_limit_bytes, "The factorisation of K - sigma M");
 }
 
 bool InertiaCounter::try_factorise(double sigma) {
+  const petsc::WorkScope scope(petsc::WorkPhase::kFactor);
   const Timer timer(seconds_.factor);
   ++statistics_.factorisations;
   stands_ = factor_->factorise(sigma);

@@ -29,6 +29,8 @@ class InertiaCounter {
   /// Throws SolveError when K - sigma M is singular all around, SystemError when memory does not suffice. Collective.
   Inertia take(double lambda, double reach = 1e-6);
 
+  /// The factor without numbers: what it will take. Collective.
+  const ShiftedFactor& analyse();
   /// The factor of the last take; one that is analysed only if there was none, or it was released. Collective.
   ShiftedFactor& get_factor();
   /// The factor where the last take left it; null if none stands.

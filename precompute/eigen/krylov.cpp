@@ -16,6 +16,7 @@
 #include "precompute/petsc/guard.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 
 namespace carillon::eigen {
 namespace {
@@ -28,13 +29,20 @@ constexpr PetscInt kBlock = 16;
 struct ShellContext {
   const KrylovRequest* request = nullptr;
   KrylovStatistics statistics;
+  std::int64_t converged = 0;  // pairs, when they were last looked at
+
+  void report() const {
+    if (request->progress) request->progress(converged, statistics.solves);
+  }
 };
 
 void solve_columns(ShellContext& context, const Columns& x) {
+  const petsc::WorkScope scope(petsc::WorkPhase::kSolve);
   const double start = MPI_Wtime();
   context.request->factor->solve(x.values, x.stride, x.count);
   context.statistics.solve_seconds += MPI_Wtime() - start;
   context.statistics.solves += x.count;
+  context.report();
 }
 
 PetscErrorCode apply_inverse(PC pc, Vec b, Vec x) {
@@ -94,7 +102,9 @@ petsc::MatHandle make_mass_shell(const KrylovRequest& request) {
 }
 
 PetscErrorCode report_progress(EPS, PetscInt, PetscInt converged, PetscScalar*, PetscScalar*, PetscReal*, PetscInt, void* context) {
-  static_cast<const KrylovRequest*>(context)->progress(converged);
+  auto& shell = *static_cast<ShellContext*>(context);
+  shell.converged = converged;
+  shell.report();
   return 0;
 }
 
@@ -329,7 +339,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   MPI_Comm comm = MPI_COMM_NULL;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(request.stiffness), &comm));
   check(register_block_lanczos());
-  ShellContext shell{&request, {}};
+  ShellContext shell{&request, {}, 0};
   const petsc::MatHandle mass = make_mass_shell(request);
   petsc::EpsHandle eps;
   check(EPSCreate(comm, eps.out()));
@@ -357,7 +367,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   } else if (family == Family::krylov || family == Family::davidson) {
     set_deflation_space(eps, request);
   }
-  if (request.progress) check(EPSMonitorSet(eps, report_progress, const_cast<KrylovRequest*>(&request), nullptr));
+  if (request.progress) check(EPSMonitorSet(eps, report_progress, &shell, nullptr));
 
   check(EPSSolve(eps));
 

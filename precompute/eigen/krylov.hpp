@@ -42,15 +42,16 @@ struct KrylovRequest {
   double sigma = 0;
   double low = 0;  // the interval whose eigenvalues are sought,
   double high = 0;
-  PetscInt count = 0;                                    // how many it holds beside the locked ones,
-  bool is_count_known = true;                            // as is known, or guessed,
-  PetscInt nearest = 0;                                  // and so many nearest sigma cover them (for what can only seek the nearest)
-  Method method = Method::kAutomatic;                    // unless SLEPc's options say otherwise
-  double tolerance = 1e-10;                              // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
-  Mat locked = nullptr;                                  // M-orthonormal columns, the run stays M-orthogonal to them; may be null
-  const std::vector<Vec3>* position = nullptr;           // of the nodes: what the starting block is made of
-  int round = 0;                                         // starting blocks of different rounds differ
-  std::function<void(std::int64_t converged)> progress;  // may be empty
+  PetscInt count = 0;                           // how many it holds beside the locked ones,
+  bool is_count_known = true;                   // as is known, or guessed,
+  PetscInt nearest = 0;                         // and so many nearest sigma cover them (for what can only seek the nearest)
+  Method method = Method::kAutomatic;           // unless SLEPc's options say otherwise
+  double tolerance = 1e-10;                     // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
+  Mat locked = nullptr;                         // M-orthonormal columns, the run stays M-orthogonal to them; may be null
+  const std::vector<Vec3>* position = nullptr;  // of the nodes: what the starting block is made of
+  int round = 0;                                // starting blocks of different rounds differ
+  /// Pairs converged and right-hand sides solved in this run so far; may be empty.
+  std::function<void(std::int64_t converged, std::int64_t solves)> progress;
 };
 
 struct KrylovStatistics {

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 
 namespace carillon::eigen {
 namespace {
@@ -208,6 +209,8 @@ void NodeMatrix::plan_exchange(Mat matrix, const std::vector<PetscInt>& ghosts) 
 }
 
 void NodeMatrix::pack(const Columns& x, int first, std::vector<Row>& packed) const {
+  // What is packed is multiplied once.
+  if (kind_ != Kind::kDiagonal) petsc::add_flops((kind_ == Kind::kScalars ? 6.0 : 18.0) * kStrip * static_cast<double>(neighbour_.size()));
   packed.resize(3 * (nodes_ + ghosts_));
   to_rows(x.part(first, std::min(kStrip, x.count - first)), packed.data());
   if (exchange_.get() == nullptr) return;

@@ -26,6 +26,7 @@
 #include "precompute/eigen/krylov.hpp"
 #include "precompute/eigen/local_columns.hpp"
 #include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/needs.hpp"
 #include "precompute/eigen/refine.hpp"
 #include "precompute/eigen/rigid_modes.hpp"
 #include "precompute/eigen/scaling.hpp"
@@ -39,24 +40,14 @@ namespace {
 
 using petsc::check;
 
-constexpr PetscInt kDenseRows = 300;       // Smaller problems are solved densely straight away,
-constexpr PetscInt kDenseRowsFull = 3000;  // and up to here when the band holds more than a quarter of the spectrum.
-constexpr std::int64_t kSliceModes = 320;  // Beyond, orthogonalisation costs more than another factorisation.
-constexpr double kEdgeNudge = 1e-6;        // Counts are taken this far outside the band, relative to lambda.
-constexpr double kSurelyApart = 1e-6;      // Modes farther apart than this, relative to lambda, are no group.
-constexpr double kEdgeTolerance = 1e-9;    // A mode this close to an end of the band (relative to lambda) is in it.
-constexpr double kSafeMargin = 1e-7;       // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
-constexpr double kZeroFraction = 1e-5;     // Of high_hz: frequencies below are zero to working precision.
-constexpr int kRounds = 60;                // Krylov runs per interval at most until its count is met,
-constexpr int kIdleRounds = 2;             // and so many without a new mode.
-constexpr double kLockedMargin = 0.5;  // Of a slice's width: modes found that near are held away (818 modes: 2,181 solves, at 0.1 2,272).
+constexpr double kSurelyApart = 1e-6;    // Modes farther apart than this, relative to lambda, are no group.
+constexpr double kEdgeTolerance = 1e-9;  // A mode this close to an end of the band (relative to lambda) is in it.
+constexpr double kSafeMargin = 1e-7;     // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
+constexpr int kRounds = 60;              // Krylov runs per interval at most until its count is met,
+constexpr int kIdleRounds = 2;           // and so many without a new mode.
+constexpr double kLockedMargin = 0.5;    // Of a slice's width: modes found that near are held away (818 modes: 2,181 solves, at 0.1 2,272).
 constexpr double kKrylovTolerance = 0.1;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
 constexpr int kBases = 3;                 // of equal modes that are tried anew, because their residuals added up.
-
-double calc_lambda(double freq_hz) {
-  const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
-  return omega_rad_s * omega_rad_s;
-}
 
 std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
   std::sort(counts.begin(), counts.end(), [](const Inertia& a, const Inertia& b) { return a.lambda < b.lambda; });
@@ -75,7 +66,6 @@ class BandSolver {
   Modes solve();
 
  private:
-  void check_room_for_copies();
   void solve_dense_band();
   void make_counter();
   void solve_sparse_band();
@@ -99,7 +89,7 @@ class BandSolver {
   void finish();
   void refine(double tolerance, ModeErrors& errors);
   void choose_basis(ModeErrors& errors);
-  void report(Phase phase, std::int64_t done) const;
+  void report(Phase phase, std::int64_t done, std::int64_t more_solves = 0) const;
   bool is_below_band(double lambda) const { return lambda < low_ * (1 - kEdgeTolerance); }
   bool is_above_band(double lambda) const { return lambda > high_ * (1 + kEdgeTolerance); }
   double to_hz(double scaled_lambda) const {
@@ -123,31 +113,19 @@ class BandSolver {
 };
 
 BandSolver::BandSolver(const Problem& problem, const Options& options)
-    : problem_(problem), options_(options), scaling_(problem.stiffness, problem.mass, calc_lambda(options.high_hz)) {
+    : problem_(problem), options_(options), scaling_(problem.stiffness, problem.mass, find_ends(options).high) {
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm_));
   MPI_Comm_rank(comm_, &rank_);
   check(MatGetSize(problem.stiffness, &n_, nullptr));
-  low_ = scaling_.to_scaled(calc_lambda(std::max(options.low_hz, kZeroFraction * options.high_hz)));
-  high_ = scaling_.to_scaled(calc_lambda(options.high_hz));
+  low_ = scaling_.to_scaled(find_ends(options).low);
+  high_ = scaling_.to_scaled(find_ends(options).high);
 }
 
-void BandSolver::report(Phase phase, std::int64_t done) const {
-  if (options_.progress && rank_ == 0)
-    options_.progress({phase, done, std::min(modes_.band_count, options_.max_modes.value_or(modes_.band_count))});
-}
-
-// K and M by nodes, at their worst moment while their arrays grow, and the rigid modes.
-void BandSolver::check_room_for_copies() {
-  double entries = 0;
-  for (const Mat matrix : {problem_.stiffness, problem_.mass}) {
-    MatInfo info;
-    check(MatGetInfo(matrix, MAT_LOCAL, &info));
-    entries += 3 * info.nz_used;
-  }
-  PetscInt rows = 0;
-  check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
-  entries += 18.0 * rows;
-  check_memory(comm_, static_cast<std::int64_t>(8 * entries), options_.memory_limit_bytes, "The eigensolver's copy of K and M");
+void BandSolver::report(Phase phase, std::int64_t done, std::int64_t more_solves) const {
+  if (!options_.progress || rank_ != 0) return;
+  const FactorStatistics& factor = modes_.factor;
+  options_.progress({phase, done, std::min(modes_.band_count, options_.max_modes.value_or(modes_.band_count)), factor.flops, factor.entries,
+                     factor.factorisations, factor.solves + more_solves});
 }
 
 Modes BandSolver::solve() {
@@ -156,7 +134,7 @@ Modes BandSolver::solve() {
     {
       const Timer timer(modes_.seconds.rigid);
       report(Phase::kRigid, 0);
-      check_room_for_copies();
+      check_memory(comm_, calc_copies_bytes(problem_), options_.memory_limit_bytes, "The eigensolver's copy of K and M");
       rigid_ = make_rigid_modes(problem_.stiffness, problem_.mass, problem_.nodes, modes_.proof.rigid_per_component);
       modes_.rigid_count = static_cast<std::int64_t>(rigid_.size());
       operators_ = std::make_unique<Operators>(problem_.stiffness, problem_.mass);
@@ -175,8 +153,7 @@ Modes BandSolver::solve() {
 }
 
 void BandSolver::solve_dense_band() {
-  constexpr std::int64_t kMatrices = 4;  // K, M, and the vectors as they were calculated and distributed
-  check_memory(comm_, kMatrices * 8 * n_ * n_, options_.memory_limit_bytes, "The dense solve");
+  check_memory(comm_, calc_dense_bytes(n_), options_.memory_limit_bytes, "The dense solve");
   DensePairs pairs;
   {
     const Timer timer(modes_.seconds.iterate);
@@ -212,9 +189,7 @@ void BandSolver::solve_dense_band() {
 
 Slice BandSolver::count_band() {
   report(Phase::kCount, 0);
-  const Inertia high = counter_->take(high_ * (1 + kEdgeNudge), kEdgeNudge);
-  const Inertia low = counter_->take(low_ * (1 - 2 * kEdgeNudge), kEdgeNudge);
-  const Slice band{low.lambda, low.below, high.lambda, high.below};
+  const Slice band = count_between(*counter_, low_, high_);
   modes_.count_below_low = band.below_low;
   if (band.below_low < modes_.rigid_count || band.count() < 0) {
     throw SolveError(
@@ -254,10 +229,7 @@ void BandSolver::solve_sparse_band() {
   sought_to_ = wanted.high;
   PetscInt rows = 0;
   check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
-  const bool is_cut = wanted.count() > kSliceModes;
-  const std::int64_t locked = is_cut ? kSliceModes / 2 : modes_.rigid_count;
-  const std::int64_t basis = calc_basis_size(std::min(wanted.count(), kSliceModes), locked, !is_cut);
-  check_memory(comm_, static_cast<std::int64_t>(rows) * 8 * (wanted.count() + locked + basis), options_.memory_limit_bytes,
+  check_memory(comm_, calc_search_bytes(rows, wanted.count(), modes_.rigid_count), options_.memory_limit_bytes,
                fmt::format("The search for {} modes", wanted.count()));
   found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted.count()));
   solve_in_slices(wanted);
@@ -298,7 +270,7 @@ double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double s
   const petsc::MatHandle locked = found_.copy_between(slice.low - margin, slice.high + margin, rigid_);
   request.locked = locked;
   const auto before = static_cast<std::int64_t>(found_.lambda.size());
-  request.progress = [&](std::int64_t converged) { report(Phase::kIterate, before + converged); };
+  request.progress = [&](std::int64_t converged, std::int64_t solves) { report(Phase::kIterate, before + converged, solves); };
   const KrylovStatistics statistics = run_krylov(request, found_);
   modes_.factor.solves += statistics.solves;
   modes_.seconds.solve += statistics.solve_seconds;

@@ -62,7 +62,11 @@ enum class Phase { kRigid, kAnalyse, kCount, kFactor, kIterate, kCheck };
 struct Progress {
   Phase phase = Phase::kRigid;
   std::int64_t modes_done = 0;
-  std::int64_t modes_wanted = 0;  // 0 until the band has been counted
+  std::int64_t modes_wanted = 0;    // 0 until the band has been counted
+  double factor_flops = 0;          // of one factorisation; 0 until one was made, or unknown
+  std::int64_t factor_entries = 0;  // the same
+  std::int64_t factorisations = 0;  // made so far
+  std::int64_t solves = 0;          // right-hand sides so far
 };
 
 struct Options {

@@ -341,6 +341,7 @@ Forecast Search::forecast_next() const {
 }
 
 AccurateBody Search::solve() {
+  if (run_.progress) run_.progress->expect_trials();
   Setting setting;
   setting.tolerance = tolerance_;
   if (run_.job.body) {

@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -14,6 +16,10 @@
 
 namespace carillon::io {
 namespace {
+
+// What is foreseen of a body before it is there.
+constexpr std::int64_t kFileBytesPerTet = 50, kUsualNodes = 20000;
+constexpr double kMeshingSeconds = 5;
 
 /// The nodes of all sets and boxes that the job holds, each once.
 std::vector<std::int32_t> find_held_nodes(const mesh::TetMesh& mesh, const spec::JobSpec& job) {
@@ -90,20 +96,8 @@ bool is_parallel_format(const Run& run) {
   return is_parallel == 1;
 }
 
-}  // namespace
-
-Setting get_setting(const spec::JobSpec& job) {
-  Setting setting;
-  setting.element = job.element;
-  setting.tolerance = job.tolerance;
-  if (job.body) {
-    if (job.body->nodes) setting.nodes = *job.body->nodes;
-    setting.edge_m = job.body->edge_m;
-  }
-  return setting;
-}
-
-Body make_body(Run& run, const Setting& setting) {
+Body make_pieces(Run& run, const Setting& setting) {
+  if (run.progress) run.progress->learn(find_extent(run, setting, {}));
   if (is_parallel_format(run)) return read_in_parallel(run, setting);
   Body body;
   body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m}) : run.job.mesh.string();
@@ -127,6 +121,51 @@ Body make_body(Run& run, const Setting& setting) {
   body.pieces.row_of_node = {};
   run.stations.say(fem::describe(body.pieces.report));
   run.stations.end();
+  return body;
+}
+
+}  // namespace
+
+Setting get_setting(const spec::JobSpec& job) {
+  Setting setting;
+  setting.element = job.element;
+  setting.tolerance = job.tolerance;
+  if (job.body) {
+    if (job.body->nodes) setting.nodes = *job.body->nodes;
+    setting.edge_m = job.body->edge_m;
+  }
+  return setting;
+}
+
+Extent find_extent(const Run& run, const Setting& setting, const Body& body) {
+  Extent extent;
+  extent.is_quadratic = setting.element == spec::Element::T10;
+  extent.is_lumped = run.job.mass == spec::Mass::lumped;
+  extent.modes = run.job.max_modes.value_or(0);
+  extent.nodes = body.pieces.nodes;
+  extent.tets = body.pieces.tets;
+  extent.unknowns = 3 * body.pieces.free_nodes;
+  extent.surface_nodes = static_cast<std::int64_t>(body.surface.vertices_m.size());
+  if (extent.tets > 0) {
+    for (const Station& station : run.stations.get_all())
+      if (station.name == "read") extent.read_seconds = station.seconds;
+    return extent;
+  }
+  if (!run.job.body) {
+    std::error_code error;
+    const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(run.job.mesh, error));
+    extent.tets = error ? 0 : (bytes / kFileBytesPerTet) << (3 * setting.refinements);
+  } else {
+    if (run.job.body->shape.empty()) extent.read_seconds = kMeshingSeconds;
+    extent.nodes = setting.nodes.value_or(kUsualNodes);
+    extent.tets = extent.is_quadratic ? extent.nodes * 2 / 3 : extent.nodes * 4;
+  }
+  return extent;
+}
+
+Body make_body(Run& run, const Setting& setting) {
+  Body body = make_pieces(run, setting);
+  if (run.progress) run.progress->learn(find_extent(run, setting, body));
   return body;
 }
 

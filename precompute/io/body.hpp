@@ -7,6 +7,7 @@
 #include <string>
 
 #include "precompute/fem/distribute.hpp"
+#include "precompute/io/costs.hpp"
 #include "precompute/io/run.hpp"
 #include "precompute/io/surface_modes.hpp"
 #include "precompute/mesh/check.hpp"
@@ -33,6 +34,9 @@ struct Body {
   std::map<std::int32_t, std::string> region_names;  // rank 0
   std::string source;                                // "bunny.msh", "bar with 2000 nodes"; for messages
 };
+
+/// What is known of the cost of solving it: of a body that was not read yet (pieces empty) by the job and the size of the file. Rank 0.
+Extent find_extent(const Run& run, const Setting& setting, const Body& body);
 
 /// Reads or makes the mesh, checks it, and gives each rank its piece; rank 0 forgets the mesh. Stations "read" and "partition".
 /// Collective. Throws on every rank: InputError naming the file or the job's line, SystemError.

@@ -3,6 +3,7 @@
 #include <json/json.h>
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 namespace carillon::io {
@@ -101,6 +102,21 @@ Json::Value describe_phases(const Run& run, const eigen::Modes& modes) {
   return phases;
 }
 
+/// What all ranks together did so far; unlike seconds it does not depend on the machine's mood. Phases are those of describe_phases(),
+/// trials of other settings among them, and "other" is what lies between.
+Json::Value describe_work(const std::array<petsc::Work, petsc::kWorkPhases>& work) {
+  Json::Value phases(Json::objectValue);
+  for (std::size_t i = 0; i < work.size(); ++i) {
+    Json::Value& entry = phases[petsc::kWorkPhaseNames[i]];
+    entry["flops"] = work[i].flops;
+    entry["messages"] = work[i].messages;
+    entry["bytes"] = work[i].bytes;
+    entry["collectives"] = work[i].collectives;
+    entry["collective_bytes"] = work[i].collective_bytes;
+  }
+  return phases;
+}
+
 Json::Value describe_damping(const spec::Material& material) {
   Json::Value damping;
   switch (material.law) {
@@ -164,8 +180,7 @@ std::string write_json(const Json::Value& value) {
   return Json::writeString(writer, value);
 }
 
-Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved,
-                         const std::vector<std::int64_t>& peak_bytes) {
+Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured) {
   Json::Value root;
   root["program"] = "carillon-precompute";
   root["git"] = git_id();
@@ -181,7 +196,8 @@ Json::Value describe_run(const Run& run, const Setting& setting, const Body& bod
     entry["peak_bytes_all_ranks"] = Json::Int64(station.peak_sum_bytes);
   }
   root["phase_seconds"] = describe_phases(run, solved.modes);
-  for (const std::int64_t bytes : peak_bytes) root["peak_bytes_by_rank"].append(Json::Int64(bytes));
+  root["work"] = describe_work(measured.work);
+  for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(Json::Int64(bytes));
   root["solver_options"] = make_list(run.options.solver_options);
   root["chosen"]["element"] = spec::to_text(setting.element);
   root["chosen"]["tolerance"] = setting.tolerance;

@@ -10,9 +10,8 @@
 
 namespace carillon::io {
 
-/// What goes under "run" in the resolved job and in the provenance of the bank. `peak_bytes`: of each rank. Rank 0 only.
-Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved,
-                         const std::vector<std::int64_t>& peak_bytes);
+/// What goes under "run" in the resolved job and in the provenance of the bank. Rank 0 only.
+Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured);
 
 /// Materials by region: what they are, how they damp, and their volume.
 Json::Value describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3);

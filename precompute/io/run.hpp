@@ -3,9 +3,11 @@
 
 #include <mpi.h>
 
+#include <memory>
 #include <string>
 
 #include "jobs/spec/job_spec.hpp"
+#include "precompute/io/progress_file.hpp"
 #include "precompute/io/run_options.hpp"
 #include "precompute/io/run_record.hpp"
 #include "runtime/config/error.hpp"
@@ -24,6 +26,7 @@ struct Run {
   spec::JobSpec job;  // the same on every rank
   RunOptions options;
   Stations stations;
+  std::unique_ptr<ProgressFile> progress;  // on rank 0, if it is asked for
 };
 
 /// Runs a collective step whose errors cannot know what it works on, and names it in them. All ranks throw alike.

@@ -4,6 +4,8 @@
 #include <json/json.h>
 
 #include <cmath>
+#include <memory>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -54,6 +56,22 @@ void check_job(const Run& run) {
   });
 }
 
+/// The file in which others see how far the run is; from now on it is written.
+void open_progress(Run& run) {
+  petsc::run_agreed(run.comm, [&] {
+    const fs::path& file = run.options.progress;
+    if (run.rank != 0 || file.empty()) return;
+    for (const fs::path& other : {run.job.file, run.job.mesh, run.job.bank, spec::find_resolved_path(run.job.bank)}) {
+      std::error_code error;  // One of them that does not exist is none of the others.
+      if (!other.empty() && (file == other || fs::equivalent(file, other, error)))
+        throw InputError(
+            fmt::format("{}: progress would be appended to a file of the job's own; give another with --progress", file.string()));
+    }
+    run.progress = std::make_unique<ProgressFile>(file, run.ranks);
+    run.stations.set_listener([progress = run.progress.get()](const std::string& name) { progress->begin(name); });
+  });
+}
+
 /// An option that nothing asked for is misspelt, or belongs to a solver that did not run.
 void check_options_used(MPI_Comm comm) {
   petsc::run_agreed(comm, [] {
@@ -92,24 +110,24 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   summary.bank = run.job.bank;
   summary.resolved = spec::find_resolved_path(run.job.bank);
   const fs::path folder = fs::absolute(summary.bank).parent_path();
-  const auto make_record = [&](const std::vector<std::int64_t>& peak_bytes) {
-    Json::Value record = describe_run(run, found.setting, found.body, found.solved, peak_bytes);
+  const auto make_record = [&](const Measured& measured) {
+    Json::Value record = describe_run(run, found.setting, found.body, found.solved, measured);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
     return spec::resolved_json(run.job, folder, write_json(record));
   };
   run.stations.begin("write", summary.bank.string());
-  std::vector<std::int64_t> peak_bytes = gather_peak_bytes(run.comm);
+  Measured measured = measure(run.comm);
   petsc::run_agreed(run.comm, [&] {
     if (run.rank != 0) return;
-    bank.provenance = make_record(peak_bytes);
+    bank.provenance = make_record(measured);
     bank::write_bank(bank, summary.bank);
     run.stations.say(fmt::format("{} bytes", fs::file_size(summary.bank)));
     summary.result = describe_result(bank);
   });
   run.stations.end();
-  peak_bytes = gather_peak_bytes(run.comm);
+  measured = measure(run.comm);
   petsc::run_agreed(run.comm, [&] {
-    if (run.rank == 0) config::write_file(summary.resolved, make_record(peak_bytes));
+    if (run.rank == 0) config::write_file(summary.resolved, make_record(measured));
   });
   return summary;
 }
@@ -120,6 +138,7 @@ RunSummary run_job(MPI_Comm comm, const fs::path& job_file, const RunOptions& op
   Run run(comm, options);
   run.job = read_shared_job(run, job_file);
   check_job(run);
+  open_progress(run);
   AccurateBody found;
   if (run.job.accuracy_cents) {
     found = solve_to_accuracy(run);
@@ -130,7 +149,9 @@ RunSummary run_job(MPI_Comm comm, const fs::path& job_file, const RunOptions& op
   }
   check_options_used(comm);
   bank::Bank bank = collect_bank(run, found);
-  return write_outputs(run, found, std::move(bank));
+  RunSummary summary = write_outputs(run, found, std::move(bank));
+  if (run.progress) run.progress->finish();
+  return summary;
 }
 
 }  // namespace carillon::io

@@ -15,6 +15,7 @@
 #include "partition/partition.hpp"
 #include "precompute/io/git_id.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 
 namespace carillon::io {
 namespace {
@@ -27,6 +28,20 @@ std::string strip_name(const std::string& text) {
 
 }  // namespace
 
+namespace {
+
+/// What is done in a station, where nothing says otherwise.
+petsc::WorkPhase find_work_phase(const std::string& station) {
+  if (station == "read") return petsc::WorkPhase::kRead;
+  if (station == "partition") return petsc::WorkPhase::kPartition;
+  if (station == "assemble") return petsc::WorkPhase::kAssemble;
+  if (station == "modes") return petsc::WorkPhase::kOrthogonalise;
+  if (station == "errors") return petsc::WorkPhase::kErrors;
+  return petsc::WorkPhase::kWrite;
+}
+
+}  // namespace
+
 Stations::Stations(MPI_Comm comm, bool quiet) : comm_(comm) {
   MPI_Comm_rank(comm, &rank_);
   speaks_ = rank_ == 0 && !quiet;
@@ -34,8 +49,10 @@ Stations::Stations(MPI_Comm comm, bool quiet) : comm_(comm) {
 
 void Stations::begin(const std::string& name, const std::string& what) {
   name_ = name;
+  petsc::set_work_phase(find_work_phase(name));
   start_ = std::chrono::steady_clock::now();
   start_cpu_s_ = find_cpu_seconds();
+  if (listener_) listener_(name);
   if (!speaks_) return;
   fmt::print("{:<10} {}\n", name, what);
   std::fflush(stdout);
@@ -65,6 +82,7 @@ const Station& Stations::end() {
   MPI_Allreduce(MPI_IN_PLACE, &station.cpu_seconds, 1, MPI_DOUBLE, MPI_SUM, comm_);
   MPI_Allreduce(MPI_IN_PLACE, &station.peak_bytes, 1, MPI_INT64_T, MPI_MAX, comm_);
   MPI_Allreduce(MPI_IN_PLACE, &station.peak_sum_bytes, 1, MPI_INT64_T, MPI_SUM, comm_);
+  petsc::set_work_phase(petsc::WorkPhase::kOther);
   stations_.push_back(station);
   say(fmt::format("{:.2f} s, {:.0f} MB peak on the largest rank", station.seconds, station.peak_bytes / 1e6));
   return stations_.back();
@@ -93,6 +111,13 @@ std::vector<std::int64_t> gather_peak_bytes(MPI_Comm comm) {
   std::vector<std::int64_t> all(rank == 0 ? static_cast<std::size_t>(ranks) : 0);
   MPI_Gather(&mine, 1, MPI_INT64_T, all.data(), 1, MPI_INT64_T, 0, comm);
   return all;
+}
+
+Measured measure(MPI_Comm comm) {
+  Measured measured;
+  measured.peak_bytes = gather_peak_bytes(comm);
+  measured.work = petsc::sum_work(comm);
+  return measured;
 }
 
 std::string git_id() { return kGitId; }

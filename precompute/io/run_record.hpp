@@ -3,10 +3,15 @@
 
 #include <mpi.h>
 
+#include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "precompute/petsc/work.hpp"
 
 namespace carillon::io {
 
@@ -25,6 +30,8 @@ class Stations {
   /// quiet: nothing is printed.
   Stations(MPI_Comm comm, bool quiet);
 
+  /// Who is told of every station that starts, on rank 0.
+  void set_listener(std::function<void(const std::string& name)> listener) { listener_ = std::move(listener); }
   /// Starts a station; `what` says what it works on. Not collective.
   void begin(const std::string& name, const std::string& what);
   /// Prints a line, or several, inside the station, on rank 0. Not collective.
@@ -46,6 +53,7 @@ class Stations {
   double start_cpu_s_ = 0.0;
   std::vector<Station> stations_;
   std::vector<std::string> warnings_;
+  std::function<void(const std::string& name)> listener_;
 };
 
 /// User and system seconds of this process so far.
@@ -56,6 +64,15 @@ std::int64_t find_peak_bytes();
 
 /// The same of every rank, on rank 0; empty on the others. Collective.
 std::vector<std::int64_t> gather_peak_bytes(MPI_Comm comm);
+
+/// What a run has taken and done so far.
+struct Measured {
+  std::vector<std::int64_t> peak_bytes;                // of each rank; on rank 0
+  std::array<petsc::Work, petsc::kWorkPhases> work{};  // of all ranks
+};
+
+/// Collective.
+Measured measure(MPI_Comm comm);
 
 /// The commit that this build was made from, "-dirty" appended when tracked files differ from it; "unknown" outside git.
 std::string git_id();

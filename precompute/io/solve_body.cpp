@@ -32,8 +32,9 @@ eigen::NodeLayout make_layout(fem::Distribution& pieces) {
 /// A line whenever the phase changes or another tenth of the modes is done.
 class ProgressLines {
  public:
-  explicit ProgressLines(const Stations& stations) : stations_(stations) {}
+  explicit ProgressLines(const Run& run) : stations_(run.stations), file_(run.progress.get()) {}
   void operator()(const eigen::Progress& progress) {
+    if (file_ != nullptr) file_->advance(progress);
     const std::int64_t tenth = progress.modes_wanted > 0 ? 10 * progress.modes_done / progress.modes_wanted : 0;
     if (progress.phase == phase_ && tenth == tenth_) return;
     phase_ = progress.phase;
@@ -61,6 +62,7 @@ class ProgressLines {
   }
 
   const Stations& stations_;
+  ProgressFile* file_;
   std::optional<eigen::Phase> phase_;
   std::int64_t tenth_ = 0;
 };
@@ -107,7 +109,7 @@ eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, 
   options.tolerance = setting.tolerance;
   options.factorisation = find_factorisation(run.job.factorisation);
   options.method = find_method(run.job.method);
-  ProgressLines lines(run.stations);
+  ProgressLines lines(run);
   options.progress = [&lines](const eigen::Progress& progress) { lines(progress); };
   run.stations.begin("modes", fmt::format("{:g} Hz to {:g} Hz", options.low_hz, options.high_hz));
   eigen::Modes modes = eigen::solve_modes({system.stiffness, system.mass, std::move(layout)}, options);

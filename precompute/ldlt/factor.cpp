@@ -16,6 +16,7 @@
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::ldlt {
@@ -147,6 +148,7 @@ bool Factor::factorise(double sigma) {
   s.name_need([&] {
     s.allocate();
     factorise_fronts(s.plan, s.stiffness, s.mass, sigma, s.numbers);
+    petsc::add_flops(s.plan.analysis.ranks[static_cast<std::size_t>(s.plan.rank)].flops);
   });
   s.backward_error = std::numeric_limits<double>::infinity();
   if (!s.numbers.is_complete || s.numbers.smallest <= kVanishedPivot * s.norm) return false;
@@ -162,6 +164,7 @@ double Factor::get_backward_error() const { return state_->backward_error; }
 double Factor::get_growth() const { return state_->numbers.growth; }
 
 void Factor::State::solve(double* x, int stride, int columns) {
+  petsc::add_flops(4.0 * static_cast<double>(plan.analysis.ranks[static_cast<std::size_t>(plan.rank)].entries) * columns);
   for (int first = 0; first < columns; first += kSolveColumns)
     solve_columns(plan, numbers, workspace, x + static_cast<std::ptrdiff_t>(first) * stride, stride,
                   std::min(kSolveColumns, columns - first));

@@ -1,0 +1,103 @@
+// Method:     The analysis of the factorisation says what it takes; Sylvester's law of inertia counts the modes (inertia.cpp).
+// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3. Deviations: none.
+#include "precompute/eigen/needs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <numbers>
+
+#include "precompute/eigen/check_input.hpp"
+#include "precompute/eigen/krylov.hpp"
+#include "precompute/eigen/rigid_modes.hpp"
+#include "precompute/eigen/scaling.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+
+constexpr double kZeroFraction = 1e-5;  // Of high_hz: frequencies below are zero to working precision.
+
+double calc_lambda(double freq_hz) {
+  const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
+  return omega_rad_s * omega_rad_s;
+}
+
+double find_cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace
+
+BandEnds find_ends(const Options& options) {
+  return {calc_lambda(std::max(options.low_hz, kZeroFraction * options.high_hz)), calc_lambda(options.high_hz)};
+}
+
+Slice count_between(InertiaCounter& counter, double low, double high) {
+  const Inertia above = counter.take(high * (1 + kEdgeNudge), kEdgeNudge);
+  const Inertia below = counter.take(low * (1 - 2 * kEdgeNudge), kEdgeNudge);
+  return {below.lambda, below.below, above.lambda, above.below};
+}
+
+std::int64_t calc_copies_bytes(const Problem& problem) {
+  double entries = 0;
+  for (const Mat matrix : {problem.stiffness, problem.mass}) {
+    MatInfo info;
+    check(MatGetInfo(matrix, MAT_LOCAL, &info));
+    entries += 3 * info.nz_used;
+  }
+  PetscInt rows = 0;
+  check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
+  entries += 18.0 * rows;
+  return static_cast<std::int64_t>(8 * entries);
+}
+
+std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count) {
+  const bool is_cut = modes > kSliceModes;
+  const std::int64_t locked = is_cut ? kSliceModes / 2 : rigid_count;
+  const std::int64_t basis = calc_basis_size(std::min(modes, kSliceModes), locked, !is_cut);
+  return rows * 8 * (modes + locked + basis);
+}
+
+std::int64_t calc_dense_bytes(std::int64_t unknowns) {
+  constexpr std::int64_t kMatrices = 4;  // K, M, and the vectors as they were calculated and distributed
+  return kMatrices * 8 * unknowns * unknowns;
+}
+
+Outlook look_ahead(const Problem& problem, const Options& options, const std::function<bool(const Outlook&)>& may_count) {
+  check_input(problem, options);
+  Outlook outlook;
+  PetscInt n = 0;
+  check(MatGetSize(problem.stiffness, &n, nullptr));
+  const BandEnds ends = find_ends(options);
+  const Scaling scaling(problem.stiffness, problem.mass, ends.high);
+  std::vector<std::int64_t> per_component;
+  outlook.rigid_count = static_cast<std::int64_t>(make_rigid_modes(problem.stiffness, problem.mass, problem.nodes, per_component).size());
+  outlook.is_dense = n <= kDenseRows || options.method == Method::kDense;
+  outlook.copies_bytes = calc_copies_bytes(problem);
+  Options unlimited = options;
+  unlimited.memory_limit_bytes = 0;
+  if (unlimited.factorisation == Factorisation::kCholmod) unlimited.factorisation = Factorisation::kAutomatic;
+  Seconds seconds;
+  FactorStatistics statistics;
+  InertiaCounter counter(problem, unlimited, seconds, statistics,
+                         [&](double lambda) { return std::sqrt(std::max(scaling.from_scaled(lambda), 0.0)) / (2 * std::numbers::pi); });
+  double start = find_cpu_seconds();
+  const ShiftedFactor& factor = counter.analyse();
+  outlook.analyse_seconds = find_cpu_seconds() - start;
+  outlook.entries = factor.get_entries();
+  outlook.flops = factor.get_flops();
+  outlook.factor_bytes = factor.get_peak_bytes();
+  if (!may_count(outlook)) return outlook;
+  start = find_cpu_seconds();
+  const Slice band = count_between(counter, scaling.to_scaled(ends.low), scaling.to_scaled(ends.high));
+  outlook.factor_seconds = (find_cpu_seconds() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
+  outlook.modes = std::min(band.count(), options.max_modes.value_or(band.count()));
+  return outlook;
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,55 @@
+// What a solve needs, known before it is begun; the solver itself and those who foresee it reckon alike.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "precompute/eigen/inertia.hpp"
+#include "precompute/eigen/slices.hpp"
+#include "precompute/eigen/solve_modes.hpp"
+
+namespace carillon::eigen {
+
+inline constexpr PetscInt kDenseRows = 300;       // Smaller problems are solved densely straight away,
+inline constexpr PetscInt kDenseRowsFull = 3000;  // and up to here when the band holds more than a quarter of the spectrum.
+inline constexpr std::int64_t kSliceModes = 320;  // Beyond, orthogonalisation costs more than another factorisation.
+
+inline constexpr double kEdgeNudge = 1e-6;  // Counts are taken this far outside the band, relative to lambda.
+
+/// The ends of the band as eigenvalues [(rad/s)^2]; a lower one of zero is what is zero to working precision.
+struct BandEnds {
+  double low = 0;
+  double high = 0;
+};
+BandEnds find_ends(const Options& options);
+
+/// Counts the eigenvalues below both ends (scaled), a little outside. Two factorisations. Collective.
+Slice count_between(InertiaCounter& counter, double low, double high);
+
+/// Of this rank [byte]. K and M by nodes, at their worst moment while their arrays grow, and the rigid modes.
+std::int64_t calc_copies_bytes(const Problem& problem);
+/// The modes, the basis they are sought in, and those held away, for `rows` rows of this rank and so many modes.
+std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count);
+/// The matrices of a dense solve, on every rank.
+std::int64_t calc_dense_bytes(std::int64_t unknowns);
+
+/// What can be said of a solve without solving.
+struct Outlook {
+  bool is_dense = false;          // LAPACK; nothing below is known but the count
+  std::int64_t entries = 0;       // of a factor, all ranks
+  double flops = 0;               // of a factorisation
+  std::int64_t factor_bytes = 0;  // at its worst moment on this rank
+  std::int64_t copies_bytes = 0;
+  std::int64_t rigid_count = 0;
+  double analyse_seconds = 0;
+  double factor_seconds = 0;          // CPU, of one factorisation; 0: none was made
+  std::optional<std::int64_t> modes;  // of the band, as many as are wanted at most; empty: not counted
+};
+
+/// Analyses K - sigma M, and counts the modes of the band by inertia if `may_count` says that two factorisations of so many flops are worth
+/// it and there is memory for them. K and M are as before afterwards. Throws what solve_modes() throws before it searches, but for want of
+/// memory. Collective.
+Outlook look_ahead(const Problem& problem, const Options& options, const std::function<bool(const Outlook&)>& may_count);
+
+}  // namespace carillon::eigen

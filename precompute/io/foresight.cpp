@@ -1,0 +1,126 @@
+// Method:     Every part of the run has a foreseen cost in seconds of wall clock. What is done, at these prices, against the seconds it
+//             really took gives the pace; the pace times the prices of what is left gives the seconds left, and
+//             percent = 100 gone / (gone + left). Within a factorisation the clock says how far it is; within the iteration the number of
+//             right-hand sides does.
+// Source:     none. Deviations: none.
+#include "precompute/io/foresight.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <string_view>
+
+namespace carillon::io {
+namespace {
+
+constexpr std::array<std::string_view, 7> kStations{"read", "partition", "assemble", "modes", "errors", "collect", "write"};
+constexpr int kModes = 3, kCollect = 5;
+constexpr double kTrustSeconds = 0.5;  // of the prices as they stand, against what is measured
+constexpr double kNearEnd = 0.95;      // of a part whose time is up and which goes on
+constexpr double kMost = 99.9;         // per cent, before the end
+constexpr double kTrialShare = 0.5;    // of the rest: for a trial after which others may follow
+
+std::array<double, 7> list(const Costs& costs) {
+  return {costs.read, costs.partition, costs.assemble, costs.sum_modes(), costs.errors, costs.collect, costs.write};
+}
+
+double calc_factorisations(const eigen::Progress& progress) {
+  const auto made = progress.factorisations;
+  return static_cast<double>(std::max(predict_factorisations(progress.modes_wanted), made));
+}
+
+}  // namespace
+
+void Foresight::begin(const std::string& station, double seconds) {
+  const auto found = std::find(kStations.begin(), kStations.end(), station);
+  if (found == kStations.end()) return;
+  station_ = static_cast<int>(found - kStations.begin());
+  if (station_ == 0) {
+    start_percent_ = percent_;
+    start_s_ = seconds;
+    progress_ = {};
+  }
+  if (station_ >= kCollect && is_trial_) {  // It was the last trial.
+    is_trial_ = false;
+    start_percent_ = percent_;
+  }
+  begun_s_ = seconds;
+}
+
+void Foresight::learn(const Extent& extent) {
+  extent_ = extent;
+  costs_ = calc_wall(predict_costs(extent), extent, ranks_);
+  knows_extent_ = extent.tets > 0;
+}
+
+void Foresight::advance(const eigen::Progress& progress, double seconds) {
+  const bool is_news = progress.factor_flops != progress_.factor_flops || progress.modes_wanted != progress_.modes_wanted;
+  progress_ = progress;
+  begun_s_ = seconds;
+  if (!is_news) return;
+  if (progress.factor_flops > 0) extent_.factor_flops = progress.factor_flops;
+  if (progress.factor_entries > 0) extent_.factor_entries = progress.factor_entries;
+  if (progress.modes_wanted > 0) extent_.modes = progress.modes_wanted;
+  learn(extent_);
+}
+
+/// At its price, without the step that is under way.
+double Foresight::calc_modes_done() const {
+  if (progress_.phase == eigen::Phase::kRigid || progress_.phase == eigen::Phase::kAnalyse) return 0;
+  if (progress_.phase == eigen::Phase::kCheck) return costs_.sum_modes() - costs_.check;
+  const double factors = static_cast<double>(progress_.factorisations) / calc_factorisations(progress_);
+  const auto wanted = static_cast<double>(std::max<std::int64_t>(predict_solves(std::max<std::int64_t>(extent_.modes, 1)), 1));
+  const double solved = std::min(static_cast<double>(progress_.solves) / wanted, kNearEnd);
+  return costs_.analyse + costs_.factor * factors + costs_.solve * solved + costs_.orthogonalise * solved * solved;
+}
+
+/// The price of the step under way.
+double Foresight::calc_step() const {
+  if (station_ != kModes) return list(costs_)[static_cast<std::size_t>(station_)];
+  switch (progress_.phase) {
+    case eigen::Phase::kRigid:
+    case eigen::Phase::kAnalyse:
+      return costs_.analyse;
+    case eigen::Phase::kCount:
+    case eigen::Phase::kFactor:
+      return costs_.factor / calc_factorisations(progress_);
+    case eigen::Phase::kCheck:
+      return costs_.check;
+    default:
+      return 0;
+  }
+}
+
+Foresight::Share Foresight::calc_share(double seconds) const {
+  const std::array<double, 7> prices = list(costs_);
+  double done = 0;
+  double all = 0;
+  for (int i = 0; i < static_cast<int>(prices.size()); ++i) {
+    all += prices[static_cast<std::size_t>(i)];
+    if (i < station_) done += prices[static_cast<std::size_t>(i)];
+  }
+  if (station_ == kModes) done += calc_modes_done();
+  const double step = station_ < 0 ? 0 : calc_step();
+  done += std::min(seconds - begun_s_, kNearEnd * step);
+  const double gone = seconds - start_s_;
+  const double pace = (gone + kTrustSeconds) / (done + kTrustSeconds);
+  return {gone, std::max(all - done, 0.0) * pace};
+}
+
+double Foresight::calc_percent(double seconds) {
+  if (is_done_) return percent_ = 100;
+  const Share share = calc_share(seconds);
+  const double part = share.done / std::max(share.done + share.left, 1e-9);
+  const double end = is_trial_ ? start_percent_ + kTrialShare * (kMost - start_percent_) : 100;
+  percent_ = std::clamp(start_percent_ + part * (end - start_percent_), percent_, kMost);
+  return percent_;
+}
+
+std::optional<double> Foresight::calc_seconds_left(double seconds) const {
+  if (is_done_) return 0.0;
+  if (!knows_extent_ || is_trial_) return std::nullopt;
+  return calc_share(seconds).left;
+}
+
+}  // namespace carillon::io
