@@ -202,27 +202,30 @@ TEST(Recording, EveryPieceOfItIsRefusedButTheWhole) {
 }
 
 TEST(Recording, BadLinesAreNamed) {
+  const auto expect_bad = [](const std::string& from, const std::string& to, const std::string& says) {
+    expect_error(kHeader + replace(kImpulse, from, to), says);
+  };
   expect_error("", "run.jsonl:1: the file is empty");
   expect_error(kImpulse, "run.jsonl:1: ");
   expect_error(replace(kHeader, "1,", "2,"), "carillon_contacts");
   expect_error(replace(kHeader, "20}", "0}"), "run.jsonl:1: ");
   expect_error(kHeader + "\n{\"impulse\": \n", "run.jsonl:3: this is not JSON");
   expect_error(kHeader + kImpulse + "[1]\n", "run.jsonl:3: the file must hold one JSON object");
-  expect_error(kHeader + replace(kImpulse, "0.5,", "NaN,"), "run.jsonl:2: this is not JSON");
-  expect_error(kHeader + replace(kImpulse, "0.5,", "1e999,"), "run.jsonl:2: ");
-  expect_error(kHeader + replace(kImpulse, "0.5,", "\"soon\","), "run.jsonl:2: ");
-  expect_error(kHeader + replace(kImpulse, "duration_s", "duration"), "\"duration_s\"");
-  expect_error(kHeader + replace(kImpulse, "\"body\": 0,", "\"body\": 0, \"bodies\": 1,"), "impulse.bodies");
-  expect_error(kHeader + replace(kImpulse, "\"body\": 0,", "\"body\": 2,"), "there is no body 2; the first line names 2");
-  expect_error(kHeader + replace(kImpulse, "\"body\": 0,", "\"body\": 0, \"other\": 7,"), "there is no body 7");
-  expect_error(kHeader + replace(kImpulse, "\"triangle\": 3", "\"triangle\": 20"), "the bank of \"ball\" has 20 triangles");
-  expect_error(kHeader + replace(kImpulse, "\"triangle\": 3", "\"triangle\": 3.5"), "run.jsonl:2: ");
-  expect_error(kHeader + replace(kImpulse, "[0.25, 0.25, 0.5]", "[0.25, 0.25]"), "run.jsonl:2: ");
-  expect_error(kHeader + replace(kImpulse, "[0.25, 0.25, 0.5]", "[0.25, 0.25, 0.75]"), "do not sum to 1");
-  expect_error(kHeader + replace(kImpulse, "1e-4", "-1e-4"), "the duration is negative");
-  expect_error(kHeader + replace(kImpulse, "impulse\"", "inpulse\""), "inpulse");
+  expect_bad("0.5,", "NaN,", "run.jsonl:2: this is not JSON");
+  expect_bad("0.5,", "1e999,", "run.jsonl:2: ");
+  expect_bad("0.5,", "\"soon\",", "run.jsonl:2: ");
+  expect_bad("duration_s", "duration", "\"duration_s\"");
+  expect_bad("\"body\": 0,", "\"body\": 0, \"bodies\": 1,", "impulse.bodies");
+  expect_bad("\"body\": 0,", "\"body\": 2,", "there is no body 2; the first line names 2");
+  expect_bad("\"body\": 0,", "\"body\": 0, \"other\": 7,", "there is no body 7");
+  expect_bad("\"triangle\": 3", "\"triangle\": 20", "the bank of \"ball\" has 20 triangles");
+  expect_bad("\"triangle\": 3", "\"triangle\": 3.5", "run.jsonl:2: ");
+  expect_bad("[0.25, 0.25, 0.5]", "[0.25, 0.25]", "run.jsonl:2: ");
+  expect_bad("[0.25, 0.25, 0.5]", "[0.25, 0.25, 0.75]", "do not sum to 1");
+  expect_bad("1e-4", "-1e-4", "the duration is negative");
+  expect_bad("impulse\"", "inpulse\"", "inpulse");
   expect_error(kHeader + "{}\n", "run.jsonl:2: this line holds no event");
-  expect_error(kHeader + replace(kImpulse, "}}", "}, \"mark\": {\"time_s\": 1}}"), "run.jsonl:2: ");
+  expect_bad("}}", "}, \"mark\": {\"time_s\": 1}}", "run.jsonl:2: ");
   expect_error(kHeader + "{\"mark\": {\"time_s\": 2}}\n" + kImpulse, "run.jsonl:3: time goes back from 2 s to 0.5 s");
   expect_error(replace(kHeader, "1, ", "1, \"events\": 2, ") + kImpulse, "the first line says 2 events and there are 1");
 }

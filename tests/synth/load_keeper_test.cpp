@@ -25,6 +25,15 @@ struct Machine {
     now.mode_samples += work * seconds;
     return load;
   }
+  /// Plays so many tenths of a second, looked at after each; the budget at the end.
+  double keep(LoadKeeper& keeper, double share, double budget, int times) {
+    for (int i = 0; i < times; ++i) {
+      play(0.1, budget);
+      budget = keeper.calc_budget(share, now, budget);
+      EXPECT_GT(budget, 0.0);
+    }
+    return budget;
+  }
 };
 
 TEST(LoadKeeper, ComesToTheShareAndStays) {
@@ -48,41 +57,22 @@ TEST(LoadKeeper, ComesToTheShareAndStays) {
 TEST(LoadKeeper, LeavesAloneWhatHasRoomAndGivesBackWhatItTook) {
   Machine machine{.fixed = 0.02, .per_mode_sample = 2e-10, .wanted = 5e8};
   LoadKeeper keeper;
-  double budget = kUnlimited;
-  for (int i = 0; i < 20; ++i) {
-    machine.play(0.1, budget);
-    budget = keeper.calc_budget(0.3, machine.now, budget);
-    EXPECT_EQ(budget, kUnlimited);
-  }
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(machine.keep(keeper, 0.3, kUnlimited, 1), kUnlimited);
   machine.wanted = 1e10;
-  for (int i = 0; i < 20; ++i) {
-    machine.play(0.1, budget);
-    budget = keeper.calc_budget(0.3, machine.now, budget);
-  }
+  double budget = machine.keep(keeper, 0.3, kUnlimited, 20);
   EXPECT_LT(budget, 2e9);
   machine.wanted = 1e8;
-  for (int i = 0; i < 100; ++i) {
-    machine.play(0.1, budget);
-    budget = keeper.calc_budget(0.3, machine.now, budget);
-  }
+  budget = machine.keep(keeper, 0.3, budget, 100);
   EXPECT_EQ(budget, kUnlimited);
 }
 
 TEST(LoadKeeper, SurvivesWhatCannotBeKeptAndClocksThatErr) {
   Machine machine{.fixed = 0.7, .per_mode_sample = 2e-10, .wanted = 1e9};
   LoadKeeper keeper;
-  double budget = kUnlimited;
-  for (int i = 0; i < 100; ++i) {
-    machine.play(0.1, budget);
-    budget = keeper.calc_budget(0.3, machine.now, budget);
-    EXPECT_GT(budget, 0.0);
-  }
+  double budget = machine.keep(keeper, 0.3, kUnlimited, 100);
   EXPECT_LT(budget, 1e6);
   machine.fixed = 0.1;  // and comes back
-  for (int i = 0; i < 150; ++i) {
-    machine.play(0.1, budget);
-    budget = keeper.calc_budget(0.3, machine.now, budget);
-  }
+  budget = machine.keep(keeper, 0.3, budget, 150);
   EXPECT_GT(budget, 8e8);
   const double before = budget;
   machine.now.busy_s -= 1.0;
