@@ -138,18 +138,14 @@ carillon_options make_default() {
 
 uint32_t to_bits(synth::EffectSet effects) {
   uint32_t bits = 0;
-  for (int e = 0; e < synth::kEffectCount; ++e)
-    if (effects.has(static_cast<synth::Effect>(e))) bits |= 1U << static_cast<unsigned>(e);
+  for (const synth::Effect effect : effects) bits |= 1U << static_cast<unsigned>(effect);
   return bits;
 }
 
 synth::EffectSet to_effects(uint32_t bits) {
   if (bits >= 1U << static_cast<unsigned>(synth::kEffectCount))
     throw InputError("effects " + std::to_string(bits) + " are no sum of carillon_effect");
-  synth::EffectSet effects;
-  for (int e = 0; e < synth::kEffectCount; ++e)
-    if ((bits >> static_cast<unsigned>(e) & 1U) != 0) effects = effects.with(static_cast<synth::Effect>(e));
-  return effects;
+  return synth::EffectSet::from_mask(bits);
 }
 
 template <>
@@ -500,10 +496,8 @@ carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_
   if (synth == nullptr || !read(counters)) return CARILLON_BAD_ARGUMENT;
   const synth::EffectCounters ours = synth->synthesiser.get_effect_counters(body);
   carillon_effect_counters given{};
-  for (int e = 0; e < synth::kEffectCount; ++e) {
-    given.units[e] = ours.units[static_cast<synth::Effect>(e)];
-    given.bytes[e] = ours.bytes[static_cast<synth::Effect>(e)];
-  }
+  std::copy(ours.units.begin(), ours.units.end(), given.units);
+  std::copy(ours.bytes.begin(), ours.bytes.end(), given.bytes);
   write(given, counters);
   return CARILLON_OK;
 }

@@ -109,7 +109,7 @@ class Changes {
   synth::EffectSet find(std::size_t body, synth::EffectSet effects) const {
     const BodyCourse& course = (*courses_)[body];
     if (!course.is_played) return {};
-    if (!course.is_touched) effects = effects.without({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping});
+    if (!course.is_touched) effects = effects.without(synth::kContactEffects);
     return find_effects(*scene_, body, effects);
   }
 
@@ -164,8 +164,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     sound.body_modes.push_back(model->get_mode_count());
     sound.modes += model->get_mode_count();
     // Once a process, and not while the sound plays.
-    if (effects.has(Effect::kRoughness) || effects.has(Effect::kRolling) || effects.has(Effect::kContactDamping))
-      synth::Texture::make_tables();
+    if (effects.has_any(synth::kContactEffects)) synth::Texture::make_tables();
     const double lead_s = effects.has(Effect::kAccelerationNoise) ? model->get_sphere_radius_m() / synth::kSoundSpeedMs : 0.0;
     fed[i] = {.number = static_cast<int>(i), .moves = !effects.is_empty() && !scene.bodies[i].spec.fixed, .lead_s = lead_s};
   }

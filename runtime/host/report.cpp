@@ -45,9 +45,8 @@ contact::Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse&
 plan::MoreJson list_measured(const Sound& sound, std::size_t body, double duration_s) {
   plan::MoreJson more;
   const synth::EffectCounters& counters = sound.effect_counters[body];
-  for (int e = 0; e < synth::kEffectCount; ++e) {
-    const auto effect = static_cast<synth::Effect>(e);
-    more[static_cast<std::size_t>(e)] =
+  for (const synth::Effect effect : synth::EffectSet::all()) {
+    more[effect] =
         fmt::format("\"measured_us_per_s\": {:.4g}, \"units\": {}",
                     1e6 * static_cast<double>(counters.ticks[effect]) * sound.seconds_per_tick / duration_s, counters.units[effect]);
   }

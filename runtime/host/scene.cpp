@@ -82,10 +82,7 @@ Quaternion read_rotation(config::Object& body) {
 /// The effects that "key" of `object` names, none twice.
 synth::EffectSet read_names(config::Object& object, std::string_view key) {
   std::vector<std::string> playable;
-  for (int i = 0; i < synth::kEffectCount; ++i) {
-    const auto effect = static_cast<synth::Effect>(i);
-    if (kPlayableEffects.has(effect)) playable.emplace_back(synth::get_name(effect));
-  }
+  for (const synth::Effect effect : kPlayableEffects) playable.emplace_back(synth::get_name(effect));
   synth::EffectSet effects;
   for (const config::Entry& entry : object.entries(key, std::numeric_limits<std::size_t>::max())) {
     const auto refuse = [&](const std::string& what) { throw InputError(fmt::format("{}: \"{}\" {}", entry.place, key, what)); };
@@ -125,11 +122,8 @@ plan::Wish read_effects(config::Object& object) {
   wishes.choice_or("base", {"auto"}, "auto");
   if (wishes.has("on")) wish.on = read_names(wishes, "on");
   if (wishes.has("off")) wish.off = read_names(wishes, "off");
-  for (int i = 0; i < synth::kEffectCount; ++i) {
-    const auto effect = static_cast<synth::Effect>(i);
-    if (wish.on.has(effect) && wish.off.has(effect)) {
-      wishes.fail("off", fmt::format("names \"{}\", and so does \"on\"; keep one of them", synth::get_name(effect)));
-    }
+  for (const synth::Effect effect : wish.on.common(wish.off)) {
+    wishes.fail("off", fmt::format("names \"{}\", and so does \"on\"; keep one of them", synth::get_name(effect)));
   }
   wishes.finish();
   return wish;

@@ -15,6 +15,7 @@
 #include <numbers>
 #include <optional>
 #include <queue>
+#include <utility>
 
 #include "runtime/config/error.hpp"
 #include "runtime/synth/ears.hpp"
@@ -27,15 +28,7 @@ using std::numbers::pi;
 using Rule = Reason::Rule;
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kAlways = std::numeric_limits<double>::infinity();
-constexpr EffectSet kContactEffects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};
-constexpr EffectSet kEarEffects{Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars};
-
-std::size_t index(Effect effect) { return static_cast<std::size_t>(effect); }
-
-template <typename Function>
-void for_each_effect(Function function) {
-  for (int i = 0; i < synth::kEffectCount; ++i) function(static_cast<Effect>(i));
-}
+using synth::kContactEffects;
 
 double calc_norm(const Vec3& x) { return std::hypot(x[0], x[1], x[2]); }
 
@@ -59,10 +52,10 @@ struct Planner::State {
     double ring_pa2_s = 0.0, ring_s = 0.0;  // modal exposure of its strikes, falling by 60 dB a second since ring_s
     std::vector<double> quiet_s;            // per mode of the bank's levels: when it is not heard any more
     std::vector<double> anchor_m;           // ways to the microphones by which kDoppler is judged
-    std::array<double, synth::kEffectCount> until_s{};
-    std::array<double, synth::kEffectCount> share{};  // the loudest call so far
-    std::array<Reason, synth::kEffectCount> reason;   // of that call
-    std::array<Reason, synth::kEffectCount> call;     // of the last one
+    synth::PerEffect<double> until_s{};
+    synth::PerEffect<double> share{};  // the loudest call so far
+    synth::PerEffect<Reason> reason;   // of that call
+    synth::PerEffect<Reason> call;     // of the last one
     struct Lasting {
       std::uint64_t id = 0;
       double share = 0.0;  // of its damping, were all modes sounding
@@ -82,6 +75,7 @@ struct Planner::State {
   SceneFacts facts;
   Costs costs;
   synth::Track listener{1};
+  bool has_walk = false;  // that events give
   std::map<const bank::Bank*, std::unique_ptr<BankLevels>> banks;
   std::vector<Body> bodies;
   std::priority_queue<Pending> pending;
@@ -93,9 +87,10 @@ struct Planner::State {
 
   double calc_inaudible_db() const { return std::min(kInaudibleDb, calc_level_db(loudest_pa2_s) - kBelowLoudestDb); }
   void find_possible(std::size_t body);
+  void begin_walk(double time_s);
   void refuse(Body& body, Effect effect, const Reason& reason) {
     body.possible = body.possible.without(effect);
-    body.reason[index(effect)] = reason;
+    body.reason[effect] = reason;
   }
   double find_ways(const Body& body, double time_s);
   void call(Body& body, Effect effect, double share, double until_s, Reason reason, double limit = kTellableShare);
@@ -128,9 +123,7 @@ Planner::Planner(SceneFacts facts, const Costs& costs) : state_(std::make_unique
     body.position_m = of.position_m;
     body.until_s.fill(kNever);
     body.share.fill(-1.0);
-    for (const Effect effect : {Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) {
-      body.reason[index(effect)] = {.rule = Rule::kNoContact};
-    }
+    for (const Effect effect : kContactEffects) body.reason[effect] = {.rule = Rule::kNoContact};
     body.quiet_s.assign(levels->get_modes().size(), kNever);
     body.nearest_m = s.find_ways(body, 0.0);
     body.anchor_m = s.way_m;
@@ -149,21 +142,31 @@ void Planner::State::find_possible(std::size_t number) {
   if (of.fixed) refuse(body, Effect::kAccelerationNoise, {.rule = Rule::kFixed});
   if (facts.microphones_m.size() < 2) refuse(body, Effect::kTwoEars, {.rule = Rule::kOneMicrophone});
   if (!facts.moves) {
-    for (const Effect effect : {Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) {
-      refuse(body, effect, {.rule = Rule::kNoContact});
-    }
+    for (const Effect effect : kContactEffects) refuse(body, effect, {.rule = Rule::kNoContact});
   }
-  if (of.fixed && listener.is_still()) refuse(body, Effect::kDoppler, {.rule = Rule::kStill});
+  if (of.fixed && listener.is_still() && !has_walk) refuse(body, Effect::kDoppler, {.rule = Rule::kStill});
   if (!body.bank->can_ring()) {
-    for (const Effect effect : {Effect::kModal, Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) {
-      refuse(body, effect, {.rule = Rule::kNoModes});
-    }
+    for (const Effect effect : kContactEffects.with(Effect::kModal)) refuse(body, effect, {.rule = Rule::kNoModes});
   }
   const bool silent = !body.bank->can_ring() && of.fixed;
   if (silent || (!facts.moves && !of.struck)) {
-    for_each_effect([&](Effect effect) {
-      if (body.possible.has(effect)) refuse(body, effect, {.rule = silent ? Rule::kNoModes : Rule::kNotStruck});
-    });
+    for (const Effect effect : body.possible) refuse(body, effect, {.rule = silent ? Rule::kNoModes : Rule::kNotStruck});
+  }
+}
+
+/// Events give the listener's way from now on; what was known of it before that time stays.
+void Planner::State::begin_walk(double time_s) {
+  constexpr std::size_t kRemembered = 4096;  // waypoints
+  const synth::Track known = std::exchange(listener, synth::Track(kRemembered));
+  for (std::size_t i = 0; i < known.get_count(); ++i) {
+    if (known.get_waypoint(i).time_s <= time_s) listener.push(known.get_waypoint(i));
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    Body& body = bodies[i];
+    Reason& reason = body.reason[Effect::kDoppler];
+    if (body.possible.has(Effect::kDoppler) || reason.rule != Rule::kStill) continue;
+    reason = {};
+    find_possible(i);
   }
 }
 
@@ -184,15 +187,14 @@ double Planner::State::find_ways(const Body& body, double time_s) {
 
 /// Something calls for an effect with that share of the sound, until then.
 void Planner::State::call(Body& body, Effect effect, double share, double until_s, Reason reason, double limit) {
-  const std::size_t e = index(effect);
   if (!body.possible.has(effect)) return;
-  if (share > body.share[e]) {
-    body.share[e] = share;
-    body.reason[e] = reason;
+  if (share > body.share[effect]) {
+    body.share[effect] = share;
+    body.reason[effect] = reason;
   }
   if (!(share > limit)) return;
-  body.call[e] = reason;
-  body.until_s[e] = std::max(body.until_s[e], until_s);
+  body.call[effect] = reason;
+  body.until_s[effect] = std::max(body.until_s[effect], until_s);
 }
 
 /// The ways of a body's sound at that time.
@@ -256,7 +258,7 @@ void Planner::State::apply(const stream::Impulse& impulse) {
       body.quiet_s[m] = quiet_s;
     }
     end_s = std::max(end_s, impulse.time_s + half_s);
-    body.plan.effects[index(Effect::kModal)].cost_us +=
+    body.plan.effects[Effect::kModal].cost_us +=
         1e-3 * (rung_s * facts.rate_hz * costs.mode_sample_ns + static_cast<double>(modes.size()) * costs.strike_mode_ns);
     const double share = weigh(heard);
     const bool counts = share > kTellableShare || of.wish.off.has(Effect::kAccelerationNoise);
@@ -289,7 +291,7 @@ void Planner::State::apply(const stream::Impulse& impulse) {
   const double lost = weigh((levels.pulse_loss_pa2_s + click.pulse_loss_pa2_s) * spreading);
   call(body, Effect::kHertzPulse, lost, end_s + travel_s, {.rule = Rule::kChange, .value = to_db(lost), .limit = to_db(kTellableShare)});
   if (lost > kTellableShare) {
-    body.plan.effects[index(Effect::kHertzPulse)].cost_us +=
+    body.plan.effects[Effect::kHertzPulse].cost_us +=
         1e-3 * costs.pulse_mode_sample_ns * static_cast<double>(amplitude_pa.size()) * impulse.duration_s * facts.rate_hz;
   }
   body.sounds_until_s = std::max(body.sounds_until_s, end_s);
@@ -351,18 +353,18 @@ void Planner::State::apply(const Pending& next) {
 EffectSet Planner::State::decide(const BodyFacts& of, Body& body, double time_s) const {
   EffectSet set = of.wish.on;
   if (of.wish.automatic) {
-    for_each_effect([&](Effect effect) {
+    for (const Effect effect : EffectSet::all()) {
       const auto base = find_base(effect);
       if (of.wish.on.has(effect) && base) set = set.with(*base);  // what is forced on brings what it acts on
-      if (body.until_s[index(effect)] + kHoldS >= time_s) set = set.with(effect);
-    });
+      if (body.until_s[effect] + kHoldS >= time_s) set = set.with(effect);
+    }
   }
   set = set.without(of.wish.off);
   if (!of.wish.automatic) return set;
-  for_each_effect([&](Effect effect) {
+  for (const Effect effect : EffectSet::all()) {
     const auto base = find_base(effect);
     if (base && !set.has(*base) && !of.wish.on.has(effect)) set = set.without(effect);
-  });
+  }
   if (!set.has(Effect::kModal) && !set.has(Effect::kAccelerationNoise)) {
     for (const Effect effect : {Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars}) {
       if (!of.wish.on.has(effect)) set = set.without(effect);
@@ -379,14 +381,14 @@ void Planner::State::add_costs(Body& body) {
   const double samples = kTickS * facts.rate_hz, all = static_cast<double>(facts.microphones_m.size());
   const double ears = body.now.has(Effect::kTwoEars) ? all : 1.0;
   const auto add = [&](Effect effect, double ns) {
-    if (body.now.has(effect)) body.plan.effects[index(effect)].cost_us += 1e-3 * samples * ns;
+    if (body.now.has(effect)) body.plan.effects[effect].cost_us += 1e-3 * samples * ns;
   };
   add(Effect::kModal, costs.voice_sample_ns);
   add(Effect::kAirDelay, costs.ear_sample_ns);
   add(Effect::kTwoEars, (all - 1.0) * costs.ear_sample_ns);
   add(Effect::kDoppler, ears * (costs.moving_ear_sample_ns - costs.ear_sample_ns));
   add(Effect::kAccelerationNoise, ears * costs.dipole_ear_sample_ns + costs.click_sample_ns);
-  for (const Effect effect : {Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}) add(effect, costs.force_sample_ns);
+  for (const Effect effect : kContactEffects) add(effect, costs.force_sample_ns);
 }
 
 EffectSet Planner::get_possible(int body) const {
@@ -399,7 +401,7 @@ EffectSet Planner::get_possible(int body) const {
 bool Planner::needs_contacts() const {
   for (std::size_t i = 0; i < state_->bodies.size(); ++i) {
     const EffectSet possible = get_possible(static_cast<int>(i));
-    if (state_->facts.moves && possible.without(kContactEffects) != possible) return true;
+    if (state_->facts.moves && possible.has_any(kContactEffects)) return true;
   }
   return false;
 }
@@ -418,7 +420,7 @@ void Planner::watch(const stream::Event& event) {
   } else if (const auto* motion = std::get_if<stream::Motion>(&event)) {
     if (!is_ours(motion->body)) return;
   } else if (const auto* listener = std::get_if<stream::Listener>(&event)) {
-    if (s.order == 0 || s.listener.is_still()) s.listener = synth::Track(4096);
+    if (!std::exchange(s.has_walk, true)) s.begin_walk(listener->time_s);
     s.listener.push({listener->time_s, listener->position_m, listener->velocity_m_s});
     return;
   } else {
@@ -447,28 +449,27 @@ std::vector<Change> Planner::advance(double known_s) {
       const EffectSet set = s.decide(of, body, time_s);
       if (set != body.now || !body.decided) {
         Change change{time_s, static_cast<int>(i), set, {}};
-        for_each_effect([&](Effect effect) {
+        for (const Effect effect : EffectSet::all()) {
           const bool on = set.has(effect);
-          if (body.decided && on == body.now.has(effect)) return;
-          EffectPlan& plan = body.plan.effects[index(effect)];
+          if (body.decided && on == body.now.has(effect)) continue;
+          EffectPlan& plan = body.plan.effects[effect];
           if (on && !plan.ever) plan.first_s = time_s;
           plan.ever = plan.ever || on;
           plan.switched += on;
           const bool forced = !of.wish.automatic || of.wish.on.has(effect) || of.wish.off.has(effect);
-          Reason reason = on ? body.call[index(effect)] : body.decided ? Reason{.rule = Rule::kSilent} : body.reason[index(effect)];
+          Reason reason = on ? body.call[effect] : body.decided ? Reason{.rule = Rule::kSilent} : body.reason[effect];
           if (forced) reason = {.rule = of.wish.automatic || on ? Rule::kForced : Rule::kNotOffered};
           change.switches.push_back({effect, on, reason});
-        });
+        }
         body.now = set;
         body.decided = true;
         changes.push_back(std::move(change));
       }
-      for_each_effect([&](Effect effect) {
-        if (!set.has(effect)) return;
-        EffectPlan& plan = body.plan.effects[index(effect)];
+      for (const Effect effect : set) {
+        EffectPlan& plan = body.plan.effects[effect];
         plan.last_s = std::min(time_s + kTickS, s.facts.duration_s);
         plan.on_s += std::max(0.0, plan.last_s - time_s);
-      });
+      }
       s.add_costs(body);
     }
   }
@@ -482,21 +483,21 @@ BodyPlan Planner::get_plan(int number) const {
   const State::Body& body = state_->bodies.at(i);
   const Wish& wish = state_->facts.bodies[i].wish;
   BodyPlan plan = body.plan;
-  for_each_effect([&](Effect effect) {
-    EffectPlan& of = plan.effects[index(effect)];
-    of.reason = body.reason[index(effect)];
+  for (const Effect effect : EffectSet::all()) {
+    EffectPlan& of = plan.effects[effect];
+    of.reason = body.reason[effect];
     if (!of.ever) of.cost_us = 0.0;
     const bool forced = wish.on.has(effect) || wish.off.has(effect);
     if (forced || !wish.automatic) {
       of.reason = {.rule = forced && (wish.automatic || wish.on.has(effect)) ? Rule::kForced : Rule::kNotOffered};
-      return;
+      continue;
     }
     const auto base = find_base(effect);
     if (base && (wish.off.has(*base) || (!plan[*base].ever && body.possible.has(effect)))) {
       of.reason = {.rule = Rule::kNeedsOther, .other = *base};
     }
     if (of.ever && of.reason.rule == Rule::kNotStruck) of.reason = {.rule = Rule::kForced};  // brought along
-  });
+  }
   return plan;
 }
 
@@ -507,57 +508,6 @@ double Planner::calc_silence_pa(int number) const {
   if (!(state_->loudest_pa2_s > 0.0)) return kStandardPa;
   const double quiet_pa = kReferencePa * std::pow(10.0, state_->calc_inaudible_db() / 20.0);
   return std::max(kStandardPa, kMargin * quiet_pa * body.nearest_m);
-}
-
-std::string describe(const Reason& r) {
-  switch (r.rule) {
-    case Rule::kForced:
-      return "the scene says so";
-    case Rule::kNotOffered:
-      return "not in the scene's list";
-    case Rule::kNeedsOther:
-      return fmt::format("has nothing to act on without {}", synth::get_name(r.other));
-    case Rule::kNotStruck:
-      return "nothing happens to the body";
-    case Rule::kNoModes:
-      return "no mode between 20 Hz and half the sample rate";
-    case Rule::kTooQuiet:
-      return fmt::format("{:.1f} dB(A), below {:.1f} dB(A) nobody hears it", r.value, r.limit);
-    case Rule::kHeard:
-      return fmt::format("heard with {:.1f} dB(A) at {:.2f} m", r.value, r.distance_m);
-    case Rule::kSilent:
-      return fmt::format("nothing has called for it for {:g} s", kHoldS);
-    case Rule::kChange:
-      return fmt::format("without it the sound would differ by {:.1f} dB, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
-                         r.limit);
-    case Rule::kThump:
-      return fmt::format("a thump of {:.1f} dB in the sound of so large a body, told from it above {:.1f} dB", r.value, r.limit);
-    case Rule::kFixed:
-      return "a body that cannot move has none";
-    case Rule::kOneMicrophone:
-      return "there is one microphone";
-    case Rule::kStill:
-      return r.limit > 0.0 ? fmt::format("way to the microphones changes by {:.3f} mm while it sounds, less than {:.3f} mm", 1e3 * r.value,
-                                         1e3 * r.limit)
-                           : "neither the body nor the listener moves";
-    case Rule::kMoving:
-      return fmt::format("way to a microphone changes while it sounds, by more than {:.3f} mm", 1e3 * r.limit);
-    case Rule::kSameWay:
-      return fmt::format("ways to the microphones differ from that to their middle by {:.3f} mm, less than {:.3f} mm", 1e3 * r.value,
-                         1e3 * r.limit);
-    case Rule::kOtherWay:
-      return fmt::format("ways to the microphones differ from that to their middle by {:.1f} mm, more than {:.3f} mm", 1e3 * r.value,
-                         1e3 * r.limit);
-    case Rule::kNoContact:
-      return "no contact lasts";
-    case Rule::kNoSlip:
-      return fmt::format("{:.2g} mm/s at most, less than {:g} mm/s", 1e3 * r.value, 1e3 * r.limit);
-    case Rule::kSlip:
-      return fmt::format("{:.3g} m/s, more than {:g} mm/s", r.value, 1e3 * r.limit);
-    case Rule::kAirTravel:
-      return fmt::format("{:.2f} m to the nearest microphone, {:.2f} ms", r.value, 1e3 * r.value / bank::kSoundSpeedMs);
-  }
-  return "";
 }
 
 }  // namespace carillon::plan

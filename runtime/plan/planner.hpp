@@ -129,8 +129,8 @@ struct EffectPlan {
 };
 
 struct BodyPlan {
-  std::array<EffectPlan, synth::kEffectCount> effects;
-  const EffectPlan& operator[](Effect effect) const { return effects[static_cast<std::size_t>(effect)]; }
+  synth::PerEffect<EffectPlan> effects;
+  const EffectPlan& operator[](Effect effect) const { return effects[effect]; }
 };
 
 class Planner {

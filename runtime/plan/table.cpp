@@ -38,8 +38,7 @@ std::string format_plan(const Planner& planner, const SceneFacts& facts) {
     fmt::format_to(out, "{}{}, {} modes: {:.0f} us of CPU per second\n", facts.bodies[i].name, facts.bodies[i].fixed ? ", fixed" : "",
                    facts.bodies[i].bank->mode_count(), total);
     all += total;
-    for (int e = 0; e < synth::kEffectCount; ++e) {
-      const auto effect = static_cast<Effect>(e);
+    for (const Effect effect : EffectSet::all()) {
       const EffectPlan& of = plan[effect];
       fmt::format_to(out, "  {:<19} {:<21} {:>7.1f} us/s  {}\n", synth::get_name(effect), describe_time(of, duration),
                      of.cost_us / duration, describe(of.reason));
@@ -54,12 +53,11 @@ std::string make_plan_json(const Planner& planner, const SceneFacts& facts, int 
   auto out = std::back_inserter(json);
   const double duration = find_duration(planner, facts);
   const BodyPlan plan = planner.get_plan(body);
-  for (int e = 0; e < synth::kEffectCount; ++e) {
-    const auto effect = static_cast<Effect>(e);
+  for (const Effect effect : EffectSet::all()) {
     const EffectPlan& of = plan[effect];
     fmt::format_to(out, "{}\"{}\": {{\"on_s\": {:.3f}, \"switched\": {}, \"predicted_us_per_s\": {:.4g}, \"why\": {}{}{}}}",
-                   e == 0 ? "" : ",\n   ", synth::get_name(effect), of.on_s, of.switched, of.cost_us / duration, quote(describe(of.reason)),
-                   more[static_cast<std::size_t>(e)].empty() ? "" : ", ", more[static_cast<std::size_t>(e)]);
+                   json.size() == 1 ? "" : ",\n   ", synth::get_name(effect), of.on_s, of.switched, of.cost_us / duration,
+                   quote(describe(of.reason)), more[effect].empty() ? "" : ", ", more[effect]);
   }
   return json + "}";
 }

@@ -1,7 +1,6 @@
 // A plan as people and programs read it.
 #pragma once
 
-#include <array>
 #include <span>
 #include <string>
 
@@ -15,7 +14,7 @@ std::string format_plan(const Planner& planner, const SceneFacts& facts);
 
 /// The plan of one body as a JSON object: per effect "on_s", "switched", "predicted_us_per_s", "why", and `more`: further members of its
 /// object, as JSON text.
-using MoreJson = std::array<std::string, synth::kEffectCount>;
+using MoreJson = synth::PerEffect<std::string>;
 std::string make_plan_json(const Planner& planner, const SceneFacts& facts, int body, const MoreJson& more = {});
 
 /// Changes as a JSON list, in order of time: {"time_s", "body", "effect", "on", "why"}, one an effect; at most `most`.

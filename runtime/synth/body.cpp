@@ -21,10 +21,10 @@ constexpr EffectSet kOfTheAir{Effect::kModal, Effect::kAccelerationNoise, Effect
 /// Whether a build and a body have an effect: false without a look where the build has not.
 constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
 
-constexpr EffectSet kOfContacts = EffectSet{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}.common(kCompiledEffects);
+constexpr EffectSet kOfContacts = kContactEffects.common(kCompiledEffects);
 
 /// Whether lasting contacts do anything: they act on modes.
-constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::kModal) && !effects.common(kOfContacts).is_empty(); }
+constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::kModal) && effects.has_any(kOfContacts); }
 
 /// The middle of the microphones, where those are who hear a body without two ears.
 Vec3 calc_middle(const std::vector<Vec3>& places) {
@@ -35,11 +35,7 @@ Vec3 calc_middle(const std::vector<Vec3>& places) {
 }
 
 /// The first of a set, or another where it is empty.
-constexpr Effect find_first(EffectSet effects, Effect otherwise) {
-  for (int e = 0; e < kEffectCount; ++e)
-    if (effects.has(static_cast<Effect>(e))) return static_cast<Effect>(e);
-  return otherwise;
-}
+constexpr Effect find_first(EffectSet effects, Effect otherwise) { return effects.is_empty() ? otherwise : *effects.begin(); }
 
 std::unique_ptr<Air> make_air(EffectSet effects, const BodyFrame& frame) {
   auto air = std::make_unique<Air>();

@@ -35,9 +35,9 @@ inline constexpr Surface kGroundSurface{.roughness_m = 20e-6, .friction = 0.5, .
 
 struct ContactForcesOptions {
   Surface surface{};
-  EffectSet effects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};  // others are not looked at
-  int max_contacts = 8;                                                              // that act at once, 1 to kMostContacts
-  int max_records = 512;                                                             // that wait for their time
+  EffectSet effects = kContactEffects;  // others are not looked at
+  int max_contacts = 8;                 // that act at once, 1 to kMostContacts
+  int max_records = 512;                // that wait for their time
 };
 
 struct ContactCounters {

@@ -26,13 +26,9 @@ std::optional<Effect> find_effect(std::string_view name) noexcept {
 }
 
 void check_compiled(EffectSet effects) {
-  const EffectSet missing = effects.without(kCompiledEffects);
-  for (int i = 0; i < kEffectCount; ++i) {
-    const auto effect = static_cast<Effect>(i);
-    if (missing.has(effect))
-      throw InputError(std::string("the effect \"") + get_name(effect) +
-                       "\" is not in this build; leave it out, or build with it in the CMake option CARILLON_EFFECTS");
-  }
+  for (const Effect effect : effects.without(kCompiledEffects))
+    throw InputError(std::string("the effect \"") + get_name(effect) +
+                     "\" is not in this build; leave it out, or build with it in the CMake option CARILLON_EFFECTS");
 }
 
 }  // namespace carillon::synth

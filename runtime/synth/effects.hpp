@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -45,6 +46,7 @@ class EffectSet {
     return set;
   }
   constexpr bool has(Effect effect) const { return (bits_ & bit(effect)) != 0; }
+  constexpr bool has_any(EffectSet other) const { return (bits_ & other.bits_) != 0; }
   constexpr EffectSet with(Effect effect) const { return make(bits_ | bit(effect)); }
   constexpr EffectSet without(Effect effect) const { return make(bits_ & ~bit(effect)); }
   constexpr EffectSet with(EffectSet other) const { return make(bits_ | other.bits_); }
@@ -53,6 +55,31 @@ class EffectSet {
   constexpr bool is_empty() const { return bits_ == 0; }
   static constexpr EffectSet from_mask(unsigned mask) { return make(mask & all().bits_); }
   friend constexpr bool operator==(EffectSet, EffectSet) = default;
+
+  /// Goes through the effects of the set in the order of their list.
+  class Iterator {
+   public:
+    using value_type = Effect;
+    using difference_type = std::ptrdiff_t;
+    constexpr Iterator() = default;
+    constexpr explicit Iterator(unsigned left) : left_(left) {}
+    constexpr Effect operator*() const { return static_cast<Effect>(std::countr_zero(left_)); }
+    constexpr Iterator& operator++() {
+      left_ &= left_ - 1;
+      return *this;
+    }
+    constexpr Iterator operator++(int) {
+      const Iterator before = *this;
+      ++*this;
+      return before;
+    }
+    friend constexpr bool operator==(Iterator, Iterator) = default;
+
+   private:
+    unsigned left_ = 0;  // bits of those that are still to come
+  };
+  constexpr Iterator begin() const { return Iterator(bits_); }
+  constexpr Iterator end() const { return Iterator(); }
 
  private:
   static constexpr unsigned bit(Effect effect) { return 1U << static_cast<unsigned>(effect); }
@@ -67,6 +94,9 @@ class EffectSet {
 /// What this build can play. Code of other effects is not in it.
 inline constexpr EffectSet kCompiledEffects = EffectSet::from_mask(CARILLON_EFFECTS_MASK);
 
+/// What contacts that last make of the surfaces that touch.
+inline constexpr EffectSet kContactEffects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};
+
 /// What a body has when nobody says anything: it rings, struck by pulses that last, heard late, with Doppler shift, by every microphone at
 /// its own place.
 inline constexpr EffectSet kUsualEffects =
@@ -75,12 +105,15 @@ inline constexpr EffectSet kUsualEffects =
 /// Throws InputError that names the first effect of `effects` that this build was made without. [main-thread]
 void check_compiled(EffectSet effects);
 
-/// One number for each effect.
+/// One value for each effect.
 template <typename T>
 class PerEffect {
  public:
   constexpr T& operator[](Effect effect) { return values_[static_cast<std::size_t>(effect)]; }
   constexpr const T& operator[](Effect effect) const { return values_[static_cast<std::size_t>(effect)]; }
+  constexpr void fill(const T& value) { values_.fill(value); }
+  constexpr auto begin() const { return values_.begin(); }
+  constexpr auto end() const { return values_.end(); }
   friend constexpr bool operator==(const PerEffect&, const PerEffect&) = default;
 
  private:

@@ -102,10 +102,10 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
     throw InputError("a body needs a longest distance below 100 km and room for waypoints");
   if (const char* fault = find_fault(settings.surface); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
   collect();
-  const auto free = std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; });
-  if (free == owned_.end())
+  const std::size_t free = find_free();
+  if (free == owned_.size())
     throw InputError("there are " + std::to_string(options_.max_bodies) + " bodies already; raise max_bodies, or remove one");
-  const auto number = static_cast<int>(free - owned_.begin());
+  const auto number = static_cast<int>(free);
   auto body =
       std::make_unique<Body>(std::move(model),
                              BodyFrame{.rate_hz = options_.rate_hz,
@@ -118,35 +118,43 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                                        .surface = settings.surface},
                              settings.position_m, settings.rotation);
   auto change = body->make_change({}, settings.effects);
-  Published& published = published_bodies_[static_cast<std::size_t>(number)];
-  for (int e = 0; e < kEffectCount; ++e) {
-    published.units[static_cast<std::size_t>(e)].store(0, std::memory_order_relaxed);
-    published.ticks[static_cast<std::size_t>(e)].store(0, std::memory_order_relaxed);
+  Published& published = published_bodies_[free];
+  for (const Effect effect : EffectSet::all()) {
+    published.units[effect].store(0, std::memory_order_relaxed);
+    published.ticks[effect].store(0, std::memory_order_relaxed);
   }
   published.peak_pa.store(0.0F, std::memory_order_relaxed);
-  *free = Owned{.body = std::move(body),
+  Owned& owned = owned_[free];
+  owned = Owned{.body = std::move(body),
                 .change = std::move(change),
                 .wanted_model = nullptr,
                 .effects = settings.effects,
                 .wanted = settings.effects,
                 .bytes = {},
                 .is_leaving = false};
-  free->bytes = free->change->calc_bytes();
+  owned.bytes = owned.change->calc_bytes();
   publish_bytes(number);
-  commands_->push({.body = free->body.get(), .change = free->change.get(), .number = number});
+  commands_->push({.body = owned.body.get(), .change = owned.change.get(), .number = number});
   return number;
 }
 
-Synthesiser::Owned& Synthesiser::find_owned(int body) {
-  if (body < 0 || body >= options_.max_bodies || owned_[static_cast<std::size_t>(body)].body == nullptr ||
-      owned_[static_cast<std::size_t>(body)].is_leaving)
+/// The number of a body that is there and stays.
+std::size_t Synthesiser::check_owned(int body) const {
+  const auto i = static_cast<std::size_t>(body);
+  if (body < 0 || i >= owned_.size() || owned_[i].body == nullptr || owned_[i].is_leaving)
     throw InputError("there is no body " + std::to_string(body));
-  return owned_[static_cast<std::size_t>(body)];
+  return i;
+}
+
+/// The first number that no body has; that of no body when all are taken.
+std::size_t Synthesiser::find_free() const {
+  const auto free = std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; });
+  return static_cast<std::size_t>(free - owned_.begin());
 }
 
 void Synthesiser::set_effects(int body, EffectSet effects) {
   collect();
-  Owned& owned = find_owned(body);
+  Owned& owned = owned_[check_owned(body)];
   // Refused here, whether it has to wait or not.
   if (owned.wanted_model != nullptr)
     Body::check(effects, *owned.wanted_model);
@@ -159,13 +167,13 @@ void Synthesiser::set_effects(int body, EffectSet effects) {
 void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   check_model(model.get());
   collect();
-  Owned& owned = find_owned(body);
+  Owned& owned = owned_[check_owned(body)];
   Body::check(owned.wanted, *model);
   owned.wanted_model = std::move(model);
   send_change(body);
 }
 
-EffectSet Synthesiser::get_effects(int body) const { return const_cast<Synthesiser*>(this)->find_owned(body).wanted; }
+EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].wanted; }
 
 /// Makes the change to what is wanted, unless an earlier one is on its way.
 void Synthesiser::send_change(int number) {
@@ -176,7 +184,7 @@ void Synthesiser::send_change(int number) {
   owned.wanted_model.reset();
   owned.effects = owned.wanted;
   const EffectBytes more = owned.change->calc_bytes();
-  for (int e = 0; e < kEffectCount; ++e) owned.bytes[static_cast<Effect>(e)] += more[static_cast<Effect>(e)];
+  for (const Effect effect : EffectSet::all()) owned.bytes[effect] += more[effect];
   publish_bytes(number);
   commands_->push({.body = owned.body.get(), .change = owned.change.get(), .number = number});
 }
@@ -191,12 +199,11 @@ void Synthesiser::publish_bytes(int number) {
     else if (owned_[i].effects.has(Effect::kContactDamping))
       move_contacts_to(Effect::kContactDamping);
   }
-  for (int e = 0; e < kEffectCount; ++e)
-    published_bodies_[i].bytes[static_cast<std::size_t>(e)].store(bytes[static_cast<Effect>(e)], std::memory_order_relaxed);
+  for (const Effect effect : EffectSet::all()) published_bodies_[i].bytes[effect].store(bytes[effect], std::memory_order_relaxed);
 }
 
 void Synthesiser::remove_body(int body) {
-  Owned& owned = find_owned(body);
+  Owned& owned = owned_[check_owned(body)];
   owned.is_leaving = true;
   commands_->push({.body = owned.body.get(), .number = body, .removes = true});
 }
@@ -211,7 +218,7 @@ void Synthesiser::collect() {
       continue;
     }
     const EffectBytes less = owned.change->calc_bytes();
-    for (int e = 0; e < kEffectCount; ++e) owned.bytes[static_cast<Effect>(e)] -= less[static_cast<Effect>(e)];
+    for (const Effect effect : EffectSet::all()) owned.bytes[effect] -= less[effect];
     owned.change.reset();
     publish_bytes(command.number);
     send_change(command.number);
@@ -220,7 +227,7 @@ void Synthesiser::collect() {
 
 bool Synthesiser::is_full() {
   collect();
-  return std::find_if(owned_.begin(), owned_.end(), [](const Owned& owned) { return owned.body == nullptr; }) == owned_.end();
+  return find_free() == owned_.size();
 }
 
 void Synthesiser::set_awake(int number) noexcept {
@@ -454,9 +461,9 @@ void Synthesiser::publish(int number) noexcept {
   const auto i = static_cast<std::size_t>(number);
   const BodyWork& work = playing_[i]->get_work();
   Published& published = published_bodies_[i];
-  for (std::size_t e = 0; e < kEffectCount; ++e) {
-    published.units[e].store(work.units[static_cast<Effect>(e)], std::memory_order_relaxed);
-    if (options_.ticks != nullptr) published.ticks[e].store(work.ticks[static_cast<Effect>(e)], std::memory_order_relaxed);
+  for (const Effect effect : EffectSet::all()) {
+    published.units[effect].store(work.units[effect], std::memory_order_relaxed);
+    if (options_.ticks != nullptr) published.ticks[effect].store(work.ticks[effect], std::memory_order_relaxed);
   }
   published.peak_pa.store(work.peak_pa, std::memory_order_relaxed);
 }
@@ -465,11 +472,10 @@ EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
   EffectCounters counters;
   if (body < 0 || body >= options_.max_bodies) return counters;
   const Published& published = published_bodies_[static_cast<std::size_t>(body)];
-  for (std::size_t e = 0; e < kEffectCount; ++e) {
-    const auto effect = static_cast<Effect>(e);
-    counters.units[effect] = published.units[e].load(std::memory_order_relaxed);
-    counters.ticks[effect] = published.ticks[e].load(std::memory_order_relaxed);
-    counters.bytes[effect] = published.bytes[e].load(std::memory_order_relaxed);
+  for (const Effect effect : EffectSet::all()) {
+    counters.units[effect] = published.units[effect].load(std::memory_order_relaxed);
+    counters.ticks[effect] = published.ticks[effect].load(std::memory_order_relaxed);
+    counters.bytes[effect] = published.bytes[effect].load(std::memory_order_relaxed);
   }
   return counters;
 }

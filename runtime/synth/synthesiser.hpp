@@ -179,14 +179,15 @@ class Synthesiser {
   };
   /// What all threads may see of a body.
   struct Published {
-    std::array<std::atomic<std::int64_t>, kEffectCount> units{}, ticks{}, bytes{};
+    PerEffect<std::atomic<std::int64_t>> units{}, ticks{}, bytes{};
     std::atomic<float> peak_pa{0.0F};
   };
   template <typename T>
   class Pipe;
 
   void check_model(const Model* model) const;
-  Owned& find_owned(int body);
+  std::size_t check_owned(int body) const;
+  std::size_t find_free() const;
   void send_change(int number);
   void publish_bytes(int number);
   void apply_commands() noexcept;

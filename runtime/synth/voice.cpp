@@ -18,7 +18,7 @@ namespace carillon::synth {
 namespace {
 
 /// Whether this build has any effect of contacts that last.
-constexpr bool kHasContacts = !kCompiledEffects.common({Effect::kRoughness, Effect::kRolling, Effect::kContactDamping}).is_empty();
+constexpr bool kHasContacts = kCompiledEffects.has_any(kContactEffects);
 constexpr std::int64_t kCullEvery = 8;  // periods
 
 bool is_finite(const stream::Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }

@@ -211,6 +211,43 @@ TEST(Planner, WhoWalksHearsDopplerFromBodiesAtRest) {
   EXPECT_EQ(Planner(stage.facts).get_possible(0).without(Effect::kDoppler), Planner(stage.facts).get_possible(0));
 }
 
+TEST(Planner, HearsAListenerWhoWalksByEvents) {
+  const auto walk = [](double y, double stop_s) {
+    Stage stage;
+    std::vector<stream::Event> events;
+    for (double time_s = 0.0; time_s <= stop_s; time_s += 1.0) {
+      const Vec3 velocity{0, time_s == 1.0 ? y : 0.0, 0};
+      events.emplace_back(stream::Listener{.time_s = time_s, .position_m = {0, 0.5 * y * time_s, 0}, .velocity_m_s = velocity});
+    }
+    for (const double time_s : {0.2, 1.5, 3.2}) events.emplace_back(make_strike(time_s, 0.01));
+    return play(stage.facts, events);
+  };
+  EXPECT_TRUE(find_effects(walk(0.5, 2.0), 1.5).has(Effect::kDoppler));
+  EXPECT_FALSE(find_effects(walk(0.5, 2.0), 3.6).has(Effect::kDoppler)) << "stands again";
+  EXPECT_FALSE(find_effects(walk(0.0, 2.0), 1.5).has(Effect::kDoppler)) << "stands all the time";
+  EXPECT_TRUE(find_effects(walk(0.5, 1.0), 0.5).has(Effect::kDoppler)) << "one step from where the scene has him";
+
+  Stage stage;
+  Planner planner(stage.facts);
+  EXPECT_FALSE(planner.get_possible(0).has(Effect::kDoppler));
+  planner.watch(stream::Listener{.time_s = 1.0});
+  EXPECT_TRUE(planner.get_possible(0).has(Effect::kDoppler));
+  stage.body().struck = false;
+  Planner silent(stage.facts);
+  silent.watch(stream::Listener{.time_s = 1.0});
+  EXPECT_EQ(silent.get_possible(0), EffectSet{}) << "of a body that makes no sound no way is heard";
+}
+
+TEST(Planner, EventsGoOnWithTheWayThatTheSceneKnows) {
+  Stage stage;
+  stage.facts.listener = {{0.0, {0, 0, 0}}, {1.0, {0, 0, 0}}, {1.01, {0, 0, 0}}, {2.0, {0, 0.5, 0}}, {2.01, {0, 0.5, 0}}};
+  const auto changes = play(stage.facts, {stream::Listener{.time_s = 3.0, .position_m = {0, 0.5, 0}}, make_strike(0.2, 0.01),
+                                          make_strike(1.5, 0.01), make_strike(3.2, 0.01)});
+  EXPECT_FALSE(find_effects(changes, 0.3).has(Effect::kDoppler));
+  EXPECT_TRUE(find_effects(changes, 1.5).has(Effect::kDoppler));
+  EXPECT_FALSE(find_effects(changes, 3.6).has(Effect::kDoppler));
+}
+
 TEST(Planner, ABodyComesToRestAndIsStruckAgain) {
   Stage stage;
   stage.facts.moves = true;
@@ -343,11 +380,11 @@ TEST(Planner, AHailOfStrikesDoesNotMakeItFlap) {
     events.emplace_back(stream::Motion{.time_s = t, .position_m = {0.4, 2.0, i % 2 == 0 ? 0.0 : 0.05}});
   }
   const auto changes = play(stage.facts, events);
-  std::array<int, synth::kEffectCount> on{};
+  synth::PerEffect<int> on;
   for (const Change& change : changes)
-    for (const Switch& one : change.switches) on[static_cast<std::size_t>(one.effect)] += one.on;
+    for (const Switch& one : change.switches) on[one.effect] += one.on;
   for (const int times : on) EXPECT_LE(times, 1);
-  EXPECT_EQ(on[static_cast<std::size_t>(Effect::kDoppler)], 1);
+  EXPECT_EQ(on[Effect::kDoppler], 1);
 }
 
 TEST(Planner, DecidesTheSameHoweverTheEventsCome) {
@@ -420,7 +457,7 @@ TEST(Planner, TheTableSaysWhatAndWhy) {
   planner.watch(make_strike(0.5, 0.01, 1e-3));
   const auto changes = planner.advance(10.0);
   const std::string text = format_plan(planner, stage.facts);
-  for (int i = 0; i < synth::kEffectCount; ++i) EXPECT_NE(text.find(synth::get_name(static_cast<Effect>(i))), std::string::npos);
+  for (const Effect effect : EffectSet::all()) EXPECT_NE(text.find(synth::get_name(effect)), std::string::npos);
   EXPECT_NE(text.find("cube, fixed, 1 modes"), std::string::npos) << text;
   EXPECT_NE(text.find("heard with"), std::string::npos) << text;
   EXPECT_NE(text.find("a body that cannot move has none"), std::string::npos) << text;

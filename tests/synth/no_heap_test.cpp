@@ -123,7 +123,7 @@ TEST(NoHeap, EffectsTakeTheMemoryThatTheirCountersSay) {
   const auto model = Model::make(testing::make_cube_bank(modes));
   const auto sum = [](const Synthesiser& synthesiser, int body) {
     std::int64_t bytes = 0;
-    for (int e = 0; e < kEffectCount; ++e) bytes += synthesiser.get_effect_counters(body).bytes[static_cast<Effect>(e)];
+    for (const std::int64_t more : synthesiser.get_effect_counters(body).bytes) bytes += more;
     return static_cast<double>(bytes);
   };
   Synthesiser synthesiser({.max_waypoints = 2});
