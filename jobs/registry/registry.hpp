@@ -22,21 +22,26 @@ namespace carillon::registry {
 enum class State { queued, running, waiting, done, failed, cancelled };
 std::string to_text(State state);
 
+/// The wall clock, seconds since 1970: for people, never for decisions.
+double find_unix_seconds();
+/// The last part of a job file's name.
+std::string find_name(const std::string& job_file);
+
 struct Job {
   store::Id id;
   State state = State::queued;
-  std::string name;              // of the job file that asked last, for people
-  std::string engine = "local";  // "local" or "slurm"
-  store::Resources resources;    // as asked for; claim() may set what was predicted
-  std::string reason;            // one sentence: why it failed, waits, or was cancelled
-  std::string token;             // of the attempt, 32 hex digits; empty before the first
-  process::Identity worker;      // of the attempt; of the one who claimed, before that is known
-  std::string slurm_job;         // "123" or "123_4"
-  bool cancel_wanted = false;    // somebody asked a running job to end
+  std::string name = {};            // of the job file that asked last, for people
+  std::string engine = "local";     // "local" or "slurm"
+  store::Resources resources = {};  // as asked for; claim() may set what was predicted
+  std::string reason = {};          // one sentence: why it failed, waits, or was cancelled
+  std::string token = {};           // of the attempt, 32 hex digits; empty before the first
+  process::Identity worker = {};    // of the attempt; of the one who claimed, before that is known
+  std::string slurm_job = {};       // "123" or "123_4"
+  bool cancel_wanted = false;       // somebody asked a running job to end
   int attempts = 0;
   int failures = 0;  // attempts that count against the retries
   double ready_boot_s = 0.0;
-  std::string ready_boot_id;
+  std::string ready_boot_id = {};
   double submitted_unix_s = 0.0, started_unix_s = 0.0, ended_unix_s = 0.0;
 };
 
@@ -78,6 +83,8 @@ class Registry {
 
   /// Forgets rows (gc).
   void remove(const std::vector<store::Id>& ids);
+  /// Forgets all submissions but these (gc); the caller holds store::Store::lock_exclusive().
+  void keep_submissions(const std::vector<Submission>& submissions);
 
  private:
   struct Data;

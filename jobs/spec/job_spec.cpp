@@ -14,6 +14,8 @@ namespace fs = std::filesystem;
 
 constexpr double kMostHz = 1e12;
 constexpr std::size_t kMostFixed = 1000, kMostRegions = 10000;
+constexpr long long kMostRanks = 1'000'000;
+constexpr double kMostGb = 1e9, kMostSeconds = 1e9;
 constexpr double kLeastCents = 1e-3, kMostCents = 1200;
 
 /// The words of a schema and their meaning; a job may write `words` only.
@@ -101,6 +103,15 @@ void read_solver(config::Object& job, JobSpec& spec) {
   solver->finish();
 }
 
+void read_resources(config::Object& job, JobSpec& spec) {
+  auto resources = job.object_if("resources");
+  if (!resources) return;
+  if (auto ranks = resources->integer_if("ranks", 1, kMostRanks)) spec.resources.ranks = static_cast<int>(*ranks);
+  spec.resources.memory_gb = resources->number_if("memory_gb", {0.0, kMostGb}).value_or(0.0);
+  spec.resources.time_limit_s = resources->number_if("time_limit_s", {0.0, kMostSeconds}).value_or(0.0);
+  resources->finish();
+}
+
 void read_geometry(config::Object& job, JobSpec& spec) {
   if (job.has("body")) {
     if (job.has("mesh")) job.fail("body", "\"mesh\" names the body already; give one of \"mesh\" (a file) and \"body\"");
@@ -123,6 +134,7 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 }
 
 void check_outputs(config::Object& job, const JobSpec& spec) {
+  if (spec.bank.empty()) return;
   const fs::path input = !spec.body ? spec.mesh : spec.body->surface;
   const fs::path resolved = find_resolved_path(spec.bank);
   if (!input.empty() && (is_same_file(spec.bank, input) || is_same_file(resolved, input))) {
@@ -131,7 +143,7 @@ void check_outputs(config::Object& job, const JobSpec& spec) {
   if (is_same_file(spec.bank, spec.file)) job.fail("bank", "the bank would overwrite this job file; choose another file");
 }
 
-JobSpec read_root(config::Object job, const fs::path& file) {
+JobSpec read_root(config::Object job, const fs::path& file, BankKey bank) {
   JobSpec spec;
   spec.file = file;
   if (job.has("accuracy_cents")) {
@@ -141,7 +153,7 @@ JobSpec read_root(config::Object job, const fs::path& file) {
                fmt::format("must be from {:g} to {:g} cents, and is {:g}", kLeastCents, kMostCents, *spec.accuracy_cents));
   }
   read_geometry(job, spec);
-  spec.bank = job.path("bank");
+  if (bank == BankKey::required || job.has("bank")) spec.bank = job.path("bank");
   spec.band_hz = job.numbers_or<2>("band_hz", spec.band_hz);
   if (!(spec.band_hz[0] > 0 && spec.band_hz[1] > spec.band_hz[0])) {
     job.fail("band_hz", fmt::format("must be [low, high] with 0 < low < high in Hz, and is [{}, {}]", spec.band_hz[0], spec.band_hz[1]));
@@ -154,6 +166,7 @@ JobSpec read_root(config::Object job, const fs::path& file) {
   if (auto count = job.integer_if("max_modes", 1, 40000)) spec.max_modes = static_cast<int>(*count);
   spec.fixed = read_all_fixed(job);
   read_solver(job, spec);
+  read_resources(job, spec);
   job.ignore("run");
   job.finish();
   check_outputs(job, spec);
@@ -164,9 +177,11 @@ JobSpec read_root(config::Object job, const fs::path& file) {
 
 fs::path find_resolved_path(const fs::path& bank) { return fs::path(bank) += ".resolved.json"; }
 
-JobSpec parse_job(std::string_view text, const fs::path& file) { return read_root(config::parse_document(text, file).root(), file); }
+JobSpec parse_job(std::string_view text, const fs::path& file, BankKey bank, int first_line) {
+  return read_root(config::parse_document(text, file, first_line).root(), file, bank);
+}
 
-JobSpec read_job(const fs::path& file) { return read_root(config::read_document(file).root(), file); }
+JobSpec read_job(const fs::path& file, BankKey bank) { return read_root(config::read_document(file).root(), file, bank); }
 
 std::string to_text(Element element) { return kElements.find(element); }
 std::string to_text(Mass mass) { return kMasses.find(mass); }

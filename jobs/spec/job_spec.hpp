@@ -42,11 +42,18 @@ struct Body {
   std::string place = {};  // "file:line" of the job, for messages
 };
 
+/// What the job may use of a machine: for `carillon`, which starts it; no part of what is computed. 0: not given.
+struct Resources {
+  int ranks = 0;
+  double memory_gb = 0.0;     // of all ranks together, 1e9 bytes
+  double time_limit_s = 0.0;  // of one attempt
+};
+
 struct JobSpec {
   std::filesystem::path file;                 // where it was read from
   std::filesystem::path mesh;                 // absolute; empty when the job names a body
   std::optional<Body> body;                   // in place of mesh
-  std::filesystem::path bank;                 // absolute
+  std::filesystem::path bank;                 // absolute; empty: none given
   Material material;                          // of the whole body, or of the regions that `materials` does not name
   bool has_material = true;                   // false: `materials` has to name every region, and `material` is the first of them
   std::map<std::string, Material> materials;  // by region of the mesh: its tag as text, or its name
@@ -59,17 +66,22 @@ struct JobSpec {
   std::optional<double> accuracy_cents;  // in place of element, the mesh's size and tolerance: those are then the program's to choose
   Method method = Method::automatic;     // solver.method
   Factorisation factorisation = Factorisation::automatic;  // solver.factorisation
+  Resources resources;
 };
 
+/// Whether a job without "bank" can be used: `carillon` keeps banks in its store.
+enum class BankKey { required, optional };
+
 /// Reads and validates a job. Throws InputError. Not collective: rank 0 reads, then broadcasts the text.
-JobSpec read_job(const std::filesystem::path& file);
-JobSpec parse_job(std::string_view text, const std::filesystem::path& file);
+JobSpec read_job(const std::filesystem::path& file, BankKey bank = BankKey::required);
+/// The same from text; `file` names it in messages and anchors relative paths, `first_line` is the number of its first line there.
+JobSpec parse_job(std::string_view text, const std::filesystem::path& file, BankKey bank = BankKey::required, int first_line = 1);
 
 /// Where the resolved job goes: beside the bank, "<bank>.resolved.json".
 std::filesystem::path find_resolved_path(const std::filesystem::path& bank);
 
-/// The job as JSON text with every value used. Paths are written relative to `folder` where they can be. `run_json` (an object, may be
-/// empty) is stored under the key "run", which read_job() accepts and ignores, so that the result runs again as a job.
+/// The job as JSON text with every value used, "resources" left out. Paths are written relative to `folder` where they can be. `run_json`
+/// (an object, may be empty) is stored under the key "run", which read_job() accepts and ignores, so that the result runs again as a job.
 std::string resolved_json(const JobSpec& job, const std::filesystem::path& folder, const std::string& run_json);
 
 /// The words of the schema, as a job writes them.

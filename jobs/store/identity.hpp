@@ -1,7 +1,9 @@
 // What a bank is made of, and so its id.
 #pragma once
 
+#include <array>
 #include <filesystem>
+#include <map>
 #include <string>
 
 #include "jobs/spec/job_spec.hpp"
@@ -15,9 +17,24 @@ namespace carillon::store {
 /// same.
 std::string make_canonical_job(const spec::JobSpec& job);
 
-/// Hashes the input and fills id, job, input_*, solver, resources and job_file of a request. `solver` is the line that
-/// carillon-precompute --version prints. Throws InputError for a mesh or surface that cannot be read.
-Request make_request(const spec::JobSpec& job, const std::string& solver);
+/// Makes requests; a file that many jobs name is hashed once as long as it does not change.
+class RequestMaker {
+ public:
+  /// `solver`: the line that carillon-precompute --version prints.
+  explicit RequestMaker(std::string solver) : solver_(std::move(solver)) {}
+  /// Hashes the input and fills the request but its engine. Throws InputError for a mesh or surface that cannot be read.
+  Request make(const spec::JobSpec& job);
+
+ private:
+  struct Known {
+    Id sha256;
+    std::string head;                  // the first bytes
+    std::array<long long, 5> stamp{};  // device, file, size and times
+  };
+  const Known& find_input(const std::filesystem::path& file, const std::string& what);
+  std::string solver_;
+  std::map<std::filesystem::path, Known> known_;
+};
 
 /// Copies the input into the store unless it is there, and makes work/ab/<id> with job.json and request.json unless it is there. True when
 /// this call made it. Throws InputError when the input is no longer what was hashed, SystemError when the disk refuses.

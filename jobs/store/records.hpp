@@ -6,22 +6,18 @@
 #include <optional>
 #include <string>
 
+#include "jobs/spec/job_spec.hpp"
 #include "jobs/store/id.hpp"
 
 namespace carillon::store {
 
-/// What a job may use. 0: not given (ranks and memory are then predicted by whoever starts it; time is unlimited).
-struct Resources {
-  int ranks = 0;
-  double memory_gb = 0.0;  // of the whole job, 1e9 bytes
-  double time_limit_s = 0.0;
-};
+using spec::Resources;
 
 /// request.json: the parts of the id, and what is not part of it.
 struct Request {
   std::string id;            // 64 hex digits
   std::string job;           // canonical text of the resolved job, without paths
-  std::string input_kind;    // "mesh", "surface", or "" when the body is a shape
+  std::string input_kind;    // "mesh", "surface" or "shape"
   std::string input_format;  // "msh", "vtu", "mesh", "tetgen", "hdf", or the ending of a surface, "obj"
   std::string input_sha256;  // 64 hex digits; of a TetGen pair, of both
   std::string solver;        // the line of carillon-precompute --version
@@ -60,6 +56,10 @@ std::optional<Progress> read_progress(const std::filesystem::path& folder);
 
 /// `folder`/request.json and so on. SystemError when the disk refuses.
 void write_request(const std::filesystem::path& folder, const Request& request);
+/// The text of request.json, or of one line of submissions.jsonl; and back.
+std::string format_request(const Request& request, bool one_line = false);
+Request parse_request(std::string_view text, const std::filesystem::path& name);
+std::string format_standing(const Standing& standing);
 void write_standing(const std::filesystem::path& folder, const Standing& standing);
 
 /// Bytes of a path as text that JSON and SQLite take: valid UTF-8 stays, any other byte (and a backslash before an x) becomes "\xNN".

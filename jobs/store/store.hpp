@@ -85,6 +85,8 @@ class Store {
   Lock lock_exclusive() const;  // waits
 
  private:
+  Lock take_lock(int operation) const;
+  void remove_folder(const std::filesystem::path& folder) const;
   explicit Store(std::filesystem::path root) : root_(std::move(root)) {}
   std::filesystem::path root_;  // absolute
 };

@@ -46,7 +46,7 @@ LAW = {
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
     "jobs/process": (["runtime/config"], ["fmt"]),
     "jobs/outcome": (["runtime/config", "jobs/process"], ["fmt"]),
-    "jobs/store": (["runtime/config", "jobs/spec"], ["fmt", "json", "openssl"]),
+    "jobs/store": (["runtime/config", "jobs/spec", "jobs/process"], ["fmt", "json", "openssl"]),
     "jobs/registry": (["runtime/config", "jobs/process", "jobs/store"], ["fmt", "sqlite", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
@@ -68,7 +68,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
-SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dlfcn|signal|pthread|poll|termios|errno|limits|stddef|stdint|stdlib|stdio|string|math|time|spawn|immintrin|xmmintrin)\.h$")
+SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dlfcn|signal|pthread|poll|termios|errno|limits|stddef|stdint|stdlib|stdio|string|math|time|spawn|immintrin|xmmintrin|pwd)\.h$")
 
 
 def library_of(path):

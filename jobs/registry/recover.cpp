@@ -1,0 +1,228 @@
+// Method:     banks/ and work/ are the truth. A job of banks/ is done; one of work/ stands where its state.json says; order and names come
+//             from the log of submissions.
+// Source:     own.
+// Deviations: none.
+#include "jobs/registry/recover.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "jobs/registry/rows.hpp"
+#include "jobs/store/files.hpp"
+#include "runtime/config/error.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::registry {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kLogName = "submissions.jsonl";
+constexpr std::size_t kMostLineBytes = 32 << 20;
+
+/// What a folder of the store says of its job. A damaged record costs what it held, not the job.
+Job make_job(const store::Store& store, const store::Id& id) {
+  Job job{id};
+  const fs::path folder = store.find_folder(id);
+  try {
+    if (const auto request = store::read_request(folder)) {
+      job.name = find_name(request->job_file);
+      job.engine = request->engine;
+      job.resources = request->resources;
+      job.submitted_unix_s = request->submitted_unix_s;
+    }
+  } catch (const InputError&) {
+    job.name = "?";
+  }
+  if (store.has_bank(id)) {
+    job.state = State::done;
+    return job;
+  }
+  try {
+    if (const auto standing = store::read_standing(folder)) {
+      const State state = find_state(standing->state).value_or(State::queued);
+      job.state = state == State::waiting ? State::queued : state;
+      job.reason = standing->reason;
+      job.attempts = standing->attempts;
+      job.failures = standing->failures;
+    }
+  } catch (const InputError&) {
+  }
+  return job;
+}
+
+/// Finds what differs without a lock, then looks again under one.
+struct Differences {
+  std::vector<store::Id> unknown;            // a folder, no row
+  std::vector<store::Id> finished, missing;  // rows whose bank is there; rows with no folder at all
+  bool is_empty() const { return unknown.empty() && finished.empty() && missing.empty(); }
+};
+
+Differences find_differences(Database& database, const store::Store& store) {
+  std::map<store::Id, State> rows;
+  Statement row(database, "select id, state from jobs");
+  while (row.step()) {
+    const auto id = store::parse_id(row.text(0));
+    const auto state = find_state(row.text(1));
+    if (!id || !state) throw Damaged("a row of the registry names no job or no state");
+    rows.emplace(*id, *state);
+  }
+  const std::vector<store::Id> work = store.list_work(), banks = store.list_banks();  // in this order: a job moves from work to banks
+  Differences found;
+  for (const auto* list : {&banks, &work}) {
+    for (const store::Id& id : *list) {
+      if (rows.count(id) == 0) found.unknown.push_back(id);
+    }
+  }
+  for (const store::Id& id : banks) {
+    const auto at = rows.find(id);
+    if (at != rows.end() && at->second != State::done && at->second != State::running) found.finished.push_back(id);
+  }
+  for (const auto& [id, state] : rows) {
+    if (state == State::running || state == State::failed || std::binary_search(banks.begin(), banks.end(), id)) continue;
+    if (state == State::done || !std::binary_search(work.begin(), work.end(), id)) found.missing.push_back(id);
+  }
+  return found;
+}
+
+/// False when there is nothing to change any more.
+bool settle_missing(Job& job, const store::Store& store) {
+  if (store.has_bank(job.id) || job.state == State::running || job.state == State::failed) return false;
+  if (store.has_work(job.id)) {
+    if (job.state != State::done) return false;
+    job.state = State::queued;
+    return true;
+  }
+  job.reason = job.state == State::done ? "its bank is no longer in the store; submit the job again"
+                                        : "its folder is no longer in the store; submit the job again";
+  job.state = State::failed;
+  return true;
+}
+
+}  // namespace
+
+std::string find_name(const std::string& job_file) {
+  const std::size_t slash = job_file.rfind('/');
+  return slash == std::string::npos ? job_file : job_file.substr(slash + 1);
+}
+
+fs::path set_aside(const fs::path& file) {
+  std::error_code error;
+  fs::path target;
+  for (int n = 1; target.empty() || fs::exists(target, error); ++n)
+    target = file.parent_path() / fmt::format("registry.damaged-{}.sqlite", n);
+  for (const char* ending : {"-wal", "-shm", ""}) {  // the file itself last: until then the damage is seen again
+    fs::rename(fs::path(file) += ending, fs::path(target) += ending, error);
+    if (error && error != std::errc::no_such_file_or_directory) store::throw_errno(file, "set aside this damaged registry", error.value());
+  }
+  store::sync_folder(file.parent_path());
+  return target;
+}
+
+void append_submissions(const store::Store& store, const std::vector<Submission>& submissions) {
+  const fs::path file = store.root() / kLogName;
+  std::string text;
+  for (const Submission& submission : submissions) {
+    store::Request request = submission.request;
+    request.job_file = submission.job_file;
+    text += store::format_request(request, true);
+  }
+  const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+  if (fd < 0) store::throw_errno(file, "write", errno);
+  struct stat info {};
+  char last = '\n';
+  if (::fstat(fd, &info) == 0 && info.st_size > 0) [[maybe_unused]]
+    const ssize_t got = ::pread(fd, &last, 1, info.st_size - 1);
+  if (last != '\n') text.insert(0, "\n");  // behind a line that was cut
+  int error = 0;
+  for (std::string_view left = text; !left.empty() && error == 0;) {
+    const ssize_t put = ::write(fd, left.data(), left.size());
+    if (put > 0) left.remove_prefix(static_cast<std::size_t>(put));
+    if (put < 0 && errno != EINTR) error = errno;
+  }
+  if (error == 0 && ::fsync(fd) != 0) error = errno;
+  ::close(fd);
+  if (error != 0) store::throw_errno(file, "write", error);
+}
+
+std::vector<Submission> read_submission_log(const store::Store& store) {
+  std::vector<Submission> submissions;
+  std::map<std::string, std::size_t> newest;
+  std::error_code error;
+  if (!fs::is_regular_file(store.root() / kLogName, error)) return submissions;
+  std::ifstream stream(store.root() / kLogName, std::ios::binary);
+  for (std::string line; std::getline(stream, line);) {
+    if (line.empty() || line.size() > kMostLineBytes) continue;
+    try {
+      const store::Request request = store::parse_request(line, kLogName);
+      newest[request.job_file] = submissions.size();
+      submissions.push_back({request.job_file, request});
+    } catch (const InputError&) {
+    }
+  }
+  std::vector<Submission> kept;
+  for (std::size_t i = 0; i < submissions.size(); ++i) {
+    if (newest[submissions[i].job_file] == i) kept.push_back(submissions[i]);
+  }
+  return kept;
+}
+
+void rewrite_submission_log(const store::Store& store, const std::vector<Submission>& submissions) {
+  std::string text;
+  for (const Submission& submission : submissions) text += store::format_request(submission.request, true);
+  config::write_file(store.root() / kLogName, text);
+}
+
+std::size_t fill_from_store(Database& database, const store::Store& store) {
+  std::set<store::Id> left;
+  for (const store::Id& id : store.list_work()) left.insert(id);
+  for (const store::Id& id : store.list_banks()) left.insert(id);
+  const std::size_t count = left.size();
+  long long seq = 1;
+  for (const Submission& submission : read_submission_log(store)) {
+    write_submission(database, submission, seq);
+    const store::Id id = store::require_id(submission.request.id, kLogName);
+    if (left.erase(id) > 0) insert_job(database, make_job(store, id), seq);
+    ++seq;
+  }
+  std::vector<Job> others;
+  for (const store::Id& id : left) others.push_back(make_job(store, id));
+  std::stable_sort(others.begin(), others.end(), [](const Job& a, const Job& b) { return a.submitted_unix_s < b.submitted_unix_s; });
+  for (const Job& job : others) insert_job(database, job, seq++);
+  return count;
+}
+
+void reconcile(Database& database, const store::Store& store, const Say& say) {
+  if (find_differences(database, store).is_empty()) return;
+  Transaction transaction(database);
+  const Differences found = find_differences(database, store);
+  long long seq = find_next_seq(database);
+  for (const store::Id& id : found.unknown) insert_job(database, make_job(store, id), seq++);
+  for (const store::Id& id : found.finished) {
+    Job job = *read_job(database, id);
+    job.state = State::done;
+    job.reason.clear();
+    update_job(database, job);
+  }
+  std::size_t missing = 0;
+  for (const store::Id& id : found.missing) {
+    Job job = *read_job(database, id);
+    if (!settle_missing(job, store)) continue;
+    update_job(database, job);
+    ++missing;
+  }
+  transaction.commit();
+  if (missing > 0)
+    say(fmt::format("{} job{} of the registry had lost folders in the store; carillon status names them", missing,
+                    missing == 1 ? "" : "s"));
+}
+
+}  // namespace carillon::registry

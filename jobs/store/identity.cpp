@@ -1,0 +1,224 @@
+// Method:     The id is SHA-256 over the resolved job in one canonical line, the kind, format and SHA-256 of the input's bytes, and the
+//             solver's version. Jobs that ask for the same in other words resolve to the same line.
+// Source:     own; FIPS 180-4 for the hash.
+// Deviations: none.
+#include "jobs/store/identity.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <json/json.h>
+#include <pwd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <sstream>
+
+#include "jobs/store/files.hpp"
+#include "runtime/config/error.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::store {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kHeadBytes = 4096;
+constexpr const char* kScheme = "carillon identity 1";
+
+Json::Value parse_json(const std::string& text) {
+  Json::Value root;
+  std::istringstream stream(text);
+  std::string errors;
+  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors))
+    throw SystemError("internal: a resolved job is not JSON: " + errors);
+  return root;
+}
+
+/// -0 is 0.
+void drop_signs_of_zero(Json::Value& value) {
+  if (value.type() == Json::realValue && value.asDouble() == 0.0) value = 0.0;
+  if (value.isArray() || value.isObject()) {
+    for (Json::Value& member : value) drop_signs_of_zero(member);
+  }
+}
+
+std::string lower_ending(const fs::path& file) {
+  std::string ending = file.extension().string();
+  if (!ending.empty()) ending.erase(0, 1);
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+/// As the reader of meshes finds it: by the content where that tells, else by the ending.
+std::string find_mesh_format(const std::string& head, const std::string& ending) {
+  std::string_view text = head;
+  if (text.starts_with("\x89HDF\r\n")) return "hdf";
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  if (text.size() > 1 && text[0] == '$' && std::isalpha(static_cast<unsigned char>(text[1])) != 0) return "msh";
+  if (text.starts_with('<')) return "vtu";
+  if (text.starts_with("MeshVersionFormatted")) return "mesh";
+  return ending;
+}
+
+/// The two files of a TetGen mesh, of which either may be named.
+std::array<fs::path, 2> find_tetgen_pair(const fs::path& file) {
+  const auto partner = [&](const char* ending) { return lower_ending(file) == ending ? file : fs::path(file).replace_extension(ending); };
+  return {partner("node"), partner("ele")};
+}
+
+Id hash_pair(const Id& node, const Id& ele) { return hash_text("node " + node.text() + "\nele " + ele.text() + "\n"); }
+
+std::string find_user() {
+  std::array<char, 4096> buffer{};
+  struct passwd entry {
+  }, *found = nullptr;
+  ::getpwuid_r(::geteuid(), &entry, buffer.data(), buffer.size(), &found);
+  return found != nullptr ? to_text(found->pw_name) : fmt::format("{}", ::geteuid());
+}
+
+const fs::path& get_input(const spec::JobSpec& job) { return job.body ? job.body->surface : job.mesh; }
+
+/// Copies a file to `target` while it is hashed.
+Id copy_hashed(const fs::path& file, const char* what, const fs::path& target) {
+  const int fd = ::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0444);
+  if (fd < 0) throw_errno(target, "write", errno);
+  int error = 0;
+  const auto write_all = [&](std::string_view bytes) {
+    while (!bytes.empty() && error == 0) {
+      const ssize_t put = ::write(fd, bytes.data(), bytes.size());
+      if (put > 0) bytes.remove_prefix(static_cast<std::size_t>(put));
+      if (put < 0 && errno != EINTR) error = errno;
+    }
+    if (error != 0) throw_errno(target, "write", error);
+  };
+  try {
+    const Id id = hash_file(file, what, write_all);
+    if (::fsync(fd) != 0) throw_errno(target, "write", errno);
+    ::close(fd);
+    return id;
+  } catch (...) {
+    ::close(fd);
+    throw;
+  }
+}
+
+/// Puts files into inputs/ under the names that follow from their hash.
+void take_snapshot(const Store& store, const spec::JobSpec& job, const Request& request) {
+  if (request.input_kind == "shape") return;
+  const Id wanted = require_id(request.input_sha256, "the input's hash");
+  const fs::path target = store.input_file(wanted, request.input_format);
+  const bool is_pair = request.input_format == "tetgen";
+  std::error_code none;
+  if (fs::exists(target, none) && (!is_pair || fs::exists(fs::path(target).replace_extension("ele"), none))) return;
+  const fs::path temporary = store.make_temporary();
+  try {
+    const auto pair = find_tetgen_pair(get_input(job));
+    const char* what = job.body ? "surface" : "mesh";
+    Id found = copy_hashed(is_pair ? pair[0] : get_input(job), what, temporary / "first");
+    if (is_pair) found = hash_pair(found, copy_hashed(pair[1], what, temporary / "second"));
+    if (found != wanted)
+      throw InputError(fmt::format("{}: this {} changes while it is read; submit the job when it is whole", get_input(job).string(), what));
+    make_folder(target.parent_path());
+    const auto name = [&](const char* from, const fs::path& to) {
+      if (::rename((temporary / from).c_str(), to.c_str()) != 0) throw_errno(to, "write", errno);
+    };
+    if (is_pair) name("second", fs::path(target).replace_extension("ele"));
+    name("first", target);
+    sync_folder(target.parent_path());
+    sync_folder(target.parent_path().parent_path());
+  } catch (...) {
+    fs::remove_all(temporary, none);
+    throw;
+  }
+  fs::remove_all(temporary, none);
+}
+
+}  // namespace
+
+std::string make_canonical_job(const spec::JobSpec& job) {
+  spec::JobSpec bare = job;
+  bare.bank.clear();
+  Json::Value root = parse_json(spec::resolved_json(bare, "/", ""));
+  root.removeMember("mesh");
+  if (root.isMember("body")) root["body"].removeMember("surface");
+  drop_signs_of_zero(root);
+  Json::StreamWriterBuilder writer;
+  writer["indentation"] = "";
+  writer["precision"] = 17;
+  writer["emitUTF8"] = true;
+  return Json::writeString(writer, root);
+}
+
+const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const std::string& what) {
+  struct stat info {};
+  const bool is_there = ::stat(file.c_str(), &info) == 0;
+  const auto stamp = std::array<long long, 5>{static_cast<long long>(info.st_dev), static_cast<long long>(info.st_ino), info.st_size,
+                                              info.st_mtim.tv_sec * 1'000'000'000LL + info.st_mtim.tv_nsec,
+                                              info.st_ctim.tv_sec * 1'000'000'000LL + info.st_ctim.tv_nsec};
+  const auto found = known_.find(file);
+  if (is_there && found != known_.end() && found->second.stamp == stamp) return found->second;
+  std::string head;
+  const Id id = hash_file(file, what, [&](std::string_view bytes) {
+    if (head.size() < kHeadBytes) head += bytes.substr(0, kHeadBytes - head.size());
+  });
+  return known_.insert_or_assign(file, Known{id, head, stamp}).first->second;
+}
+
+Request RequestMaker::make(const spec::JobSpec& job) {
+  Request request;
+  request.job = make_canonical_job(job);
+  request.solver = solver_;
+  request.resources = job.resources;
+  request.user = find_user();
+  request.submitted_unix_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  const fs::path& input = get_input(job);
+  const std::string ending = lower_ending(input);
+  request.input_kind = input.empty() ? "shape" : job.body ? "surface" : "mesh";
+  if (!input.empty()) request.input_file = to_text(input);
+  if (request.input_kind == "mesh" && (ending == "node" || ending == "ele")) {
+    const auto pair = find_tetgen_pair(input);
+    const Id node = find_input(pair[0], "mesh").sha256;
+    request.input_format = "tetgen";
+    request.input_sha256 = hash_pair(node, find_input(pair[1], "mesh").sha256).text();
+  } else if (!input.empty()) {
+    const Known& known = find_input(input, request.input_kind);
+    request.input_format = job.body ? ending : find_mesh_format(known.head, ending);
+    request.input_sha256 = known.sha256.text();
+  }
+  request.job_file = to_text(fs::absolute(job.file).lexically_normal());
+  request.id = hash_text(fmt::format("{}\njob {}\ninput {} {} {}\nsolver {}\n", kScheme, request.job, request.input_kind,
+                                     to_text(request.input_format), request.input_sha256, solver_))
+                   .text();
+  return request;
+}
+
+bool prepare_work(const Store& store, const spec::JobSpec& job, const Request& request) {
+  const Id id = require_id(request.id, "the request");
+  if (store.has_bank(id) || store.has_work(id)) return false;
+  take_snapshot(store, job, request);
+  spec::JobSpec inner = job;
+  const fs::path work = store.work_folder(id);
+  if (request.input_kind != "shape") {
+    const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
+    (job.body ? inner.body->surface : inner.mesh) = input;
+  }
+  inner.bank = work / kBankFile;
+  const fs::path temporary = store.make_temporary();
+  try {
+    config::write_file(temporary / kJobFile, spec::resolved_json(inner, work, ""));
+    write_request(temporary, request);
+    write_standing(temporary, {});
+    return store.publish_work(id, temporary);
+  } catch (...) {
+    std::error_code none;
+    fs::remove_all(temporary, none);
+    throw;
+  }
+}
+
+}  // namespace carillon::store
