@@ -14,7 +14,7 @@
 namespace carillon::outcome {
 namespace {
 
-constexpr std::array<std::pair<Cause, const char*>, 15> kWords{{{Cause::done, "done"},
+constexpr std::array<std::pair<Cause, const char*>, 16> kWords{{{Cause::done, "done"},
                                                                 {Cause::bad_input, "bad-input"},
                                                                 {Cause::no_solution, "no-solution"},
                                                                 {Cause::memory, "memory"},
@@ -28,7 +28,8 @@ constexpr std::array<std::pair<Cause, const char*>, 15> kWords{{{Cause::done, "d
                                                                 {Cause::node_lost, "node-lost"},
                                                                 {Cause::hung, "hung"},
                                                                 {Cause::bad_bank, "bad-bank"},
-                                                                {Cause::no_program, "no-program"}}};
+                                                                {Cause::no_program, "no-program"},
+                                                                {Cause::predicted, "predicted"}}};
 
 double finite(double value) { return std::isfinite(value) ? value : 0.0; }
 

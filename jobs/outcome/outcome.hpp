@@ -27,6 +27,7 @@ enum class Cause {
   hung,          // neither progress nor work for too long
   bad_bank,      // the program said that all is well, and the bank is not
   no_program,    // what has to be started is not here
+  predicted,     // nothing was solved: what it needs is known now
 };
 /// The word of a cause in outcome.json ("disk-full"), and back; none for a word that is not known.
 std::string to_text(Cause cause);

@@ -26,6 +26,7 @@ Decision decide(Cause cause, int failures, bool is_further) {
       return {Next::failed, 0.0, failures};
     case Cause::stopped:
     case Cause::checkpointed:
+    case Cause::predicted:
       return {Next::queue, 0.0, failures};
     case Cause::disk_full:
       return {Next::wait, kDiskDelayS, failures};

@@ -48,6 +48,8 @@ LAW = {
     "jobs/outcome": (["runtime/config", "jobs/process"], ["fmt"]),
     "jobs/store": (["runtime/config", "jobs/spec", "jobs/process"], ["fmt", "json", "openssl"]),
     "jobs/registry": (["runtime/config", "jobs/process", "jobs/store"], ["fmt", "sqlite", "json"]),
+    "jobs/attempt": (["runtime/config", "runtime/bank", "jobs/process", "jobs/outcome", "jobs/store"], ["fmt"]),
+    "jobs/queue": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt"], ["fmt"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
     "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),
@@ -68,7 +70,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
-SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dlfcn|signal|pthread|poll|termios|errno|limits|stddef|stdint|stdlib|stdio|string|math|time|spawn|immintrin|xmmintrin|pwd)\.h$")
+SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dlfcn|signal|pthread|poll|termios|errno|limits|stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|pwd)\.h$")
 
 
 def library_of(path):

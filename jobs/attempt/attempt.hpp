@@ -1,0 +1,52 @@
+// One attempt at one job, from its folder of work to its bank in the store. The same program runs here, under `carillon run` and inside a
+// batch script of Slurm; it never touches the registry.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "jobs/store/records.hpp"
+
+namespace carillon::attempt {
+
+enum class Launcher { automatic, alone, mpirun, srun };  // automatic: alone for one rank outside Slurm, else mpirun
+
+struct Options {
+  std::filesystem::path work;  // STORE/work/ab/<id>
+  int ranks = 1;
+  double memory_gb = 0.0;     // admitted, for the record; 0: not known
+  double time_limit_s = 0.0;  // of this attempt; 0: none
+  std::string token;          // 32 hex digits; empty: made here
+  Launcher launcher = Launcher::automatic;
+  bool is_prediction = false;      // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
+  double grace_s = 60.0;           // from "save and stop" to the kill
+  double hang_s = 600.0;           // without progress, while a rank does not work
+  double silence_s = 24 * 3600.0;  // without progress, whatever the ranks do
+};
+
+/// Nobody's error: another attempt works in this folder, and this one did nothing (EX_TEMPFAIL).
+inline constexpr int kExitBusy = 75;
+/// The job is not done and goes on later: checkpointed, stopped, killed, time over, disk full.
+inline constexpr int kExitGoesOn = 85;
+
+/// Works on the job until it ends: ends what earlier attempts left running, starts the solver, waits for it, verifies the bank and
+/// publishes it. SIGUSR1, SIGTERM, SIGINT and SIGHUP ask the solver to save and stop; a second SIGTERM or SIGINT ends it at once. The end
+/// is in outcome.json of the folder (of the bank's folder when done), written last. Takes over the signals of the process and makes it
+/// adopt orphans: for a process of its own. Returns the exit code: 0, 2, 3, 4 (failed for good), kExitGoesOn or kExitBusy. InputError:
+/// `work` is no folder of work of a store. SystemError: the folder cannot be written at all.
+int run_attempt(const Options& options);
+
+/// The command line that does this, for `program` (carillon itself): {program, "attempt", ...}.
+std::vector<std::string> make_arguments(const std::filesystem::path& program, const Options& options);
+
+/// What --validate printed, in the folder of work.
+inline constexpr const char* kPredictionFile = "prediction.json";
+
+/// Whether the solver of this installation can do that.
+bool can_predict();
+
+/// A program of ours: beside this one, else in PATH; absolute. SystemError when it is nowhere.
+std::filesystem::path find_program(const std::string& name);
+
+}  // namespace carillon::attempt

@@ -1,0 +1,223 @@
+// Method:     fork and exec, never a shell: nothing of a job is ever read as a command. One thread a rank, no binding to cores (two runs
+// side
+//             by side would be bound to the same), keep-alive probes between mpirun's daemons (a lost machine is noticed in 11 s, not in 8
+//             minutes), temporary files and shared memory in folders of the attempt. One rank needs no mpirun and starts faster without.
+// Source:     Open MPI 4.1, mpirun(1), ompi_info --all; Linux prctl(2), proc(5) (oom_score_adj).
+// Deviations: none.
+#include "jobs/attempt/launch.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <string_view>
+
+#include "jobs/store/store.hpp"
+#include "runtime/config/file.hpp"
+
+extern "C" char** environ;
+
+namespace carillon::attempt {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Sockets lie in the temporary folder, and their paths must be short.
+constexpr std::size_t kMostTemporaryPath = 60;
+
+fs::path find_temporary_base() {
+  const char* named = std::getenv("TMPDIR");
+  std::error_code error;
+  if (named != nullptr && named[0] == '/' && std::strlen(named) <= kMostTemporaryPath && fs::is_directory(named, error) &&
+      ::access(named, W_OK | X_OK) == 0)
+    return named;
+  return "/tmp";
+}
+
+std::string make_folder_name(const std::string& token) { return "carillon-" + token.substr(0, 16); }
+
+bool is_token(const std::string& token) { return token.size() == 32 && token.find_first_not_of("0123456789abcdef") == std::string::npos; }
+
+/// What an MPI program above us may have set, and would confuse ours.
+bool is_of_another_run(std::string_view entry) {
+  for (const std::string_view prefix :
+       {"OMPI_COMM_WORLD_", "OMPI_UNIVERSE_", "OMPI_FIRST_RANKS", "OMPI_NUM_APP", "OMPI_APP_CTX", "OMPI_FILE_LOCATION", "OMPI_COMMAND",
+        "OMPI_ARGV", "PMIX_", "PMI_", "OMPI_MCA_orte_hnp_uri", "OMPI_MCA_orte_local_daemon_uri", "OMPI_MCA_orte_num_nodes",
+        "OMPI_MCA_orte_ess", "OMPI_MCA_orte_app_num", "OMPI_MCA_ess", "OMPI_MCA_pmix"}) {
+    if (entry.starts_with(prefix)) return true;
+  }
+  return false;
+}
+
+std::vector<std::string> make_environment(const std::string& token, const Scratch* scratch) {
+  std::map<std::string, std::string> values;
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    const std::string_view text = *entry;
+    const std::size_t equal = text.find('=');
+    if (equal != std::string_view::npos && (scratch == nullptr || !is_of_another_run(text)))
+      values[std::string(text.substr(0, equal))] = text.substr(equal + 1);
+  }
+  values["CARILLON_ATTEMPT"] = token;
+  values["OMP_NUM_THREADS"] = values["OPENBLAS_NUM_THREADS"] = "1";
+  values["HWLOC_COMPONENTS"] = "-gl";  // Open MPI would ask every X server for graphics cards, and end with one that ends just then
+  values["OMPI_MCA_hwloc_base_binding_policy"] = "none";
+  if (::geteuid() == 0) values["OMPI_ALLOW_RUN_AS_ROOT"] = values["OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] = "1";
+  values.try_emplace("OMPI_MCA_oob_tcp_keepalive_time", "5");
+  values.try_emplace("OMPI_MCA_oob_tcp_keepalive_intvl", "2");
+  values.try_emplace("OMPI_MCA_oob_tcp_keepalive_probes", "3");
+  if (scratch != nullptr) {
+    values["TMPDIR"] = scratch->temporary();
+    if (!scratch->shared_memory().empty()) values["OMPI_MCA_btl_vader_backing_directory"] = scratch->shared_memory();
+  }
+  std::vector<std::string> environment;
+  for (const auto& [name, value] : values) environment.push_back(name + "=" + value);
+  return environment;
+}
+
+/// Whether the solver knows an option.
+bool has_option(const fs::path& program, const char* option) {
+  return config::read_file(program, "program", std::uint64_t{1} << 32).find(option) != std::string::npos;
+}
+
+int open_output(const fs::path& file, int mode) {
+  const int output = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | mode, 0666);
+  if (output < 0)
+    throw SystemError(
+        fmt::format("{}: cannot write this: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(errno)));
+  return output;
+}
+
+std::vector<const char*> to_pointers(const std::vector<std::string>& texts) {
+  std::vector<const char*> pointers;
+  for (const std::string& text : texts) pointers.push_back(text.c_str());
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
+/// In the child, between fork and exec: only what is allowed there (signal-safety(7)). Never returns.
+[[noreturn]] void become(const char* const* arguments, const char* const* environment, const char* folder, int output, int log,
+                         pid_t parent, int report) {
+  ::setpgid(0, 0);
+  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+  sigset_t none;
+  ::sigemptyset(&none);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGCHLD, SIGPIPE}) ::signal(signal, SIG_DFL);
+  ::sigprocmask(SIG_SETMASK, &none, nullptr);
+  const int adjust = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+  if (adjust >= 0) (void)!::write(adjust, "500", 3);  // when memory runs out the solver goes, not the service
+  const int input = ::open("/dev/null", O_RDONLY);
+  if (::getppid() == parent && input >= 0 && ::dup2(input, 0) == 0 && ::dup2(output, 1) == 1 && ::dup2(log, 2) == 2 && ::chdir(folder) == 0)
+    ::execve(arguments[0], const_cast<char* const*>(arguments), const_cast<char* const*>(environment));
+  const int error = errno;
+  (void)!::write(report, &error, sizeof error);
+  ::_exit(127);
+}
+
+}  // namespace
+
+Scratch::Scratch(const std::string& token) {
+  const auto make = [&](const fs::path& base) {
+    fs::path folder = base / make_folder_name(token);
+    return ::mkdir(folder.c_str(), 0700) == 0 ? folder : fs::path();
+  };
+  temporary_ = make(find_temporary_base());
+  if (temporary_.empty()) {
+    throw SystemError(fmt::format("{}: cannot make a temporary folder here: {}; make room there, or name another by TMPDIR",
+                                  find_temporary_base().string(), std::strerror(errno)));
+  }
+  shared_memory_ = make("/dev/shm");
+}
+
+Scratch::~Scratch() {
+  std::error_code error;
+  for (const fs::path& folder : {temporary_, shared_memory_}) {
+    if (!folder.empty()) fs::remove_all(folder, error);
+  }
+}
+
+void Scratch::remove_left(const std::string& token) {
+  if (!is_token(token)) return;
+  std::error_code error;
+  for (const fs::path& base : {find_temporary_base(), fs::path("/tmp"), fs::path("/dev/shm")})
+    fs::remove_all(base / make_folder_name(token), error);
+}
+
+fs::path find_program(const std::string& name) {
+  std::error_code error;
+  const fs::path beside = fs::read_symlink("/proc/self/exe", error).parent_path() / name;
+  if (!error && ::access(beside.c_str(), X_OK) == 0) return beside;
+  const char* path = std::getenv("PATH");
+  std::string_view rest = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
+  while (!rest.empty()) {
+    const std::string_view folder = rest.substr(0, rest.find(':'));
+    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
+    const fs::path candidate = fs::path(folder) / name;
+    if (candidate.is_absolute() && fs::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0) return candidate;
+  }
+  throw SystemError(fmt::format("{} is neither beside this program nor in PATH; install it", name));
+}
+
+bool is_under_slurm() { return std::getenv("SLURM_JOB_ID") != nullptr; }
+
+Launch make_launch(const Options& options, const std::string& token, const Scratch* scratch) {
+  Launch launch;
+  launch.environment = make_environment(token, scratch);
+  const fs::path solver = find_program("carillon-precompute");
+  Launcher launcher = options.launcher;
+  if (launcher == Launcher::automatic) launcher = options.ranks == 1 && !is_under_slurm() ? Launcher::alone : Launcher::mpirun;
+  if (launcher == Launcher::alone) launch.environment.push_back("OMPI_MCA_ess_singleton_isolated=1");  // no daemon for one rank
+  if (launcher == Launcher::mpirun) {
+    launch.arguments = {find_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
+    for (const char* name : {"CARILLON_ATTEMPT", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "HWLOC_COMPONENTS"}) {
+      launch.arguments.insert(launch.arguments.end(), {"-x", name});
+    }
+  } else if (launcher == Launcher::srun) {
+    launch.arguments = {find_program("srun"), "--mpi=pmix", "--kill-on-bad-exit=1", "-n", std::to_string(options.ranks)};
+  }
+  launch.arguments.insert(launch.arguments.end(), {solver, store::kJobFile});
+  const auto add = [&](std::initializer_list<const char*> words) {
+    launch.arguments.insert(launch.arguments.end(), words.begin(), words.end());
+  };
+  if (options.is_prediction) {
+    add({"--validate", "--json"});
+  } else {
+    if (has_option(solver, "--checkpoint-every")) add({"--checkpoint", store::kCheckpointFile});
+    if (has_option(solver, "--progress")) add({"--progress", store::kProgressFile});
+  }
+  return launch;
+}
+
+bool can_predict() { return has_option(find_program("carillon-precompute"), "--validate"); }
+
+pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, const fs::path& output) {
+  const std::vector<const char*> arguments = to_pointers(launch.arguments), environment = to_pointers(launch.environment);
+  const int error_file = open_output(log, O_APPEND);
+  const int output_file = output.empty() ? error_file : open_output(output, O_TRUNC);
+  std::array<int, 2> report{-1, -1};
+  int error = ::pipe2(report.data(), O_CLOEXEC) == 0 ? 0 : errno;
+  pid_t child = -1;
+  if (error == 0) {
+    const pid_t parent = ::getpid();
+    child = ::fork();
+    if (child == 0) become(arguments.data(), environment.data(), folder.c_str(), output_file, error_file, parent, report[1]);
+    if (child < 0) error = errno;
+    ::close(report[1]);
+    if (child > 0 && ::read(report[0], &error, sizeof error) != sizeof error) error = 0;
+    ::close(report[0]);
+  }
+  ::close(error_file);
+  if (output_file != error_file) ::close(output_file);
+  if (error != 0) throw SystemError(fmt::format("{}: cannot be started: {}", launch.arguments[0], std::strerror(error)));
+  return child;
+}
+
+}  // namespace carillon::attempt

@@ -1,0 +1,29 @@
+// From a folder of work to a bank in the store.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "jobs/outcome/outcome.hpp"
+#include "jobs/store/store.hpp"
+
+namespace carillon::attempt {
+
+/// What is wrong with the bank in the folder of work, in one sentence; none when it is whole and sane. `has_bank` says whether there is
+/// one.
+std::optional<std::string> find_bank_fault(const std::filesystem::path& work, bool& has_bank);
+
+/// Puts bank, resolved job, request, log and outcome into one folder and publishes it as the bank of `id`; nothing is taken from the folder
+/// of work before that. SystemError when the disk refuses: nothing is published then.
+void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome);
+
+/// A file that keeps some room on the disk, so that the end of an attempt can be written when the disk is full. Without effect where there
+/// is no room already.
+void make_reserve(const std::filesystem::path& work);
+void remove_reserve(const std::filesystem::path& work);
+
+/// Whether hardly a byte is free where `folder` is.
+bool is_disk_full(const std::filesystem::path& folder);
+
+}  // namespace carillon::attempt

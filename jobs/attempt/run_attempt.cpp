@@ -1,0 +1,238 @@
+// Method:     Lock the folder; a bank that is there already is published; end what the attempt before left running; say who works here
+//             (attempt.json) before anything is started; start, watch, classify; verify and publish; say how it ended, last.
+// Source:     docs/decisions/jobs.md. Deviations: none.
+#include <fmt/core.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <thread>
+
+#include "jobs/attempt/attempt.hpp"
+#include "jobs/attempt/launch.hpp"
+#include "jobs/attempt/processes.hpp"
+#include "jobs/attempt/publish.hpp"
+#include "jobs/attempt/watch.hpp"
+#include "jobs/outcome/outcome.hpp"
+#include "jobs/outcome/policy.hpp"
+#include "jobs/process/process.hpp"
+#include "jobs/store/store.hpp"
+
+namespace carillon::attempt {
+namespace {
+
+namespace fs = std::filesystem;
+using outcome::Cause;
+
+constexpr std::uintmax_t kMostLog = 1 << 16;  // what is read of it
+
+fs::path find_root(const fs::path& work) {
+  // STORE/work/ab/<id>
+  const fs::path root = work.parent_path().parent_path().parent_path();
+  std::error_code error;
+  if (!fs::is_regular_file(root / "VERSION", error) || work.parent_path().parent_path().filename() != "work")
+    throw InputError(fmt::format("{}: this is no folder of work of a store; name STORE/work/ab/ID", work.string()));
+  return root;
+}
+
+/// Size and moment of a file: another when it was written anew. Zeros when there is none.
+std::pair<long long, long long> find_mark(const fs::path& file) {
+  struct stat info {};
+  if (::stat(file.c_str(), &info) != 0) return {0, 0};
+  return {static_cast<long long>(info.st_ino), info.st_mtim.tv_sec * 1000000000LL + info.st_mtim.tv_nsec};
+}
+
+std::string read_end(const fs::path& file, std::uintmax_t from) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error || size <= from) return {};
+  std::ifstream stream(file, std::ios::binary);
+  stream.seekg(static_cast<std::streamoff>(std::max(from, size > kMostLog ? size - kMostLog : 0)));
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+double find_seconds() {
+  timespec time{};
+  ::clock_gettime(CLOCK_MONOTONIC, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// Others look at the lock for a moment now and then.
+std::optional<process::Lock> take_lock(const fs::path& work) {
+  for (int round = 0; round < 20; ++round) {
+    if (std::optional<process::Lock> lock = process::Lock::take(work / "lock")) return lock;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return std::nullopt;
+}
+
+class Attempt {
+ public:
+  Attempt(const Options& options, const fs::path& work)
+      : options_(options),
+        work_(work),
+        store_(store::Store::open(find_root(work))),
+        id_(store::require_id(work.filename().string(), work.string())) {
+    outcome_.token = options.token.empty() ? store::make_random_name() : options.token;
+    outcome_.ranks = options.ranks;
+    outcome_.host = process::find_host();
+    outcome_.started = outcome::find_utc();
+    options_.work = work;
+  }
+
+  int run() {
+    take_signals();
+    const double start_s = find_seconds();
+    const std::optional<outcome::Outcome> before = outcome::read_outcome(work_);
+    try {
+      clean();
+      solve(before ? before->percent : 0.0);
+    } catch (const SystemError& error) {
+      set(is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+    } catch (const InputError& error) {
+      set(Cause::bad_input, error.what());
+    } catch (const std::bad_alloc&) {
+      set(Cause::memory, "out of memory while the bank was verified");
+    }
+    outcome_.seconds = find_seconds() - start_s;
+    outcome_.percent = std::max(outcome_.percent, before ? before->percent : 0.0);
+    return finish();
+  }
+
+ private:
+  void set(Cause cause, const std::string& reason, double need_gb = 0.0) {
+    outcome_.cause = cause;
+    outcome_.reason = reason;
+    outcome_.memory_need_gb = need_gb;
+  }
+
+  /// What an attempt before this one left behind, processes and files; then it is we who work here.
+  void clean() {
+    const std::optional<outcome::Attempt> before = outcome::read_attempt(work_);
+    if (before && before->token != outcome_.token) {
+      if (before->process.host == outcome_.host) process::end_with_environment("CARILLON_ATTEMPT=" + before->token);
+      Scratch::remove_left(before->token);
+    }
+    remove_temporary_files();
+    outcome::write_attempt(work_, {outcome_.token, process::find_self(), options_.ranks, options_.memory_gb, outcome_.started});
+    make_reserve(work_);
+  }
+
+  /// Files that were being written when their writer was killed.
+  void remove_temporary_files() const {
+    std::error_code error;
+    for (fs::directory_iterator it(work_, error), end; !error && it != end; it.increment(error)) {
+      const std::string name = it->path().filename().string();
+      if (name.starts_with(".") && name.find(".tmp.") != std::string::npos) fs::remove(it->path(), error);
+    }
+  }
+
+  void solve(double percent_before) {
+    bool has_bank = false;
+    if (!find_bank_fault(work_, has_bank)) return set(Cause::done, "");  // killed between the solve and the publication
+    if (has_bank) fs::remove(work_ / store::kBankFile);
+    const fs::path log = work_ / store::kLogFile, checkpoint = work_ / store::kCheckpointFile;
+    std::optional<Scratch> scratch;
+    if (!is_under_slurm()) scratch.emplace(outcome_.token);
+    std::optional<Launch> launch;
+    try {
+      launch = make_launch(options_, outcome_.token, scratch ? &*scratch : nullptr);
+    } catch (const SystemError& error) {
+      return set(Cause::no_program, error.what());
+    }
+    std::error_code error;
+    const std::uintmax_t log_start = fs::file_size(log, error);
+    const auto mark = find_mark(checkpoint);
+    const std::uint64_t kills = find_memory_kills();
+    const fs::path printed = options_.is_prediction ? work_ / "prediction.new" : fs::path();
+    const Watched watched = watch(start(*launch, work_, log, printed), options_, outcome_.token);
+    if (const std::optional<store::Progress> progress = store::read_progress(work_)) outcome_.percent = progress->percent;
+    outcome_.exit_code = watched.exit_code;
+    outcome_.peak_memory_gb = watched.peak_memory_gb;
+    outcome_.is_further = outcome_.percent > percent_before && find_mark(checkpoint) != mark && find_mark(checkpoint).first != 0;
+    const std::string end = read_end(log, error ? 0 : log_start);
+    outcome::Ending ending{watched.exit_code, watched.was_asked_to_stop,   watched.was_out_of_time, watched.was_hung,
+                           watched.still_s,   find_memory_kills() > kills, is_disk_full(work_),     end};
+    const outcome::Verdict verdict = outcome::classify(ending);
+    set(verdict.cause, verdict.reason, verdict.memory_need_gb);
+    if (verdict.cause != Cause::done) return;
+    if (options_.is_prediction) {
+      fs::rename(printed, work_ / kPredictionFile);
+      return set(Cause::predicted, "what it needs is predicted; waits for room");
+    }
+    if (const std::optional<std::string> fault = find_bank_fault(work_, has_bank))
+      set(Cause::bad_bank, "the solver said that all is well, but: " + *fault);
+  }
+
+  /// Publishes or says why not; returns the exit code.
+  int finish() {
+    remove_reserve(work_);
+    outcome_.ended = outcome::find_utc();
+    if (outcome_.cause == Cause::done) {
+      outcome_.percent = 100.0;
+      try {
+        publish(store_, id_, outcome_);
+        store_.remove_work(id_);
+        return 0;
+      } catch (const SystemError& error) {
+        if (store_.has_bank(id_)) return 0;  // only the work could not be removed
+        set(is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+      }
+    }
+    fmt::print(stderr, "carillon attempt: {}: {}\n", outcome::to_text(outcome_.cause), outcome_.reason);
+    outcome::write_outcome(work_, outcome_);
+    switch (outcome_.cause) {
+      case Cause::bad_input:
+        return kExitInput;
+      case Cause::no_solution:
+        return kExitSolve;
+      case Cause::no_program:
+        return kExitSystem;
+      default:
+        return kExitGoesOn;
+    }
+  }
+
+  Options options_;
+  const fs::path work_;
+  const store::Store store_;
+  const store::Id id_;
+  outcome::Outcome outcome_;
+};
+
+}  // namespace
+
+int run_attempt(const Options& options) {
+  std::error_code error;
+  const fs::path work = fs::canonical(options.work, error);
+  if (error) {
+    // Published and cleared away meanwhile by another attempt: nothing is left to do.
+    throw InputError(fmt::format("{}: there is no such folder of work: {}", options.work.string(), error.message()));
+  }
+  find_root(work);
+  const std::optional<process::Lock> lock = take_lock(work);
+  if (!lock) {
+    fmt::print(stderr, "{}: another attempt works here; nothing was done\n", work.string());
+    return kExitBusy;
+  }
+  return Attempt(options, work).run();
+}
+
+std::vector<std::string> make_arguments(const fs::path& program, const Options& options) {
+  std::vector<std::string> arguments{program, "attempt", options.work, "--ranks", std::to_string(options.ranks)};
+  const auto add = [&](const char* name, const std::string& value) { arguments.insert(arguments.end(), {name, value}); };
+  if (options.memory_gb > 0.0) add("--memory-gb", fmt::format("{}", options.memory_gb));
+  if (options.time_limit_s > 0.0) add("--time-limit-s", fmt::format("{}", options.time_limit_s));
+  if (options.is_prediction) arguments.emplace_back("--predict");
+  if (!options.token.empty()) add("--token", options.token);
+  if (options.launcher == Launcher::alone) add("--launcher", "alone");
+  if (options.launcher == Launcher::mpirun) add("--launcher", "mpirun");
+  if (options.launcher == Launcher::srun) add("--launcher", "srun");
+  return arguments;
+}
+
+}  // namespace carillon::attempt

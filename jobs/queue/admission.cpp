@@ -1,0 +1,89 @@
+// Method:     See the header. Free memory is the lesser of what is not promised to running jobs and of what is available now less what
+// running
+//             jobs have been promised and do not hold yet.
+// Source:     own choice; docs/howto/jobs.md states the rule. Backfilling with a reservation for the first: Lifka 1995 (EASY), with a fixed
+//             patience in place of estimates of run times.
+// Deviations: none.
+#include "jobs/queue/admission.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace carillon::queue {
+namespace {
+
+constexpr double kUnknownGb = 0.5;  // of a job that nobody has predicted
+
+struct Room {
+  int cores = 0;
+  double memory_gb = 0.0;
+};
+
+Room calc_room(const Host& host, const std::vector<Admitted>& running) {
+  Room room{host.cores, kMemoryShare * host.total_gb};
+  double available_gb = host.available_gb - (1.0 - kMemoryShare) * host.total_gb;
+  for (const Admitted& job : running) {
+    room.cores -= job.ranks;
+    room.memory_gb -= job.memory_gb;
+    available_gb -= std::max(0.0, job.memory_gb - job.used_gb);
+  }
+  room.memory_gb = std::min(room.memory_gb, available_gb);
+  return room;
+}
+
+/// Whether it fits as soon as our own jobs have ended.
+bool will_fit(const Host& host, const std::vector<Admitted>& running, double memory_gb) {
+  double free_gb = host.available_gb - (1.0 - kMemoryShare) * host.total_gb;
+  for (const Admitted& job : running) free_gb += job.used_gb;
+  return memory_gb <= free_gb;
+}
+
+int choose_ranks(const Host& host, const Need& need, std::size_t competitors) {
+  if (need.ranks > 0) return std::min(need.ranks, host.cores);
+  if (need.seconds < kSmallSeconds) return 1;
+  const double one_gb = std::max(calc_memory(need, 1), 1e-3);
+  const double by_memory = std::max(1.0, std::floor(kMemoryShare * host.total_gb / one_gb));
+  const double side_by_side = std::min({static_cast<double>(competitors), static_cast<double>(host.cores), by_memory});
+  const double worth = std::max(1.0, std::floor(need.seconds / kSecondsPerRank));
+  return static_cast<int>(std::min(worth, std::floor(host.cores / std::max(1.0, side_by_side))));
+}
+
+}  // namespace
+
+double calc_memory(const Need& need, int ranks) {
+  if (need.memory_gb > 0.0) return std::max(need.memory_gb, need.least_gb);
+  if (need.predicted_gb.empty()) return std::max(kUnknownGb, need.least_gb);
+  // Between the powers of two that were predicted the larger of both; beyond them the last.
+  const auto place = static_cast<std::size_t>(std::max(0.0, std::log2(std::max(1, ranks))));
+  const std::size_t last = need.predicted_gb.size() - 1;
+  const bool is_power = (ranks & (ranks - 1)) == 0;
+  const double predicted_gb =
+      std::max(need.predicted_gb[std::min(place, last)], need.predicted_gb[std::min(place + (is_power ? 0 : 1), last)]);
+  return std::max(predicted_gb, need.least_gb);
+}
+
+std::vector<Ruling> choose(const Host& host, const std::vector<Admitted>& running, const std::vector<Candidate>& candidates) {
+  Room room = calc_room(host, running);
+  std::vector<Admitted> all = running;
+  std::vector<Ruling> rulings;
+  bool is_kept = false;  // for one that has waited long enough
+  for (const Candidate& candidate : candidates) {
+    Ruling ruling;
+    ruling.ranks = choose_ranks(host, candidate.need, running.size() + candidates.size());
+    ruling.memory_gb = calc_memory(candidate.need, ruling.ranks);
+    if (ruling.memory_gb > kMemoryShare * host.total_gb) {
+      ruling.answer = Answer::never;
+    } else if (!is_kept && ruling.ranks <= room.cores && ruling.memory_gb <= room.memory_gb) {
+      ruling.answer = Answer::start;
+      room.cores -= ruling.ranks;
+      room.memory_gb -= ruling.memory_gb;
+      all.push_back({ruling.ranks, ruling.memory_gb, 0.0});
+    } else if (candidate.blocked_s > kPatienceSeconds && will_fit(host, all, ruling.memory_gb)) {
+      is_kept = true;
+    }
+    rulings.push_back(ruling);
+  }
+  return rulings;
+}
+
+}  // namespace carillon::queue

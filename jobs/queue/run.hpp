@@ -1,0 +1,25 @@
+// The loop of `carillon run`: works through the queue of this machine.
+#pragma once
+
+#include <filesystem>
+
+#include "jobs/store/store.hpp"
+
+namespace carillon::queue {
+
+struct RunOptions {
+  std::filesystem::path program;  // carillon itself, which makes the attempts
+  bool keep = false;              // stay and wait for more when the queue is empty
+  bool json = false;              // JSON lines, on a terminal too
+  bool quiet = false;             // neither bar nor lines
+  int cores = 0;                  // at most so many; 0: all that this process may use
+  double memory_gb = 0.0;         // at most so much; 0: what the machine has
+};
+
+/// Starts what fits, settles what ends, adopts what others left running, until no local job is queued, waiting or running. Any number may
+/// run at once on one store. The first SIGINT or SIGTERM asks all attempts that this process started to save and stop, and puts them back
+/// into the queue; the second ends them. Takes over the signals of the process. Returns 0 when the queue is empty, 130 or 143 when it was
+/// stopped, whatever became of single jobs. SystemError when the store cannot be used any more.
+int run(const store::Store& store, const RunOptions& options);
+
+}  // namespace carillon::queue

@@ -1,0 +1,49 @@
+// Rows and the processes behind them: what became of attempts, cancel, retry. Used by everything that opens the registry, so that no row
+// stays "running" when nobody works on it.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "jobs/outcome/outcome.hpp"
+#include "jobs/registry/registry.hpp"
+#include "jobs/store/store.hpp"
+
+namespace carillon::queue {
+
+/// Where a running row of the engine "local" stands.
+enum class Standing {
+  working,   // a process works in its folder
+  starting,  // claimed, and who claimed it or was started for it is there
+  ended,     // worked on, and nobody is there any more
+  unbegun,   // claimed, and whoever claimed it is gone before anything began
+  elsewhere  // claimed on another machine
+};
+Standing find_standing(const store::Store& store, const registry::Job& job);
+
+/// Changes a row by what came of its attempt: done, failed, cancelled (when that was wanted), waiting or queued. Pure.
+void apply(registry::Job& job, const outcome::Outcome& outcome);
+
+/// Settles every running local row whose process is gone: by its bank, by the outcome it left, else as killed. Returns the rows that
+/// changed, as they are now.
+std::vector<registry::Job> settle(const store::Store& store, registry::Registry& registry);
+
+/// Settles one row whose attempt was seen to end with this exit code before it said that it had begun.
+void settle_unbegun(const store::Store& store, registry::Registry& registry, const registry::Job& job, int exit_code);
+
+/// What cancel and retry did, in one sentence for people, and whether it is what was asked for.
+struct Said {
+  bool is_done = false;
+  std::string text;
+};
+
+/// A queued or waiting job is cancelled at once. A running one is asked to save and stop, and this waits until it has, `patience_s` at
+/// most; later whoever runs the queue sees to it. A job that is done stays done. Jobs of the engine "slurm" only get the wish:
+/// carillon::slurm looks after them.
+Said cancel(const store::Store& store, registry::Registry& registry, const store::Id& id, double patience_s = 90.0);
+
+/// Puts a failed or cancelled job back into the queue, with its checkpoint and a new count of retries; a waiting one is ready at once.
+Said retry(const store::Store& store, registry::Registry& registry, const store::Id& id);
+
+}  // namespace carillon::queue
