@@ -50,6 +50,7 @@ LAW = {
     "jobs/registry": (["runtime/config", "jobs/process", "jobs/store"], ["fmt", "sqlite", "json"]),
     "jobs/attempt": (["runtime/config", "runtime/bank", "jobs/process", "jobs/outcome", "jobs/store"], ["fmt"]),
     "jobs/queue": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt"], ["fmt"]),
+    "jobs/report": (["runtime/config", "runtime/bank"], ["fmt", "json"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
     "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),

@@ -1,0 +1,196 @@
+// Method:     what was solved and what came of it: the figures of the head, the mesh, the file of the bank and its checks, the job.
+// Source:     precompute/mesh/check.hpp (what is measured of a mesh), docs/bank-format.md (what a bank holds).
+// Deviations: none.
+#include <algorithm>
+#include <cmath>
+
+#include "jobs/report/chart.hpp"
+#include "jobs/report/quantity.hpp"
+#include "jobs/report/sections.hpp"
+
+namespace carillon::report {
+namespace {
+
+constexpr Json::ArrayIndex kMostWarnings = 50;
+constexpr std::size_t kMostJobBytes = 200000;
+constexpr double kSliverDeg = 5.0;  // of the mesh check
+
+Html make_tile(std::string_view what, const Html& value, std::string_view remark) {
+  return html("<div class=\"tile\"><div class=\"what\">{}</div><div class=\"value\">{}</div><div class=\"remark\">{}</div></div>\n", what,
+              value, remark);
+}
+
+/// Texts of a list, each once, at most kMostWarnings.
+std::vector<std::string> find_texts(const Json::Value& list) {
+  std::vector<std::string> texts;
+  for (Json::ArrayIndex i = 0; list.isArray() && i < std::min(list.size(), kMostWarnings); ++i)
+    if (list[i].isString() && std::find(texts.begin(), texts.end(), list[i].asString()) == texts.end()) texts.push_back(list[i].asString());
+  return texts;
+}
+
+Html make_tiles(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  Html out = make_tile("Modes", html("{}", format_count(static_cast<std::int64_t>(bank.mode_count()))),
+                       fmt::format("{} Hz to {} Hz", format_plain(bank.band_hz[0]), format_plain(bank.band_hz[1])));
+  const std::vector<double>& bars = bank.discretisation_error_cents;
+  const auto worst = std::max_element(bars.begin(), bars.end());
+  out += make_tile("Error bar", worst == bars.end() ? html("-") : html("{}", format_cents(*worst)),
+                   worst == bars.end() ? "not known" : "body, worst mode");
+  const auto residual = std::max_element(bank.residual.begin(), bank.residual.end());
+  out += make_tile("Residual", residual == bank.residual.end() ? html("-") : html("{:.1e}", *residual), "worst mode");
+  const auto seconds = find_run_seconds(subject);
+  const auto bytes = find_peak_bytes(subject);
+  const auto ranks = find_count(subject.record.run, "ranks");
+  const std::string on = ranks ? fmt::format("{} rank{}", *ranks, *ranks == 1 ? "" : "s") : "";
+  out += make_tile("Time", html("{}", seconds ? format_seconds(*seconds) : "-"), seconds ? on : "not recorded");
+  out += make_tile("Memory", html("{}", bytes ? format_bytes(*bytes) : "-"), bytes ? "peak of all ranks" : "not recorded");
+  out += make_tile("Bank", html("{}", format_bytes(subject.file_bytes)),
+                   fmt::format("{} vertices", format_count(static_cast<std::int64_t>(bank.vertex_count()))));
+  return html("<div class=\"tiles\">\n{}</div>\n", out);
+}
+
+/// How wrong the frequencies can be, the worst of all modes, without a full stop.
+std::string describe_bars(const bank::Bank& bank) {
+  const auto find_worst = [](const std::vector<double>& bars) { return format_cents(*std::max_element(bars.begin(), bars.end())); };
+  if (bank.mode_count() == 0) return "There are no frequencies that could be wrong";
+  std::string text = bank.algebraic_error_cents.empty()
+                         ? "There are no bounds against the mesh"
+                         : fmt::format("Frequencies are those of the mesh to {} (a bound)", find_worst(bank.algebraic_error_cents));
+  return text + (bank.discretisation_error_cents.empty()
+                     ? ", and no estimates against the body"
+                     : fmt::format(", and those of the body to about {} (an estimate)", find_worst(bank.discretisation_error_cents)));
+}
+
+Html make_warnings(const Subject& subject) {
+  Html items;
+  for (const std::string& text : find_texts(find(subject.record.run, "warnings"))) items += html("<li>{}</li>\n", escape(text, 1000));
+  for (const std::string& text : subject.record.remarks) items += html("<li>{}</li>\n", text);
+  return items.empty() ? Html() : html("<div class=\"note\"><ul>\n{}</ul></div>\n", items);
+}
+
+/// The shares of the file that the layout gives to its parts.
+std::vector<Bar> make_size_bars(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  const auto modes = static_cast<double>(bank.mode_count()), vertices = static_cast<double>(bank.vertex_count());
+  const double shapes = 2.0 * static_cast<double>(bank.shape.size());
+  const double surface = 24.0 * vertices + 12.0 * static_cast<double>(bank.triangles.size());
+  const double bars = 8.0 * static_cast<double>(bank.algebraic_error_cents.size() + bank.discretisation_error_cents.size());
+  const double numbers = 8.0 * 6.0 * modes + bars;
+  const double record = static_cast<double>(bank.provenance.size() + bank.regions.size());
+  const double rest = std::max(0.0, subject.file_bytes - shapes - surface - numbers - record);
+  const auto make = [&](const char* what, double bytes) {
+    return Bar{what, bytes, fmt::format("{} \u00b7 {}", format_bytes(bytes), format_percent(bytes / std::max(1.0, subject.file_bytes)))};
+  };
+  return {make("shapes", shapes), make("surface", surface), make("numbers of modes", numbers), make("job and record", record),
+          make("layout, views, rest", rest)};
+}
+
+void add_count(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark = "") {
+  if (const auto count = find_count(in, key)) facts.add(what, html("{}", format_count(*count)), remark);
+}
+
+/// Only where there were any.
+void add_mended(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark) {
+  if (find_count(in, key).value_or(0) > 0) add_count(facts, in, key, what, remark);
+}
+
+/// A text of JSON as lines.
+std::string write_lines(const Json::Value& value) {
+  Json::StreamWriterBuilder writer;
+  writer["indentation"] = "  ";
+  writer["precision"] = 17;
+  writer["emitUTF8"] = true;
+  return Json::writeString(writer, value);
+}
+
+}  // namespace
+
+bool Subject::is_sane() const {
+  return std::all_of(checks.begin(), checks.end(), [](const bank::Check& check) { return check.faults.empty(); });
+}
+
+std::string explain_missing(const Subject& subject, std::string_view what) {
+  if (subject.record.run.isNull()) return fmt::format("there is no record of the run, and so no {}.", what);
+  return fmt::format("the record of the run holds no {}; it is of an older version, or damaged.", what);
+}
+
+Html make_head(const Subject& subject, std::string_view title) {
+  const bank::Bank& bank = subject.bank;
+  Html out = html("<header>\n<h1>{}</h1>\n<p class=\"remark\">{}, bank of version {}.{}; {} elements, {} mass</p>\n", title,
+                  subject.file.filename().string(), subject.version[0], subject.version[1], bank.element, bank.mass);
+  const auto faults =
+      std::count_if(subject.checks.begin(), subject.checks.end(), [](const bank::Check& one) { return !one.faults.empty(); });
+  if (faults > 0) {
+    out += html("<p class=\"verdict bad\">This bank is not sane: {} of {} checks fail. <a href=\"#checks\">Which?</a></p>\n", faults,
+                subject.checks.size());
+  } else {
+    out += html("<p class=\"verdict {}\">{}.<br>{}.</p>\n", bank.proof ? "good" : "fair",
+                bank.proof ? bank::describe_completeness(bank) : "There is no proof that no mode is missing", describe_bars(bank));
+  }
+  out += make_warnings(subject);
+  out += make_tiles(subject);
+  return out += html("</header>\n");
+}
+
+Html make_mesh_section(const Subject& subject) {
+  const Json::Value& mesh = find(subject.record.run, "mesh");
+  const bank::Bank& bank = subject.bank;
+  Facts quality;
+  if (const auto angle = find_amount(mesh, "min_dihedral_deg"))
+    quality.add("smallest dihedral angle", html("{:.2f}\u00b0", *angle),
+                *angle < kSliverDeg ? "a sliver: under 5\u00b0" : "slivers are under 5\u00b0");
+  if (const auto ratio = find_number(mesh, "mean_ratio_min"))
+    quality.add("worst mean ratio", html("{:.4f}", *ratio), "1 is a regular tetrahedron");
+  Html out = quality.finish();
+  if (quality.empty()) out += html("<p class=\"missing\">Left out: {}</p>\n", explain_missing(subject, "quality of the mesh"));
+  Facts facts;
+  if (const auto source = find_text(mesh, "source")) facts.add("source", html("{}", *source));
+  facts.add("nodes", html("{}", format_count(bank.counts.nodes)), "as solved, mid-side nodes among them");
+  facts.add("tetrahedra", html("{}", format_count(bank.counts.tets)));
+  facts.add("connected parts", html("{}", format_count(bank.counts.components)));
+  facts.add("surface", html("{} triangles", format_count(static_cast<std::int64_t>(bank.triangles.size()))),
+            fmt::format("{} vertices", format_count(static_cast<std::int64_t>(bank.vertex_count()))));
+  add_mended(facts, mesh, "held_nodes", "held nodes", "by the job");
+  add_count(facts, mesh, "file_nodes", "nodes of the file");
+  add_mended(facts, mesh, "refinements", "refined", "times");
+  add_mended(facts, mesh, "reoriented", "turned round", "elements that were inside out");
+  add_mended(facts, mesh, "unreferenced", "unused", "nodes of the file");
+  add_mended(facts, mesh, "welded", "welded", "nodes that lay on others");
+  add_mended(facts, mesh, "curved", "curved", "elements");
+  add_mended(facts, mesh, "straightened", "straightened", "elements that were bent too far");
+  facts.add("mass", html("{} kg", format_plain(bank.rigid.mass_kg)), fmt::format("{} m\u00b3", format_plain(bank.rigid.volume_m3)));
+  out += facts.finish();
+  Html warnings;
+  for (const std::string& text : find_texts(find(mesh, "warnings"))) warnings += html("<li>{}</li>\n", escape(text, 1000));
+  if (!warnings.empty()) out += html("<div class=\"note\"><ul>\n{}</ul></div>\n", warnings);
+  return make_section("mesh", "Mesh", out);
+}
+
+Html make_bank_section(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  Html out = html("<p>{} in all, {} bytes: {} vertices of the surface, {} modes.</p>\n", format_bytes(subject.file_bytes),
+                  format_count(static_cast<std::int64_t>(subject.file_bytes)), format_count(static_cast<std::int64_t>(bank.vertex_count())),
+                  format_count(static_cast<std::int64_t>(bank.mode_count())));
+  out += draw_bars("Bytes by part of the bank", make_size_bars(subject));
+  return make_section("size", "Size of the bank", out);
+}
+
+Html make_check_section(const Subject& subject) {
+  Table table({{""}, {"property"}, {"figure"}});
+  for (const bank::Check& check : subject.checks) {
+    if (check.faults.empty()) table.add({html("<span class=\"ok\">ok</span>"), html("{}", check.property), html("{}", check.figure)});
+    for (std::size_t i = 0; i < std::min<std::size_t>(check.faults.size(), kMostWarnings); ++i)
+      table.add({html("<span class=\"fault\">FAULT</span>"), html("{}", check.property), html("{}", check.faults[i])});
+  }
+  return make_section("checks", "Checks", table.finish());
+}
+
+Html make_job_section(const Subject& subject) {
+  Json::Value job = subject.record.job;
+  if (!job.isObject()) return leave_out("job", "Job", "neither the file of the resolved job nor the bank holds it.");
+  job.removeMember("run");
+  Html out = html("<pre>{}</pre>\n", escape(write_lines(job), kMostJobBytes));
+  return make_section("job", "Job", out);
+}
+
+}  // namespace carillon::report

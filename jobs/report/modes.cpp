@@ -1,0 +1,237 @@
+// Method:     frequencies on a logarithmic axis, each with what is known of its error; numbers in tables beside the charts.
+// Source:     docs/error-bars.md, docs/howto/trust-a-bank.md.
+// Deviations: none.
+#include <algorithm>
+#include <cmath>
+
+#include "jobs/report/chart.hpp"
+#include "jobs/report/quantity.hpp"
+#include "jobs/report/sections.hpp"
+
+namespace carillon::report {
+namespace {
+
+constexpr std::size_t kMostRows = 1000;
+constexpr double kResidualLimit = 1e-4;  // of a sane bank
+
+double calc_t60_s(const bank::Bank& bank, std::size_t mode) { return std::log(1000.0) / bank.decay_per_s[mode]; }
+
+/// Both error bars of a mode together [cent]; 0 where none is known.
+double calc_cents(const bank::Bank& bank, std::size_t mode) {
+  double cents = 0.0;
+  for (const std::vector<double>* bars : {&bank.algebraic_error_cents, &bank.discretisation_error_cents})
+    if (mode < bars->size() && std::isfinite((*bars)[mode])) cents += (*bars)[mode];
+  return cents;
+}
+
+std::string format_small(double value) { return fmt::format("{:.1e}", value); }
+
+Html make_cents(const std::vector<double>& cents, std::size_t mode) {
+  return mode < cents.size() ? html("{:.2g}", cents[mode]) : html("-");
+}
+
+std::string name_mode(const bank::Bank& bank, std::size_t mode) {
+  return fmt::format("mode {}, {}", mode + 1, format_hz(bank.freq_hz(mode)));
+}
+
+Axis make_frequency_axis() { return {.label = "frequency [Hz]", .is_log = true}; }
+
+/// Sticks over the frequency as high as the mode rings long; where not all decay, as high as their number.
+Html draw_modes(const bank::Bank& bank) {
+  bool rings_out = true;
+  for (std::size_t i = 0; i < bank.mode_count(); ++i)
+    rings_out = rings_out && bank.decay_per_s[i] > 0.0 && std::isfinite(bank.decay_per_s[i]);
+  Scatter chart{.title = "Modes by frequency",
+                .x = make_frequency_axis(),
+                .y = {.label = rings_out ? "falls by 60 dB in [s]" : "number of the mode", .is_log = rings_out},
+                .series = {{.name = "modes", .colour = 0, .marks = {}, .is_stick = true}},
+                .lines = {}};
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    const double freq = bank.freq_hz(i), cents = calc_cents(bank, i), width = std::exp2(std::min(cents, 12000.0) / 1200.0);
+    std::string title = name_mode(bank, i);
+    if (cents > 0.0) title += fmt::format(" \u00b1 {}", format_cents(cents));
+    if (rings_out) title += fmt::format(", T60 {:.3g} s", calc_t60_s(bank, i));
+    chart.series[0].marks.push_back({.x = freq,
+                                     .y = rings_out ? calc_t60_s(bank, i) : static_cast<double>(i + 1),
+                                     .x_low = cents > 0.0 ? freq / width : 0.0,
+                                     .x_high = cents > 0.0 ? freq * width : 0.0,
+                                     .title = std::move(title)});
+  }
+  return draw_scatter(chart);
+}
+
+/// A number of each mode, not negative, over the frequency.
+Series make_series(const bank::Bank& bank, const char* name, int colour, const std::vector<double>& values, std::string (*format)(double)) {
+  Series series{.name = name, .colour = colour, .marks = {}};
+  for (std::size_t i = 0; i < std::min(values.size(), bank.mode_count()); ++i) {
+    series.marks.push_back(
+        {.x = bank.freq_hz(i), .y = values[i], .title = fmt::format("{}: {} {}", name_mode(bank, i), name, format(values[i]))});
+  }
+  return series;
+}
+
+Html make_mode_table(const bank::Bank& bank) {
+  Table table({{"mode", true},
+               {"frequency [Hz]", true},
+               {"\u00b1 mesh [cent]", true},
+               {"\u00b1 body [cent]", true},
+               {"decay [1/s]", true},
+               {"T60 [s]", true},
+               {"residual", true},
+               {"gain", true}});
+  const std::size_t shown = std::min(kMostRows, bank.mode_count());
+  for (std::size_t i = 0; i < shown; ++i) {
+    table.add({html("{}", i + 1), html("{:.2f}", bank.freq_hz(i)), make_cents(bank.algebraic_error_cents, i),
+               make_cents(bank.discretisation_error_cents, i), html("{:.4g}", bank.decay_per_s[i]), html("{:.3g}", calc_t60_s(bank, i)),
+               html("{:.1e}", bank.residual[i]), html("{:.4g}", bank.radiation_gain[i])});
+  }
+  Html out = table.finish();
+  if (shown < bank.mode_count())
+    out += html("<p class=\"remark\">The first {} of {} modes; carillon-bank info --json has them all.</p>\n", shown, bank.mode_count());
+  return html(
+      "<details><summary>All modes in numbers</summary>\n{}<p class=\"remark\">Frequencies are undamped. \u00b1 mesh: to the exact mode of "
+      "the mesh, a bound; \u00b1 body: to the mode of the body, an estimate; gain: Pa at 1 m for unit modal velocity.</p>\n</details>\n",
+      out);
+}
+
+Html find_largest(const std::vector<double>& values, const bank::Bank& bank, std::string (*format)(double)) {
+  const auto worst = std::max_element(values.begin(), values.end());
+  if (worst == values.end()) return {};
+  return html("{} at {}", format(*worst), name_mode(bank, static_cast<std::size_t>(worst - values.begin())));
+}
+
+/// Both error bars over the frequency; bounds that are next to nothing beside the estimates only in words.
+Html draw_errors(const bank::Bank& bank) {
+  constexpr double kNothing = 1e-3;
+  const auto find_worst = [](const std::vector<double>& bars) { return bars.empty() ? 0.0 : *std::max_element(bars.begin(), bars.end()); };
+  const double body = find_worst(bank.discretisation_error_cents), mesh = find_worst(bank.algebraic_error_cents);
+  Scatter chart{.title = "Error bars by frequency",
+                .x = make_frequency_axis(),
+                .y = {.label = "error bar [cent]", .is_log = true},
+                .series = {},
+                .lines = {}};
+  if (body > 0.0) chart.series.push_back(make_series(bank, "body (estimate)", 0, bank.discretisation_error_cents, format_cents));
+  if (mesh > kNothing * body) chart.series.push_back(make_series(bank, "mesh (bound)", 1, bank.algebraic_error_cents, format_cents));
+  Html out = draw_scatter(chart);
+  if (body > 0.0 && mesh > 0.0 && mesh <= kNothing * body)
+    out += html("<p class=\"remark\">Estimates against the body; the bounds of the mesh are next to nothing beside them.</p>\n");
+  return out;
+}
+
+/// What was counted at the cuts, and what was found between them.
+Html make_cut_table(const bank::Bank& bank) {
+  const bank::Proof& proof = *bank.proof;
+  Table table(
+      {{"below [Hz]", true}, {"counted by inertia", true}, {"counted since the cut before", true}, {"modes here", true}, {"margin", true}});
+  const std::size_t cuts = std::min({proof.cut_hz.size(), proof.below.size(), proof.margin.size()});
+  for (std::size_t i = 0; i < std::min(cuts, kMostRows); ++i) {
+    std::int64_t here = 0;
+    for (std::size_t m = 0; i > 0 && m < bank.mode_count(); ++m)
+      here += static_cast<std::int64_t>(bank.freq_hz(m) >= proof.cut_hz[i - 1] && bank.freq_hz(m) < proof.cut_hz[i]);
+    table.add({html("{:.6g}", proof.cut_hz[i]), html("{}", proof.below[i]),
+               i > 0 ? html("{}", proof.below[i] - proof.below[i - 1]) : Html(), i > 0 ? html("{}", here) : Html(),
+               html("{:.2g}", proof.margin[i])});
+  }
+  return table.finish();
+}
+
+}  // namespace
+
+Html make_modes_section(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  if (bank.mode_count() == 0) return leave_out("modes", "Modes", "the bank has no modes; its band holds none.");
+  Html out =
+      html("<p>{} modes from {} to {}; the band is {} Hz to {} Hz{}.</p>\n", format_count(static_cast<std::int64_t>(bank.mode_count())),
+           format_hz(bank.freq_hz(0)), format_hz(bank.freq_hz(bank.mode_count() - 1)), format_plain(bank.band_hz[0]),
+           format_plain(bank.band_hz[1]), bank.complete ? "" : ", and the job limited their number");
+  out += draw_modes(bank);
+  if (!bank.discretisation_error_cents.empty() || !bank.algebraic_error_cents.empty())
+    out += html("<p class=\"remark\">Whiskers along the frequency: both error bars together.</p>\n");
+  out += make_mode_table(bank);
+  return make_section("modes", "Modes", out);
+}
+
+Html make_proof_section(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  if (!bank.proof) {
+    return leave_out("proof", "Proof that no mode is missing",
+                     subject.version[0] == 1 && subject.version[1] == 0
+                         ? "banks of version 1.0 carry none; nothing shows that the band holds no more modes than these."
+                         : "the bank carries none; nothing shows that the band holds no more modes than these.");
+  }
+  const bank::Proof& proof = *bank.proof;
+  Html out;
+  if (subject.is_sane()) out += html("<p>{}.</p>\n", bank::describe_completeness(bank));
+  out += html(
+      "<p>The signs of the pivots of K \u2212 \u03c3M count the modes below a frequency exactly, whatever the iteration found. Between two "
+      "cuts both have to agree.</p>\n");
+  out += make_cut_table(bank);
+  Facts facts;
+  facts.add("worst orthonormality", html("{:.1e}", proof.orthonormality),
+            "largest error of \u03c6\u1d62\u1d40 M \u03c6\u2c7c = \u03b4\u1d62\u2c7c");
+  facts.add("worst backward error", html("{:.1e}", proof.backward_error), "of the factorisations behind the counts");
+  std::string rigid;
+  for (std::size_t i = 0; i < std::min<std::size_t>(proof.rigid_per_component.size(), 24); ++i)
+    rigid += fmt::format("{}{}", i == 0 ? "" : ", ", proof.rigid_per_component[i]);
+  if (proof.rigid_per_component.size() > 24) rigid += " ...";
+  facts.add("rigid motions", html("{}", rigid), "of each connected part; 6 where nothing is held");
+  facts.add("groups of equal modes", html("{}", proof.cluster_first.size()), "their single shapes are one choice among many");
+  facts.add("method", html("{}", proof.method));
+  out += facts.finish();
+  return make_section("proof", "Proof that no mode is missing", out);
+}
+
+Html make_error_section(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  if (bank.algebraic_error_cents.empty() && bank.discretisation_error_cents.empty()) {
+    return leave_out("errors", "Error bars", "the bank has none; how far its frequencies are from those of the body is not known.");
+  }
+  Facts facts;
+  if (const Html worst = find_largest(bank.discretisation_error_cents, bank, format_cents); !worst.empty())
+    facts.add("body, largest", worst, "how far the mode of the body may be: an estimate");
+  if (const Html worst = find_largest(bank.algebraic_error_cents, bank, format_cents); !worst.empty())
+    facts.add("mesh, largest", worst, "how far the exact mode of this mesh may be: a bound");
+  if (const auto asked = find_amount(subject.record.job, "accuracy_cents")) facts.add("asked for", html("{} cent", format_plain(*asked)));
+  Html out = facts.finish();
+  out += draw_errors(bank);
+  const Json::Value& trials = find(find(subject.record.run, "accuracy"), "trials");
+  Table table({{"trial", true}, {"element"}, {"nodes", true}, {"worst error bar [cent]", true}, {"CPU time", true}});
+  for (Json::ArrayIndex i = 0; trials.isArray() && i < std::min<Json::ArrayIndex>(trials.size(), 100); ++i) {
+    const Json::Value& trial = trials[i];
+    const auto nodes = find_count(trial, "nodes");
+    const auto cents = find_amount(trial, "worst_cents"), seconds = find_amount(trial, "cpu_seconds");
+    table.add({html("{}", i + 1), html("{}", find_text(trial, "element").value_or("-")), html("{}", nodes ? format_count(*nodes) : "-"),
+               html("{}", cents ? fmt::format("{:.3g}", *cents) : "-"), html("{}", seconds ? format_seconds(*seconds) : "-")});
+  }
+  if (!table.empty()) out += html("<h3>On the way to the accuracy that was asked for</h3>\n{}", table.finish());
+  return make_section("errors", "Error bars", out);
+}
+
+Html make_residual_section(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  if (bank.mode_count() == 0) return leave_out("residuals", "Residuals", "the bank has no modes.");
+  Facts facts;
+  facts.add("largest", find_largest(bank.residual, bank, format_small), "||K\u03c6 \u2212 \u03bbM\u03c6|| / (\u03bb ||M\u03c6||)");
+  Scatter chart{.title = "Residuals by frequency",
+                .x = make_frequency_axis(),
+                .y = {.label = "residual", .is_log = true},
+                .series = {make_series(bank, "residual", 0, bank.residual, format_small)},
+                .lines = {}};
+  auto tolerance = find_amount(find(subject.record.run, "chosen"), "tolerance");
+  if (!tolerance) tolerance = find_amount(find(subject.record.job, "solver"), "tolerance");
+  if (tolerance && *tolerance > 0.0) {
+    facts.add("tolerance", html("{}", format_plain(*tolerance)), "of the job");
+    chart.lines.push_back({*tolerance, "tolerance of the job"});
+  } else {
+    chart.lines.push_back({kResidualLimit, "limit of a sane bank"});
+  }
+  const Json::Value& solver = find(subject.record.run, "solver");
+  if (const auto above = find_count(solver, "above_tolerance"))
+    facts.add("above the tolerance", html("{}", *above), "modes for which rounding allows no better");
+  if (const auto error = find_amount(solver, "orthonormality_error")) facts.add("orthonormality", html("{:.1e}", *error), "largest error");
+  Html out = facts.finish();
+  out += draw_scatter(chart);
+  return make_section("residuals", "Residuals", out);
+}
+
+}  // namespace carillon::report

@@ -1,0 +1,86 @@
+// Method:     every value is asked for by name and kind; what is not of that kind is not there.
+// Source:     none.
+// Deviations: none.
+#include "jobs/report/record.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <sstream>
+
+#include "runtime/config/file.hpp"
+
+namespace carillon::report {
+namespace {
+
+constexpr std::uint64_t kMostBytes = 64 << 20;
+constexpr double kMostCount = 9e15;  // below 2^53
+
+}  // namespace
+
+Json::Value parse_json(std::string_view text) {
+  Json::CharReaderBuilder builder;
+  builder["stackLimit"] = 64;
+  builder["failIfExtra"] = true;
+  const std::unique_ptr<Json::CharReader> reader(builder.newCharReader());
+  Json::Value value;
+  std::string errors;
+  try {
+    if (reader->parse(text.data(), text.data() + text.size(), &value, &errors)) return value;
+  } catch (const Json::Exception&) {  // jsoncpp throws where it is nested too deep
+  }
+  return {};
+}
+
+const Json::Value& find(const Json::Value& in, const char* key) {
+  return in.isObject() && in.isMember(key) ? in[key] : Json::Value::nullSingleton();
+}
+
+std::optional<double> find_number(const Json::Value& in, const char* key) {
+  const Json::Value& value = find(in, key);
+  if (!value.isNumeric() || !std::isfinite(value.asDouble())) return std::nullopt;
+  return value.asDouble();
+}
+
+std::optional<double> find_amount(const Json::Value& in, const char* key) {
+  const std::optional<double> value = find_number(in, key);
+  return value && *value >= 0.0 ? value : std::nullopt;
+}
+
+std::optional<std::int64_t> find_count(const Json::Value& in, const char* key) {
+  const std::optional<double> value = find_amount(in, key);
+  if (!value || *value > kMostCount || *value != std::floor(*value)) return std::nullopt;
+  return static_cast<std::int64_t>(*value);
+}
+
+std::optional<std::string> find_text(const Json::Value& in, const char* key) {
+  const Json::Value& value = find(in, key);
+  if (!value.isString()) return std::nullopt;
+  return value.asString();
+}
+
+Record read_record(const std::filesystem::path& resolved_job, const std::string& provenance) {
+  Record record;
+  if (!resolved_job.empty()) {
+    try {
+      record.job = parse_json(config::read_file(resolved_job, "resolved job", kMostBytes));
+      if (!record.job.isObject()) record.remarks.emplace_back("The file of the resolved job is no JSON object.");
+    } catch (const InputError&) {
+      record.remarks.emplace_back("The file of the resolved job cannot be read.");
+    }
+  }
+  if (!find(record.job, "run").isObject()) {
+    if (record.job.isObject()) record.remarks.emplace_back("The file of the resolved job holds no record of the run.");
+    Json::Value own = parse_json(provenance);
+    if (!record.job.isObject() && own.isObject()) record.job = own;
+    record.run = find(own, "run");
+    if (!resolved_job.empty() && record.run.isObject()) record.remarks.emplace_back("The bank's own copy of the record is shown.");
+  } else {
+    record.run = record.job["run"];
+  }
+  if (!record.job.isObject()) record.job = Json::Value();
+  if (!record.run.isObject()) record.run = Json::Value();
+  return record;
+}
+
+}  // namespace carillon::report

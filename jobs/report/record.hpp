@@ -1,0 +1,34 @@
+// The record of a run as somebody left it: nothing in it is sure.
+#pragma once
+
+#include <json/json.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace carillon::report {
+
+/// JSON of a file or a bank; null when it is none.
+Json::Value parse_json(std::string_view text);
+
+/// A member of an object; null when it is not there, or `in` is no object.
+const Json::Value& find(const Json::Value& in, const char* key);
+std::optional<double> find_number(const Json::Value& in, const char* key);       // finite
+std::optional<double> find_amount(const Json::Value& in, const char* key);       // finite, not negative
+std::optional<std::int64_t> find_count(const Json::Value& in, const char* key);  // whole, not negative
+std::optional<std::string> find_text(const Json::Value& in, const char* key);
+
+/// The resolved job of a bank and its member "run", each an object or null.
+struct Record {
+  Json::Value job, run;
+  std::vector<std::string> remarks;  // why the record is not, or not only, that of the file
+};
+
+/// From the file, and what is missing there from the text of the bank. Never throws for what the file is or holds.
+Record read_record(const std::filesystem::path& resolved_job, const std::string& provenance);
+
+}  // namespace carillon::report
