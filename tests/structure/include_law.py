@@ -51,6 +51,7 @@ LAW = {
     "jobs/attempt": (["runtime/config", "runtime/bank", "jobs/process", "jobs/outcome", "jobs/store"], ["fmt"]),
     "jobs/queue": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt"], ["fmt"]),
     "jobs/report": (["runtime/config", "runtime/bank"], ["fmt", "json"]),
+    "jobs/slurm": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt", "jobs/queue"], ["fmt"]),
     "precompute/mesh": (["runtime/config"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/config", "precompute/mesh"], ["fmt"]),
     "precompute/mesher": (["runtime/config", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),

@@ -1,0 +1,65 @@
+// Jobs of the engine "slurm": handed to Slurm in batches, followed through Slurm's own commands, settled by what they left in the store.
+//
+// A row of theirs is running without a number while it is being handed over, queued with one while it waits in Slurm, running with one
+// while it runs there. What was handed over stands in the job's folder too (records.hpp), so that nothing is submitted twice.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "jobs/outcome/outcome.hpp"
+#include "jobs/registry/registry.hpp"
+#include "jobs/slurm/records.hpp"
+#include "jobs/slurm/settings.hpp"
+#include "jobs/slurm/site.hpp"
+#include "jobs/store/store.hpp"
+
+namespace carillon::slurm {
+
+class Engine {
+ public:
+  /// Ranks, memory and time limit of a job. Asked outside of transactions.
+  using FindNeeds = std::function<store::Resources(const registry::Job&)>;
+
+  /// `program`: carillon, unless the settings name it. `say`: lines about Slurm itself, e.g. that it does not answer.
+  Engine(const store::Store& store, Settings settings, std::filesystem::path program, std::function<void(const std::string&)> say);
+
+  /// Hands over all that is ready: jobs that ask for the same go in one array. What Slurm refuses has failed, and why is in its row; when
+  /// Slurm does not answer they stay queued. Returns the rows that Slurm took or refused. Call follow() first.
+  std::vector<registry::Job> hand_over(registry::Registry& registry, const FindNeeds& find_needs);
+
+  /// Brings the rows up to date: waits, runs, ended and why, to be handed over again. Ends those with a wish to be cancelled. Rows stay as
+  /// they are while Slurm does not answer. Returns those whose state changed.
+  std::vector<registry::Job> follow(registry::Registry& registry);
+
+  /// Cancels a job that Slurm has or may get: now when Slurm answers, else as soon as it does. False: later.
+  bool cancel(registry::Registry& registry, const store::Id& id);
+
+ private:
+  using Rows = std::vector<registry::Job>;
+  void submit(registry::Registry& registry, const Batch& batch, const Rows& jobs, Rows& changed);
+  void adopt(registry::Registry& registry, Rows& jobs);
+  void look_at(registry::Registry& registry, const registry::Job& job, const Seen& seen, Rows& changed);
+  void settle(registry::Registry& registry, const registry::Job& job, const std::optional<Seen>& seen, Rows& changed);
+  void cancel_left(registry::Registry& registry);
+  void clean();
+  void tell_unreachable(const Unreachable& error);
+
+  const store::Store& store_;
+  Site site_;
+  std::filesystem::path program_;
+  std::function<void(const std::string&)> say_;
+  bool is_unreachable_told_ = false;
+};
+
+/// What became of a job that Slurm has ended, from what it left in its folder and what Slurm says. Reads files, asks nobody.
+struct Judgement {
+  bool is_cancelled = false;  // in Slurm, by somebody
+  outcome::Outcome outcome;
+};
+Judgement judge(const store::Store& store, const store::Id& id, const Handed& handed, const std::optional<Seen>& seen);
+
+}  // namespace carillon::slurm

@@ -1,0 +1,61 @@
+// Method:     `scontrol requeue` from inside the job. Slurm then kills what is left of it, this process too: it is the last thing done.
+// Source:     scontrol(1) of Slurm 22.05.
+// Deviations: none.
+#include "jobs/slurm/inside.hpp"
+
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+#include <string>
+
+#include "jobs/attempt/attempt.hpp"
+#include "jobs/outcome/policy.hpp"
+#include "jobs/slurm/records.hpp"
+#include "jobs/slurm/site.hpp"
+
+namespace carillon::slurm {
+namespace {
+
+/// For what another run with the same memory will not mend, the row's keeper decides.
+bool is_for_outside(outcome::Cause cause) { return cause == outcome::Cause::memory; }
+
+}  // namespace
+
+outcome::Outcome explain_stop(outcome::Outcome outcome) {
+  if (outcome.cause != outcome::Cause::stopped && outcome.cause != outcome::Cause::checkpointed) return outcome;
+  outcome.cause = outcome::Cause::time_limit;
+  outcome.reason = outcome.is_further ? fmt::format("saved at {:.0f} % before the time limit of the Slurm job", outcome.percent)
+                                      : "the time limit of the Slurm job came before there was anything new to save; ask for more time";
+  return outcome;
+}
+
+int end_attempt(const std::filesystem::path& work, int exit_code) {
+  const char* job = std::getenv("SLURM_JOB_ID");
+  if (job == nullptr || exit_code != attempt::kExitGoesOn) return exit_code;
+  const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
+  if (!left || is_for_outside(left->cause)) return exit_code;
+  const Site site{Settings{}};
+  const int failures = read_failures(work);
+  try {
+    if (!site.is_running(job)) return exit_code;
+    const outcome::Outcome outcome = explain_stop(*left);
+    outcome::write_outcome(work, outcome);
+    const outcome::Decision decision = outcome::decide(outcome.cause, failures, outcome.is_further);
+    if (decision.next == outcome::Next::failed) return kExitSystem;
+    write_failures(work, decision.failures);
+    fmt::print(stderr, "carillon: {}; queued again in Slurm\n", outcome.reason);
+    std::fflush(stderr);
+    site.requeue(job, decision.delay_s);
+  } catch (const SystemError& error) {
+    fmt::print(stderr, "carillon: {}\n", error.what());
+    try {
+      write_failures(work, failures);
+    } catch (const SystemError&) {
+    }
+  }
+  return exit_code;
+}
+
+}  // namespace carillon::slurm

@@ -1,0 +1,49 @@
+// Method:     As jobs/queue admits on one machine, but for a machine of its own for each job.
+// Source:     jobs/queue/needs.hpp, jobs/queue/admission.hpp. Deviations: none.
+#include "jobs/slurm/needs.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "jobs/attempt/attempt.hpp"
+#include "jobs/queue/admission.hpp"
+#include "jobs/queue/host.hpp"
+#include "jobs/queue/needs.hpp"
+#include "jobs/slurm/command.hpp"
+
+namespace carillon::slurm {
+namespace {
+
+constexpr double kPredictionPatienceS = 600.0;
+
+void predict(const store::Store& store, const registry::Job& job, const queue::Need& guess, const std::filesystem::path& program) {
+  const double memory_gb = queue::calc_memory(guess, 1);
+  if (memory_gb > queue::find_host().available_gb || !attempt::can_predict()) return;
+  attempt::Options attempt;
+  attempt.work = store.work_folder(job.id);
+  attempt.is_prediction = true;
+  run_command(attempt::make_arguments(program, attempt), {}, kPredictionPatienceS);
+}
+
+}  // namespace
+
+store::Resources find_resources(const store::Store& store, const registry::Job& job, const Settings& settings,
+                                const std::filesystem::path& program) {
+  queue::JobNeeds needs = queue::find_needs(store, job);
+  if (needs.wants_prediction) {
+    predict(store, job, needs.need, program);
+    needs = queue::find_needs(store, job);
+  }
+  store::Resources resources;
+  resources.time_limit_s = needs.time_limit_s;
+  resources.ranks = needs.need.ranks;
+  if (resources.ranks <= 0) {
+    const bool is_small = needs.need.seconds < queue::kSmallSeconds;
+    const double worth = is_small ? 1.0 : std::floor(needs.need.seconds / queue::kSecondsPerRank);
+    resources.ranks = static_cast<int>(std::clamp(worth, 1.0, static_cast<double>(settings.most_ranks)));
+  }
+  resources.memory_gb = queue::calc_memory(needs.need, resources.ranks);
+  return resources;
+}
+
+}  // namespace carillon::slurm

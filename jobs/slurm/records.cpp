@@ -1,0 +1,119 @@
+#include "jobs/slurm/records.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <fstream>
+#include <system_error>
+
+#include "jobs/slurm/script.hpp"
+#include "runtime/config/document.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::slurm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kNobody = "none";
+constexpr const char* kHandedFile = "slurm.json";
+constexpr const char* kRetriesFile = "retries.json";
+constexpr const char* kJobsFile = "jobs";
+constexpr const char* kNumberFile = "number";
+constexpr std::streamoff kMostOutputBytes = 4096;
+
+bool is_name(const std::string& text) { return text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos; }
+
+}  // namespace
+
+void write_handed(const fs::path& work, const Handed& handed) {
+  config::write_file(work / kHandedFile,
+                     fmt::format("{{\"batch\": {}, \"title\": {}, \"task\": {}, \"before\": {}}}\n", config::quote(handed.batch),
+                                 config::quote(handed.title), handed.task, config::quote(handed.before.empty() ? kNobody : handed.before)));
+}
+
+std::optional<Handed> read_handed(const fs::path& work) {
+  std::error_code error;
+  if (!fs::exists(work / kHandedFile, error)) return std::nullopt;
+  try {
+    config::Object root = config::read_document(work / kHandedFile).root();
+    Handed handed;
+    handed.batch = root.string("batch");
+    handed.title = root.string("title");
+    handed.task = static_cast<int>(root.integer("task", -1, 1 << 30));
+    handed.before = root.string("before");
+    if (handed.before == kNobody) handed.before.clear();
+    if (is_name(handed.batch)) return handed;
+  } catch (const InputError&) {
+  }
+  return std::nullopt;
+}
+
+void remove_handed(const fs::path& work) {
+  std::error_code error;
+  fs::remove(work / kHandedFile, error);
+}
+
+void write_failures(const fs::path& work, int failures) {
+  config::write_file(work / kRetriesFile, fmt::format("{{\"failures\": {}}}\n", failures));
+}
+
+int read_failures(const fs::path& work) {
+  std::error_code error;
+  if (!fs::exists(work / kRetriesFile, error)) return 0;
+  try {
+    return static_cast<int>(config::read_document(work / kRetriesFile).root().integer("failures", 0, 1 << 20));
+  } catch (const InputError&) {
+    return 0;
+  }
+}
+
+void make_batch_folder(const store::Store& store, const std::string& batch, const std::string& script, const std::vector<store::Id>& jobs) {
+  const fs::path temporary = store.make_temporary(), folder = store.root() / "slurm" / batch;
+  std::string ids;
+  for (const store::Id& id : jobs) ids += id.text() + "\n";
+  config::write_file(temporary / kJobsFile, ids);
+  config::write_file(temporary / "job.sh", script);
+  std::error_code error;
+  fs::create_directories(folder.parent_path(), error);
+  if (!error) fs::rename(temporary, folder, error);
+  if (error) throw SystemError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
+}
+
+std::vector<store::Id> read_jobs(const fs::path& root, const std::string& batch) {
+  std::ifstream stream(root / "slurm" / batch / kJobsFile);
+  std::vector<store::Id> jobs;
+  for (std::string line; std::getline(stream, line);) {
+    if (const auto id = store::parse_id(line)) jobs.push_back(*id);
+  }
+  return jobs;
+}
+
+void write_number(const fs::path& root, const std::string& batch, const std::string& number) {
+  config::write_file(root / "slurm" / batch / kNumberFile, number + "\n");
+}
+
+std::string read_number(const fs::path& root, const std::string& batch) {
+  std::ifstream stream(root / "slurm" / batch / kNumberFile);
+  std::string number;
+  std::getline(stream, number);
+  return !number.empty() && number.find_first_not_of("0123456789") == std::string::npos ? number : "";
+}
+
+void remove_batch_folder(const fs::path& root, const std::string& batch) {
+  std::error_code error;
+  if (is_name(batch)) fs::remove_all(root / "slurm" / batch, error);
+}
+
+std::string read_output(const fs::path& root, const Handed& handed) {
+  std::ifstream stream(make_output_file(root, handed.batch, std::max(handed.task, 0)), std::ios::binary | std::ios::ate);
+  if (!stream) return "";
+  const std::streamoff size = stream.tellg();
+  stream.seekg(std::max<std::streamoff>(0, size - kMostOutputBytes));
+  std::string text(static_cast<std::size_t>(std::min(size, kMostOutputBytes)), '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
+  return text;
+}
+
+}  // namespace carillon::slurm

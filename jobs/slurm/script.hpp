@@ -1,0 +1,40 @@
+// The script of a batch, and the words that sbatch is given with it. Pure functions: whatever is in a path, it stays a path.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "jobs/slurm/settings.hpp"
+
+namespace carillon::slurm {
+
+/// deploy/slurm/job.sh.
+extern const char* const kJobScript;
+
+/// Jobs that ask for the same. One of them is a job of Slurm, more are an array.
+struct Batch {
+  std::string name;                  // 32 hex digits
+  std::string title;                 // for squeue: "carillon-<12 digits>", of the id of the only job, else of `name`
+  std::string comment;               // the id of the only job, else how many there are
+  std::filesystem::path root;        // of the store, absolute
+  std::vector<std::string> folders;  // below root/work: "ab/abcdef..."
+  std::filesystem::path program;     // carillon
+  int ranks = 1;
+  double memory_gb = 0.0;     // of all ranks together; 0: what the site gives
+  double time_limit_s = 0.0;  // 0: what the site gives
+};
+
+/// A word that a shell reads as just these bytes. Throws InputError for line ends and zero bytes, which belong to no path of ours.
+std::string quote_word(std::string_view word);
+
+std::string make_script(const Batch& batch, const Settings& settings);
+
+/// sbatch and its options; the script is its input. Throws InputError for a store whose path Slurm would read otherwise (a backslash).
+std::vector<std::string> make_sbatch(const Batch& batch, const Settings& settings);
+
+/// Where Slurm puts what itself says of task `task` (of a single job, 0).
+std::filesystem::path make_output_file(const std::filesystem::path& root, const std::string& batch, int task);
+
+}  // namespace carillon::slurm

@@ -1,0 +1,39 @@
+#include "jobs/slurm/settings.hpp"
+
+#include <optional>
+
+namespace carillon::slurm {
+namespace {
+
+constexpr std::size_t kMostWords = 100;
+
+std::vector<std::string> read_texts(config::Object& object, std::string_view key) {
+  std::vector<std::string> texts;
+  for (config::Entry& entry : object.entries(key, kMostWords)) {
+    if (entry.object || entry.text.find('\0') != std::string::npos) throw InputError(entry.place + ": must be a text");
+    texts.push_back(entry.text);
+  }
+  return texts;
+}
+
+}  // namespace
+
+Settings read_settings(std::optional<config::Object> object) {
+  Settings settings;
+  if (!object) return settings;
+  settings.partition = object->string_or("partition", settings.partition);
+  settings.account = object->string_or("account", settings.account);
+  settings.qos = object->string_or("qos", settings.qos);
+  settings.launcher = object->choice_or("launcher", {"mpirun", "srun"}, settings.launcher);
+  settings.signal_before_s = object->number_or("signal_before_s", settings.signal_before_s, {0.0, 65536.0});
+  settings.most_ranks = static_cast<int>(object->integer_if("most_ranks", 1, 1 << 20).value_or(settings.most_ranks));
+  settings.most_running = static_cast<int>(object->integer_if("most_running", 0, 1 << 20).value_or(settings.most_running));
+  settings.most_in_array = static_cast<int>(object->integer_if("most_in_array", 1, 1 << 20).value_or(settings.most_in_array));
+  settings.options = read_texts(*object, "options");
+  settings.prologue = read_texts(*object, "prologue");
+  settings.program = object->string_or("program", settings.program);
+  object->finish();
+  return settings;
+}
+
+}  // namespace carillon::slurm

@@ -1,0 +1,27 @@
+// What a site's Slurm wants to be told: the object "slurm" of the profile file. docs/howto/slurm.md
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/config/document.hpp"
+
+namespace carillon::slurm {
+
+struct Settings {
+  std::string partition, account, qos;  // empty: Slurm's default
+  std::string launcher = "mpirun";      // or "srun": how the ranks are started inside the allocation
+  double signal_before_s = 120.0;       // this long before the time limit the job is told to save
+  int most_ranks = 16;                  // of a job that does not ask
+  int most_running = 0;                 // tasks of one array at a time; 0: no limit
+  int most_in_array = 1000;             // longer batches become several arrays; never more than the site allows
+  std::vector<std::string> options;     // words for sbatch, before ours: {"--constraint=zen3"}
+  std::vector<std::string> prologue;    // lines of shell at the start of every job: "module load openmpi". The profile is the user's own.
+  std::string program;                  // carillon as the nodes know it; empty: the one that submits
+};
+
+/// Throws InputError "file:line: ...". `object` may be none: all defaults.
+Settings read_settings(std::optional<config::Object> object);
+
+}  // namespace carillon::slurm

@@ -1,0 +1,41 @@
+#!/usr/bin/python3
+"""Builds the root of an image by debootstrap and the Dockerfile's own instructions, and uses it: a bank is made and read in it.
+
+usage: root.py SOURCE_DIR SIDE FOLDER        exits 77 (skipped) without root or debootstrap
+"""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+source, side, folder = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
+if os.geteuid() != 0 or not shutil.which("debootstrap"):
+    print("SKIP: needs root and debootstrap (deploy/install container)")
+    sys.exit(77)
+work = folder / side
+shutil.rmtree(work, ignore_errors=True)
+subprocess.run([source / "deploy/container/root", side, work, "--base", folder / "base"], check=True)
+root = work / "root"
+
+
+def inside(*words):
+    """In the root, as a container would: /proc and /dev are there, the variables of the image are set."""
+    settings = [line.split(" ", 1)[1] for line in (source / f"deploy/container/{side}.Dockerfile").read_text().splitlines() if line.startswith("ENV ")]
+    inner = 'mount -t proc proc "$0/proc" && mount --rbind /dev "$0/dev" && exec chroot "$0" env -C /data "$@"'
+    done = subprocess.run(["unshare", "--mount", "--propagation", "private", "sh", "-c", inner, root, *" ".join(settings).split(), *words],
+                          capture_output=True, text=True, timeout=600, env={"PATH": "/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/root"})
+    assert done.returncode == 0, (words, done.stdout, done.stderr)
+    return done.stdout
+
+
+if side == "precompute":
+    (root / "data/bar.json").write_text('{"shape": "bar"}')
+    inside("mpirun", "-np", "2", "carillon-precompute", "--shape", "bar", "-o", "bar.hdf")
+    print(inside("carillon-bank", "check", "bar.hdf"))
+else:
+    print(inside("carillon-render", "--version"))
+    libraries = inside("sh", "-c", "ldd /usr/local/bin/carillon-*")
+    assert "not found" not in libraries and "libmpi" not in libraries and "libpetsc" not in libraries, libraries
+print(f"the root of {side} works")
+shutil.rmtree(work)
