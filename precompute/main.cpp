@@ -68,6 +68,12 @@ struct CommandLine {
     app.add_option("JOB", job, "job file (JSON with // comments)")->required();
     app.add_flag("-q,--quiet", options.quiet, "no progress on standard output");
     app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
+    app.add_option("--checkpoint", options.checkpoint,
+                   "go on from this file if there is one, and save to it; SIGUSR1 and SIGTERM then save and end with 85")
+        ->check(named);
+    app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
+        ->check(CLI::Range(0.0, 1e9))
+        ->capture_default_str();
     app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
@@ -91,7 +97,6 @@ bool is_first_of_all() {
 }
 
 int run(const petsc::Session& session, const CommandLine& words) {
-  io::end_on_signals(session.rank());
   petsc::pin_blas_threads();
   MPI_Comm failures = MPI_COMM_NULL;
   MPI_Comm_dup(MPI_COMM_WORLD, &failures);
@@ -100,7 +105,12 @@ int run(const petsc::Session& session, const CommandLine& words) {
     print_start(session, words.options.quiet);
     petsc::reserve_blas_memory(PETSC_COMM_WORLD);
     const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, words.job, words.options);
-    if (session.rank() == 0 && !words.options.quiet) fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
+    if (summary.is_stopped) {
+      code = kExitCheckpointed;
+      if (session.rank() == 0) fmt::print(stderr, "carillon-precompute: {}\n", summary.result);
+    } else if (session.rank() == 0 && !words.options.quiet) {
+      fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
+    }
   } catch (const InputError& error) {
     code = fail(failures, session.rank(), kExitInput, error.what());
   } catch (const SolveError& error) {
@@ -121,6 +131,8 @@ int main(int argc, char** argv) {
     const CommandLine words(argc, argv);
     if (words.only_asks()) return is_first_of_all() ? words.app.exit(*words.error) : 0;
     petsc::restart_with_fitting_kernels(argv);
+    io::end_on_signals(is_first_of_all() ? 0 : 1);
+    if (!words.options.checkpoint.empty()) io::save_on_signals();
     const petsc::Session session(argc, argv, words.options.solver_options);
     if (!words.error) return run(session, words);
     if (session.rank() == 0) words.app.exit(*words.error);

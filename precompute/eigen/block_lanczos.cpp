@@ -51,6 +51,7 @@ constexpr double kSmallest = 1e-14;        // as far as residuals, relative to t
 constexpr double kEigenFlops = 9;          // of n^3: a symmetric eigenproblem with its vectors (Golub, Van Loan, 8.3)
 constexpr int kNearest = 32;               // Converged pairs that the others are cleared of at the end.
 constexpr double kSame = 1e-9;             // Closer Ritz values are one.
+constexpr double kOrthonormal = 1e-6;      // An orthonormal block that was kept is no farther from being one.
 constexpr double kSeen = 1e-3;             // A Ritz value with this error is no phantom.
 
 // What the type keeps in eps->data.
@@ -58,6 +59,7 @@ struct Settings {
   PetscInt block = PETSC_DEFAULT;
   PetscBool knows_count = PETSC_TRUE;
   Mat locked = nullptr;
+  LanczosKeeper* keeper = nullptr;
 };
 
 Settings& get_settings(EPS eps) { return *static_cast<Settings*>(eps->data); }
@@ -79,7 +81,10 @@ class Iteration {
     bool done = false;
   };
 
+  void open_basis();
   void start();
+  bool go_on();
+  bool keep();
   bool step();
   void multiply_mass();
   void invert();
@@ -91,7 +96,7 @@ class Iteration {
   void project_after_all();
   int orthonormalise_by_columns(Small& r);
   Small sum_products(const Columns& a, const Columns& b) const;
-  std::vector<double> sum_squares(const Columns& a, const Columns& b) const;
+  std::vector<double> sum_squares(const Columns& a, const Columns& b);
   double orthogonalise_column(int i, double* coefficients);
   Ritz calc_ritz();
   void calc_errors(Ritz& ritz) const;
@@ -129,7 +134,9 @@ class Iteration {
   std::size_t last_converged_ = 0;
   std::uint64_t noise_ = 0;
   Orthogonality orthogonality_;
-  bool is_spared_ = false;  // the step did without the projection against the whole basis
+  LanczosKeeper* keeper_ = nullptr;  // may be null
+  Wish wish_;                        // of all ranks, since the last save
+  bool is_spared_ = false;           // the step did without the projection against the whole basis
 };
 
 Columns view(Mat dense) {
@@ -149,6 +156,7 @@ Iteration::Iteration(EPS eps) : eps_(eps) {
     locked_ = locked_access_->view();
   }
   room_ = static_cast<int>(std::min(eps->ncv, eps->n - fixed - locked));
+  keeper_ = settings.keeper;
   block_ = static_cast<int>(std::min<PetscInt>(settings.block, std::max<PetscInt>(room_, 1)));
   t_.assign(static_cast<std::size_t>(room_) * static_cast<std::size_t>(room_), 0.0);
 
@@ -179,11 +187,22 @@ Small Iteration::sum_products(const Columns& a, const Columns& b) const {
 }
 
 // a_j^T b_j
-std::vector<double> Iteration::sum_squares(const Columns& a, const Columns& b) const {
-  std::vector<double> squares(static_cast<std::size_t>(a.count));
+std::vector<double> Iteration::sum_squares(const Columns& a, const Columns& b) {
+  const auto count = static_cast<std::size_t>(a.count);
+  std::vector<double> squares(count + (keeper_ != nullptr ? 2 : 0));
+  if (keeper_ != nullptr) {  // What this rank wants of it goes along: no message of its own.
+    const Wish wish = keeper_->ask();
+    squares[count] = wish.stop ? 1 : 0;
+    squares[count + 1] = wish.save ? 1 : 0;
+  }
   for (int j = 0; j < a.count; ++j)
     squares[static_cast<std::size_t>(j)] = std::inner_product(a.column(j), a.column(j) + a.rows, b.column(j), 0.0);
-  MPI_Allreduce(MPI_IN_PLACE, squares.data(), a.count, MPI_DOUBLE, MPI_SUM, comm_);
+  MPI_Allreduce(MPI_IN_PLACE, squares.data(), static_cast<int>(squares.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  if (keeper_ != nullptr) {
+    wish_.stop = wish_.stop || squares[count] > 0;
+    wish_.save = wish_.save || squares[count + 1] > 0;
+    squares.resize(count);
+  }
   return squares;
 }
 
@@ -211,9 +230,7 @@ void Iteration::invert() {
   check(STApplyMat(eps_->st, block, w_mat_));
 }
 
-// The first block: the initial space and random vectors, once through the operator, which damps what is far from the shift.
-void Iteration::start() {
-  for (PetscInt j = eps_->nini; j < block_; ++j) check(BVSetRandomColumn(eps_->V, j));
+void Iteration::open_basis() {
   PetscScalar* array = nullptr;
   PetscInt fixed = 0;
   check(BVGetNumConstraints(eps_->V, &fixed));
@@ -222,6 +239,69 @@ void Iteration::start() {
   fixed_ = {array, rows, rows, static_cast<int>(fixed)};
   basis_ = {array + fixed * rows, rows, rows, room_ + block_};
   everything_ = {array, rows, rows, static_cast<int>(fixed) + room_ + block_};
+}
+
+// From where the keeper's iteration stood. False where it does not fit this one: what is read has no effect then.
+bool Iteration::go_on() {
+  const LanczosState& state = *keeper_->start;
+  const auto& [block, room, size, width, previous, next_check, last_size, last_converged, iterations, noise] = state.sizes;
+  const bool fits = block == block_ && room == room_ && size <= room && width >= 1 && width <= block && width <= size &&
+                    previous <= size - width && last_size <= size && last_converged <= size && next_check <= room + 4 * block &&
+                    iterations < eps_->max_it && static_cast<std::int64_t>(state.t.size()) == size * size;
+  if (!fits) {
+    keeper_->reject("its iteration is not this one");
+    return false;
+  }
+  keeper_->read(basis_.part(0, static_cast<int>(size)));
+  width_ = static_cast<int>(width);
+  for (int j = 0; j < block_; ++j) {
+    if (j < width_)
+      std::copy_n(basis_.column(static_cast<int>(size - width) + j), w_.rows, w_.column(j));
+    else
+      std::fill_n(w_.column(j), w_.rows, 0.0);
+  }
+  multiply_mass();
+  const Small gram = sum_products(w_.part(0, width_), z_.part(0, width_));
+  double error = 0;
+  for (int j = 0; j < width_; ++j) {
+    for (int i = 0; i < width_; ++i) error = std::max(error, std::abs(gram[static_cast<std::size_t>(j * width_ + i)] - (i == j ? 1 : 0)));
+  }
+  if (!(error < kOrthonormal)) {
+    keeper_->reject("its basis is not orthonormal");
+    return false;
+  }
+  size_ = static_cast<int>(size);
+  for (int j = 0; j < size_; ++j) std::copy_n(state.t.data() + static_cast<std::ptrdiff_t>(j) * size_, size_, &t(0, j));
+  previous_ = static_cast<int>(previous);
+  next_check_ = static_cast<int>(next_check);
+  last_size_ = static_cast<int>(last_size);
+  last_converged_ = static_cast<std::size_t>(last_converged);
+  eps_->its = static_cast<PetscInt>(iterations);
+  noise_ = static_cast<std::uint64_t>(noise);
+  return true;
+}
+
+// Between two steps: saves where a rank wished it. True if one wants to stop.
+bool Iteration::keep() {
+  if (keeper_ == nullptr || !(wish_.stop || wish_.save)) return false;
+  LanczosState state;
+  state.sizes = {block_,     room_,
+                 size_,      width_,
+                 previous_,  next_check_,
+                 last_size_, static_cast<std::int64_t>(last_converged_),
+                 eps_->its,  static_cast<std::int64_t>(noise_)};
+  for (int j = 0; j < size_; ++j) state.t.insert(state.t.end(), &t(0, j), &t(0, j) + size_);
+  keeper_->save(state, basis_.part(0, size_));
+  keeper_->was_stopped = wish_.stop;
+  wish_ = {};
+  return keeper_->was_stopped;
+}
+
+// The first block: the initial space and random vectors, once through the operator, which damps what is far from the shift.
+void Iteration::start() {
+  for (PetscInt j = eps_->nini; j < block_; ++j) check(BVSetRandomColumn(eps_->V, j));
+  open_basis();
+  const auto rows = static_cast<std::ptrdiff_t>(eps_->nloc);
   for (int j = 0; j < block_; ++j) std::copy_n(basis_.column(j), rows, w_.column(j));
   multiply_mass();
   invert();
@@ -671,14 +751,21 @@ void Iteration::clear_nearest(const Ritz& ritz, int count) {
 }
 
 void Iteration::run() {
-  start();
+  bool is_resumed = false;
+  if (keeper_ != nullptr && keeper_->start != nullptr) {
+    open_basis();
+    is_resumed = go_on();
+    PetscScalar* array = everything_.values;
+    if (!is_resumed) check(BVRestoreArray(eps_->V, &array));
+  }
+  if (!is_resumed) start();
   if (width_ == 0) {  // nothing beside what is deflated
     eps_->nconv = 0;
     eps_->reason = EPS_CONVERGED_TOL;
     PetscScalar* all = everything_.values;
     return check(BVRestoreArray(eps_->V, &all));
   }
-  next_check_ = std::min(static_cast<int>(1.7 * static_cast<double>(eps_->nev)) + 2 * block_, room_);
+  if (!is_resumed) next_check_ = std::min(static_cast<int>(1.7 * static_cast<double>(eps_->nev)) + 2 * block_, room_);
   while (true) {
     const bool goes_on = step();
     ++eps_->its;
@@ -702,6 +789,11 @@ void Iteration::run() {
     previous_ = size_ - width_;
     size_ += next_width_;
     width_ = next_width_;
+    if (keep()) {
+      eps_->nconv = 0;
+      eps_->reason = EPS_CONVERGED_USER;
+      break;
+    }
   }
   PetscScalar* array = everything_.values;
   check(BVRestoreArray(eps_->V, &array));
@@ -834,6 +926,13 @@ PetscErrorCode set_locked(EPS eps, Mat columns) {
   if (columns != nullptr) PetscCall(PetscObjectReference(reinterpret_cast<PetscObject>(columns)));
   PetscCall(MatDestroy(&get_settings(eps).locked));
   get_settings(eps).locked = columns;
+  return 0;
+}
+
+PetscErrorCode set_keeper(EPS eps, LanczosKeeper* keeper) {
+  PetscBool is_ours = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_ours));
+  if (is_ours == PETSC_TRUE) get_settings(eps).keeper = keeper;
   return 0;
 }
 

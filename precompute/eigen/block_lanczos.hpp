@@ -3,6 +3,15 @@
 
 #include <slepceps.h>
 
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "precompute/eigen/block_kernels.hpp"
+#include "precompute/eigen/checkpoint.hpp"
+
 namespace carillon::eigen {
 
 /// The name for EPSSetType and -eps_type.
@@ -28,5 +37,27 @@ PetscErrorCode set_count_known(EPS eps, PetscBool known);
 /// which is what makes hundreds of them cheap (EPSSetDeflationSpace orthonormalises anew, vector by vector). Null: none. Logically
 /// collective.
 PetscErrorCode set_locked(EPS eps, Mat columns);
+
+/// Where an iteration stands between two steps, beside its basis. The same on every rank.
+struct LanczosState {
+  /// block, room, size, width, previous, next_check, last_size, last_converged, iterations, noise: as the iteration calls them.
+  std::array<std::int64_t, 10> sizes{};
+  std::vector<double> t;  // (size, size) the projected operator
+
+  std::int64_t size() const { return sizes[2]; }
+};
+
+/// Saves an iteration on its way and goes on with one.
+struct LanczosKeeper {
+  std::function<Wish()> ask;                                            // local, every step
+  std::function<void(const LanczosState&, const Columns& basis)> save;  // collective
+  const LanczosState* start = nullptr;                                  // null: from the beginning
+  std::function<void(const Columns& basis)> read;                       // of start; collective
+  std::function<void(const std::string& why)> reject;                   // start does not fit; collective
+  bool was_stopped = false;                                             // it ended because ask() wished so, after save()
+};
+
+/// Null: none. The keeper must outlive the solve. Logically collective.
+PetscErrorCode set_keeper(EPS eps, LanczosKeeper* keeper);
 
 }  // namespace carillon::eigen

@@ -43,6 +43,7 @@ bool InertiaCounter::try_factorise(double sigma) {
   ++statistics_.factorisations;
   stands_ = factor_->factorise(sigma);
   if (!stands_) return false;
+  standing_ = sigma;
   statistics_.entries = factor_->get_entries();
   statistics_.flops = factor_->get_flops();
   worst_backward_error_ = std::max(worst_backward_error_, factor_->get_backward_error());
@@ -67,6 +68,24 @@ Inertia InertiaCounter::take(double lambda, double reach) {
       fmt::format("K - sigma M is singular all around {:.6g} Hz: the mesh has nodes without mass or stiffness, or the mass matrix is "
                   "not positive definite.",
                   to_hz_(lambda)));
+}
+
+ShiftedFactor& InertiaCounter::stand_at(double sigma) {
+  if (factor_ == nullptr) make_factor();
+  if (stands_ && standing_ == sigma) return *factor_;
+  if (try_factorise(sigma)) return *factor_;
+  if (!uses_mumps_ && options_.factorisation == Factorisation::kAutomatic) {
+    uses_mumps_ = true;
+    release();
+    make_factor();
+    if (try_factorise(sigma)) return *factor_;
+  }
+  throw SolveError(fmt::format("K - sigma M cannot be factorised again at {:.6g} Hz, where it was before.", to_hz_(sigma)));
+}
+
+void InertiaCounter::go_on(bool uses_mumps, double worst_backward_error) {
+  uses_mumps_ = uses_mumps_ || uses_mumps;
+  worst_backward_error_ = worst_backward_error;
 }
 
 ShiftedFactor& InertiaCounter::get_factor() {

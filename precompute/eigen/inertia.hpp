@@ -42,6 +42,13 @@ class InertiaCounter {
   }
 
   const std::vector<Inertia>& get_taken() const { return taken_; }
+  /// The factor at sigma, where a count was taken before; factorised anew if it stands elsewhere. Throws as take() does. Collective.
+  ShiftedFactor& stand_at(double sigma);
+  /// A count that was taken before, by another run.
+  void recall(const Inertia& taken) { taken_.push_back(taken); }
+  /// Goes on from another run.
+  void go_on(bool uses_mumps, double worst_backward_error);
+  bool uses_mumps() const { return uses_mumps_; }
   /// Forgets counts that were taken too near an eigenvalue.
   void forget(double lambda);
   double get_worst_backward_error() const { return worst_backward_error_; }
@@ -58,7 +65,8 @@ class InertiaCounter {
   MPI_Comm comm_ = MPI_COMM_NULL;
   bool uses_mumps_ = false;
   std::unique_ptr<ShiftedFactor> factor_;
-  bool stands_ = false;  // factor_ holds the values of the last take
+  bool stands_ = false;  // factor_ holds the values at standing_
+  double standing_ = 0;
   std::vector<Inertia> taken_;
   double worst_backward_error_ = 0;
 };

@@ -270,18 +270,21 @@ void FoundModes::reset(Mat stiffness, PetscInt capacity) {
   columns_ = make_columns(capacity);
 }
 
+void FoundModes::make_room(PetscInt count) {
+  if (count <= capacity_) return;
+  petsc::MatHandle larger = make_columns(count);
+  {
+    const LocalColumns from(columns_);
+    const LocalColumns to(larger);
+    for (PetscInt j = 0; j < static_cast<PetscInt>(lambda.size()); ++j) std::copy_n(from.column(j), from.rows, to.column(j));
+  }
+  columns_ = std::move(larger);
+  capacity_ = count;
+}
+
 void FoundModes::add(double eigenvalue, const std::function<bool(Vec shape)>& write) {
   const auto count = static_cast<PetscInt>(lambda.size());
-  if (count == capacity_) {
-    capacity_ = capacity_ + capacity_ / 8 + 8;
-    petsc::MatHandle larger = make_columns(capacity_);
-    {
-      const LocalColumns from(columns_);
-      const LocalColumns to(larger);
-      for (PetscInt j = 0; j < count; ++j) std::copy_n(from.column(j), from.rows, to.column(j));
-    }
-    columns_ = std::move(larger);
-  }
+  if (count == capacity_) make_room(capacity_ + capacity_ / 8 + 8);
   Vec column = nullptr;
   check(MatDenseGetColumnVecWrite(columns_, count, &column));
   const bool is_new = write(column);
@@ -363,6 +366,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   check(EPSSetFromOptions(eps));
   if (family == Family::block) {
     check(set_locked(eps, request.locked));
+    check(set_keeper(eps, request.keeper));
     set_starting_block(eps, request);
   } else if (family == Family::krylov || family == Family::davidson) {
     set_deflation_space(eps, request);
@@ -371,6 +375,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
 
   check(EPSSolve(eps));
 
+  if (request.keeper != nullptr && request.keeper->was_stopped) return shell.statistics;
   EPSConvergedReason reason = EPS_CONVERGED_ITERATING;
   check(EPSGetConvergedReason(eps, &reason));
   PetscInt converged = 0;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "precompute/eigen/block_lanczos.hpp"
 #include "precompute/eigen/node_matrix.hpp"
 #include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/eigen/solve_modes.hpp"
@@ -24,6 +25,10 @@ class FoundModes {
   petsc::MatHandle copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const;
   /// The columns by the order given, and nothing else; this object is empty afterwards. Collective.
   petsc::MatHandle take(const std::vector<std::size_t>& order);
+  /// Makes room for `count` modes in all. Collective.
+  void make_room(PetscInt count);
+  /// The columns; those beyond lambda.size() mean nothing.
+  Mat get_columns() const { return columns_; }
 
   std::vector<double> lambda;
 
@@ -52,6 +57,7 @@ struct KrylovRequest {
   int round = 0;                                // starting blocks of different rounds differ
   /// Pairs converged and right-hand sides solved in this run so far; may be empty.
   std::function<void(std::int64_t converged, std::int64_t solves)> progress;
+  LanczosKeeper* keeper = nullptr;  // of the block method; may be null
 };
 
 struct KrylovStatistics {

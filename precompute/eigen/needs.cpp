@@ -37,9 +37,9 @@ BandEnds find_ends(const Options& options) {
   return {calc_lambda(std::max(options.low_hz, kZeroFraction * options.high_hz)), calc_lambda(options.high_hz)};
 }
 
-Slice count_between(InertiaCounter& counter, double low, double high) {
-  const Inertia above = counter.take(high * (1 + kEdgeNudge), kEdgeNudge);
-  const Inertia below = counter.take(low * (1 - 2 * kEdgeNudge), kEdgeNudge);
+Slice count_between(const std::function<Inertia(double lambda, double reach)>& take, double low, double high) {
+  const Inertia above = take(high * (1 + kEdgeNudge), kEdgeNudge);
+  const Inertia below = take(low * (1 - 2 * kEdgeNudge), kEdgeNudge);
   return {below.lambda, below.below, above.lambda, above.below};
 }
 
@@ -94,7 +94,8 @@ Outlook look_ahead(const Problem& problem, const Options& options, const std::fu
   outlook.factor_bytes = factor.get_peak_bytes();
   if (!may_count(outlook)) return outlook;
   start = find_cpu_seconds();
-  const Slice band = count_between(counter, scaling.to_scaled(ends.low), scaling.to_scaled(ends.high));
+  const Slice band = count_between([&](double lambda, double reach) { return counter.take(lambda, reach); }, scaling.to_scaled(ends.low),
+                                   scaling.to_scaled(ends.high));
   outlook.factor_seconds = (find_cpu_seconds() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
   outlook.modes = std::min(band.count(), options.max_modes.value_or(band.count()));
   return outlook;

@@ -24,8 +24,9 @@ struct BandEnds {
 };
 BandEnds find_ends(const Options& options);
 
-/// Counts the eigenvalues below both ends (scaled), a little outside. Two factorisations. Collective.
-Slice count_between(InertiaCounter& counter, double low, double high);
+/// Counts the eigenvalues below both ends (scaled), a little outside. take: InertiaCounter::take, or who asks it. Two factorisations.
+/// Collective.
+Slice count_between(const std::function<Inertia(double lambda, double reach)>& take, double low, double high);
 
 /// Of this rank [byte]. K and M by nodes, at their worst moment while their arrays grow, and the rigid modes.
 std::int64_t calc_copies_bytes(const Problem& problem);

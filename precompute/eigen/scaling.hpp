@@ -3,7 +3,9 @@
 
 #include <petscmat.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 
 namespace carillon::eigen {
 
@@ -19,6 +21,8 @@ class Scaling {
 
   double to_scaled(double lambda) const { return std::ldexp(lambda, -lambda_power_); }
   double from_scaled(double lambda) const { return std::ldexp(lambda, lambda_power_); }
+  /// The powers of two, of M and of lambda.
+  std::array<std::int64_t, 2> get_powers() const { return {mass_power_, lambda_power_}; }
   /// A scaled mode shape times this is one in the units of M.
   double get_shape_factor() const { return std::ldexp(1.0, -mass_power_ / 2); }
 

@@ -30,6 +30,7 @@
 #include "precompute/eigen/refine.hpp"
 #include "precompute/eigen/rigid_modes.hpp"
 #include "precompute/eigen/scaling.hpp"
+#include "precompute/eigen/search_keeper.hpp"
 #include "precompute/eigen/slices.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
@@ -54,6 +55,12 @@ std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
   return counts;
 }
 
+MPI_Comm find_comm(Mat matrix) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(matrix), &comm));
+  return comm;
+}
+
 // Modes of a slice that are still to be found.
 struct Missing {
   std::int64_t count = 0;
@@ -73,8 +80,9 @@ class BandSolver {
   Slice cut(const Slice& band);
   void solve_in_slices(const Slice& band);
   void find_missing(const Slice& slice, double sigma);
-  void run_rounds(const Slice& slice, ShiftedFactor& factor, double sigma, int first);
-  double run_round(const Slice& slice, ShiftedFactor& factor, double sigma, Missing missing, int round);
+  void run_rounds(const Slice& slice, ShiftedFactor* cholmod, double sigma, int first);
+  double run_round(const Slice& slice, ShiftedFactor* cholmod, double sigma, Missing missing, int round);
+  Inertia take(double lambda, double reach = 1e-6);
   std::int64_t count_found(double low, double high) const;
   double find_margin(double lambda) const;
   void move_doubtful_counts();
@@ -110,11 +118,15 @@ class BandSolver {
   std::unique_ptr<InertiaCounter> counter_;
   FoundModes found_;
   Modes modes_;
+  SearchKeeper keeper_;
 };
 
 BandSolver::BandSolver(const Problem& problem, const Options& options)
-    : problem_(problem), options_(options), scaling_(problem.stiffness, problem.mass, find_ends(options).high) {
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm_));
+    : problem_(problem),
+      options_(options),
+      comm_(find_comm(problem.stiffness)),
+      scaling_(problem.stiffness, problem.mass, find_ends(options).high),
+      keeper_(comm_, options.checkpoint, {&found_, &modes_.factor, nullptr}) {
   MPI_Comm_rank(comm_, &rank_);
   check(MatGetSize(problem.stiffness, &n_, nullptr));
   low_ = scaling_.to_scaled(find_ends(options).low);
@@ -189,7 +201,7 @@ void BandSolver::solve_dense_band() {
 
 Slice BandSolver::count_band() {
   report(Phase::kCount, 0);
-  const Slice band = count_between(*counter_, low_, high_);
+  const Slice band = count_between([this](double lambda, double reach) { return take(lambda, reach); }, low_, high_);
   modes_.count_below_low = band.below_low;
   if (band.below_low < modes_.rigid_count || band.count() < 0) {
     throw SolveError(
@@ -198,7 +210,7 @@ Slice BandSolver::count_band() {
                     band.below_low, to_hz(band.low), band.below_high, to_hz(band.high), modes_.rigid_count));
   }
   if (band.below_low > modes_.rigid_count) {
-    const Inertia still = counter_->take(low_ * 1e-4);
+    const Inertia still = take(low_ * 1e-4);
     modes_.mechanism_count = still.below - modes_.rigid_count;
     counter_->forget(still.lambda);
   }
@@ -209,19 +221,37 @@ Slice BandSolver::count_band() {
 // The part of the band that holds the modes wanted.
 Slice BandSolver::cut(const Slice& band) {
   if (!options_.max_modes) return band;
-  return cut_to_lowest(band, *options_.max_modes, [this](double lambda) { return counter_->take(lambda).below; });
+  return cut_to_lowest(band, *options_.max_modes, [this](double lambda) { return take(lambda).below; });
+}
+
+// A count, or what is remembered of it.
+Inertia BandSolver::take(double lambda, double reach) {
+  SearchStep step;
+  step.asked = {lambda, reach};
+  if (const SearchStep* known = keeper_.recall(step)) {
+    const Inertia taken{known->answer[0], static_cast<std::int64_t>(known->answer[1])};
+    counter_->recall(taken);
+    return taken;
+  }
+  const Inertia taken = counter_->take(lambda, reach);
+  step.answer = {taken.lambda, static_cast<double>(taken.below)};
+  keeper_.record(step);
+  return taken;
 }
 
 void BandSolver::make_counter() {
   counter_ = std::make_unique<InertiaCounter>(problem_, options_, modes_.seconds, modes_.factor, [this](double x) { return to_hz(x); });
+  keeper_.set_counter(counter_.get());
 }
 
 void BandSolver::solve_sparse_band() {
   report(Phase::kAnalyse, 0);
+  keeper_.start(n_, scaling_.get_powers());
   make_counter();
   const Slice band = count_band();
   if (band.count() == 0) return describe_proof();
   if (n_ <= kDenseRowsFull && 4 * band.below_high > n_) {
+    keeper_.set_counter(nullptr);
     counter_.reset();
     return solve_dense_band();
   }
@@ -232,6 +262,7 @@ void BandSolver::solve_sparse_band() {
   check_memory(comm_, calc_search_bytes(rows, wanted.count(), modes_.rigid_count), options_.memory_limit_bytes,
                fmt::format("The search for {} modes", wanted.count()));
   found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted.count()));
+  keeper_.load_found();
   solve_in_slices(wanted);
   prove();
   describe_proof();
@@ -243,7 +274,15 @@ std::int64_t BandSolver::count_found(double low, double high) const {
 }
 
 // One Krylov run; adds to found_ what lies in the slice and was not there. Returns up to where from sigma on it left nothing out.
-double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double sigma, Missing missing, int round) {
+double BandSolver::run_round(const Slice& slice, ShiftedFactor* cholmod, double sigma, Missing missing, int round) {
+  SearchStep step;
+  step.kind = SearchStep::kRound;
+  step.asked = {sigma, slice.low, slice.high, static_cast<double>(missing.count), round + (missing.is_known ? 0.0 : 0.5)};
+  if (const SearchStep* known = keeper_.recall(step)) {
+    keeper_.show_found(*known);
+    return known->answer[0];
+  }
+  ShiftedFactor& factor = cholmod != nullptr ? *cholmod : counter_->stand_at(sigma);
   const Timer timer(modes_.seconds.iterate);
   KrylovRequest request;
   request.stiffness = problem_.stiffness;
@@ -271,9 +310,13 @@ double BandSolver::run_round(const Slice& slice, ShiftedFactor& factor, double s
   request.locked = locked;
   const auto before = static_cast<std::int64_t>(found_.lambda.size());
   request.progress = [&](std::int64_t converged, std::int64_t solves) { report(Phase::kIterate, before + converged, solves); };
+  request.keeper = keeper_.begin_round(step);
   const KrylovStatistics statistics = run_krylov(request, found_);
   modes_.factor.solves += statistics.solves;
   modes_.seconds.solve += statistics.solve_seconds;
+  keeper_.end_round();
+  step.answer = {statistics.solved_to};
+  keeper_.record(step);
   return statistics.solved_to;
 }
 
@@ -292,20 +335,19 @@ void BandSolver::find_missing(const Slice& slice, double sigma) {
     modes_.factor.entries = cholmod->get_entries();
   } else {
     report(Phase::kFactor, static_cast<std::int64_t>(found_.lambda.size()));
-    sigma = counter_->take(sigma, 1e-5).lambda;
+    sigma = take(sigma, 1e-5).lambda;
   }
-  ShiftedFactor& factor = cholmod != nullptr ? *cholmod : counter_->get_factor();
-  run_rounds(slice, factor, sigma, 0);
+  run_rounds(slice, cholmod.get(), sigma, 0);
 }
 
 // Runs with the factor at sigma until the slice holds what it was counted to hold, or runs find nothing new.
-void BandSolver::run_rounds(const Slice& slice, ShiftedFactor& factor, double sigma, int first) {
+void BandSolver::run_rounds(const Slice& slice, ShiftedFactor* cholmod, double sigma, int first) {
   int idle = 0;
   for (int round = first; round < kRounds && idle < kIdleRounds; ++round) {
     const std::int64_t missing = slice.count() - count_found(slice.low * (1 - kEdgeTolerance), slice.high * (1 + kEdgeTolerance));
     if (missing <= 0) break;
     const std::size_t before = found_.lambda.size();
-    run_round(slice, factor, sigma, {missing, true}, round);
+    run_round(slice, cholmod, sigma, {missing, true}, round);
     idle = found_.lambda.size() > before ? 0 : idle + 1;
   }
 }
@@ -315,19 +357,19 @@ void BandSolver::solve_in_slices(const Slice& band) {
   const std::int64_t most = options_.factorisation == Factorisation::kCholmod ? band.count() : kSliceModes;
   Sweep sweep(band, most, [this](double lambda) {
     report(Phase::kFactor, static_cast<std::int64_t>(found_.lambda.size()));
-    return counter_->take(lambda).below;
+    return take(lambda).below;
   });
   Slice counted = band;  // between shifts, where counts are exact
   while (!sweep.is_last()) {
     const Sweep::Part part = sweep.take();
     counted.high = part.sigma;
     counted.below_high = part.below_sigma;
-    const double solved_to = run_round(part.slice, counter_->get_factor(), part.sigma, {part.slice.count(), false}, 0);
+    const double solved_to = run_round(part.slice, nullptr, part.sigma, {part.slice.count(), false}, 0);
     if (count_found(counted.low, counted.high) >= counted.count()) {
       sweep.advance(solved_to, band.below_low + count_found(band.low * (1 - kEdgeTolerance), solved_to));
     } else {
       // Copies are missing below the shift, and above it no doubt too. Left for later they would count as modes of the slices to come.
-      run_rounds(counted, counter_->get_factor(), part.sigma, 1);
+      run_rounds(counted, nullptr, part.sigma, 1);
       sweep.advance(part.sigma, part.below_sigma);
     }
     counted.low = part.sigma;
@@ -366,7 +408,7 @@ void BandSolver::move_doubtful_counts() {
     if (is_end) place = old.lambda * (old.lambda >= high_ ? 1 + 10 * kSafeMargin : 1 - 10 * kSafeMargin);
     if (place == 0) continue;
     counter_->forget(old.lambda);
-    (void)counter_->take(place);
+    (void)take(place);
   }
 }
 
@@ -384,7 +426,7 @@ bool BandSolver::move_counts_to_band() {
     }
     if (nearest == old.lambda) continue;
     counter_->forget(old.lambda);
-    const std::int64_t below = counter_->take(std::midpoint(nearest, is_high ? high_ : low_), kEdgeTolerance / 10).below;
+    const std::int64_t below = take(std::midpoint(nearest, is_high ? high_ : low_), kEdgeTolerance / 10).below;
     modes_.band_count -= std::abs(below - old.below);
     if (!is_high) modes_.count_below_low = below;
     has_moved = true;
@@ -557,6 +599,9 @@ void BandSolver::finish() {
 
 Modes solve_modes(const Problem& problem, const Options& options) {
   check_input(problem, options);
+  if (options.checkpoint != nullptr) {
+    if (std::optional<Modes> known = load_modes(problem.stiffness, *options.checkpoint)) return std::move(*known);
+  }
   return BandSolver(problem, options).solve();
 }
 

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "precompute/eigen/checkpoint.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::eigen {
@@ -79,6 +80,7 @@ struct Options {
   /// What the ranks of one host may use together [byte]; 0: what the machine, its cgroup and the process limits leave.
   std::int64_t memory_limit_bytes = 0;
   std::function<void(const Progress&)> progress;  // may be empty
+  Checkpoint* checkpoint = nullptr;               // may be null
 };
 
 /// Own seconds of the stages (wall clock, the slowest rank).
@@ -153,7 +155,8 @@ struct Modes {
 /// same afterwards. Equations: docs/equations.md, eigenproblem.
 /// Throws, on all ranks alike: InputError when the options or the layout are unusable; SolveError when a factorisation breaks down or fewer
 /// modes converge than the band holds by the inertia of K - sigma M, or a residual stays above tolerance and rounding; SystemError when
-/// memory runs out.
+/// memory runs out; Stopped when the checkpoint asked to stop. Dense solves are not saved, other methods than block Lanczos only between
+/// their runs.
 Modes solve_modes(const Problem& problem, const Options& options);
 
 }  // namespace carillon::eigen

@@ -17,6 +17,7 @@
 #include <type_traits>
 
 #include "precompute/eigen/memory.hpp"
+#include "precompute/io/checkpoint_file.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/slabs/read_parallel.hpp"
 
@@ -365,6 +366,10 @@ AccurateBody Search::solve() {
     }
     petsc::run_agreed(run_.comm, [&] {
       if (run_.rank == 0) decision = decide();
+      // CPU seconds have a say in it, and differ from run to run; a run that is gone on with takes the mesh that the other took.
+      if (const Setting* kept = run_.checkpoint ? run_.checkpoint->find_setting(report_.trials.size()) : nullptr;
+          kept != nullptr && decision.is_done == 0)
+        decision.setting = *kept;
     });
     MPI_Bcast(&decision, sizeof decision, MPI_BYTE, 0, run_.comm);
   }

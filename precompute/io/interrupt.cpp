@@ -17,12 +17,24 @@ namespace {
 std::array<char, 4096> cleanup_file{}, cleanup_folder{};
 volatile sig_atomic_t has_cleanup = 0;
 volatile sig_atomic_t own_rank = 0;
+volatile sig_atomic_t saves = 0;
+volatile sig_atomic_t has_news = 0;
+volatile sig_atomic_t stop_signal = 0;
 std::atomic<pid_t> child_process{0};
 static_assert(std::atomic<pid_t>::is_always_lock_free, "A handler may only touch lock-free atomics.");
 
 void say(const char* text) { (void)!write(STDERR_FILENO, text, std::strlen(text)); }
 
+const char* find_name(int signal) {
+  return signal == SIGTERM ? "SIGTERM" : signal == SIGINT ? "SIGINT" : signal == SIGHUP ? "SIGHUP" : "SIGUSR1";
+}
+
 void handle(int signal) {
+  const bool is_to_save = saves != 0 && (signal == SIGTERM || signal == SIGUSR1);
+  if (is_to_save && has_news != 0) {
+    stop_signal = signal;
+    return;
+  }
   if (has_cleanup != 0) {
     const pid_t child = child_process.load();
     if (child > 0) kill(child, SIGKILL);
@@ -31,10 +43,10 @@ void handle(int signal) {
   }
   if (own_rank == 0) {
     say("carillon-precompute: stopped by ");
-    say(signal == SIGTERM ? "SIGTERM" : signal == SIGINT ? "SIGINT" : "SIGHUP");
-    say("; the bank was not touched, or it is whole\n");
+    say(find_name(signal));
+    say(is_to_save ? "; what the checkpoint holds can be gone on from\n" : "; the bank was not touched, or it is whole\n");
   }
-  _exit(128 + signal);
+  _exit(is_to_save ? kExitCheckpointed : 128 + signal);
 }
 
 }  // namespace
@@ -44,12 +56,28 @@ void end_on_signals(int rank) {
   struct sigaction action {};
   action.sa_handler = handle;
   sigfillset(&action.sa_mask);
+  action.sa_flags = SA_RESTART;
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
     struct sigaction before {};
     // nohup and shells without job control have a process ignore some of them: that stays.
     if (sigaction(signal, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
   }
 }
+
+void save_on_signals() {
+  saves = 1;
+  struct sigaction action {};
+  action.sa_handler = handle;
+  sigfillset(&action.sa_mask);
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGUSR1, &action, nullptr);
+}
+
+void set_news(bool is_new) { has_news = is_new ? 1 : 0; }
+
+bool is_stop_asked() { return stop_signal != 0; }
+
+std::string find_stop_name() { return stop_signal == 0 ? "a signal" : find_name(stop_signal); }
 
 Cleanup::Cleanup(const std::string& file) {
   const std::string folder = file.substr(0, file.rfind('/'));

@@ -14,6 +14,8 @@
 
 namespace carillon::io {
 
+class CheckpointFile;
+
 struct Run {
   Run(MPI_Comm communicator, const RunOptions& wishes) : comm(communicator), options(wishes), stations(communicator, wishes.quiet) {
     MPI_Comm_rank(comm, &rank);
@@ -26,7 +28,8 @@ struct Run {
   spec::JobSpec job;  // the same on every rank
   RunOptions options;
   Stations stations;
-  std::unique_ptr<ProgressFile> progress;  // on rank 0, if it is asked for
+  std::unique_ptr<ProgressFile> progress;      // on rank 0, if it is asked for
+  std::shared_ptr<CheckpointFile> checkpoint;  // if it is asked for
 };
 
 /// Runs a collective step whose errors cannot know what it works on, and names it in them. All ranks throw alike.

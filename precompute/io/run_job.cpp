@@ -13,7 +13,10 @@
 #include "precompute/io/accuracy.hpp"
 #include "precompute/io/bank_content.hpp"
 #include "precompute/io/body.hpp"
+#include "precompute/io/checkpoint_file.hpp"
 #include "precompute/io/describe_run.hpp"
+#include "precompute/io/fingerprint.hpp"
+#include "precompute/io/interrupt.hpp"
 #include "precompute/io/run.hpp"
 #include "precompute/io/solve_body.hpp"
 #include "precompute/io/surface_modes.hpp"
@@ -132,13 +135,34 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   return summary;
 }
 
-}  // namespace
+/// The files of the job itself must outlive the checkpoint.
+void check_checkpoint(const Run& run) {
+  const fs::path& file = run.options.checkpoint;
+  config::check_writable(file, "checkpoint");
+  std::vector<fs::path> others{run.job.file, run.job.bank, spec::find_resolved_path(run.job.bank), run.options.progress};
+  others.push_back(run.job.body ? run.job.body->surface : run.job.mesh);
+  for (const fs::path& other : others) {
+    std::error_code ignored;
+    if (other.empty()) continue;
+    if (fs::absolute(file).lexically_normal() == fs::absolute(other).lexically_normal() || fs::equivalent(file, other, ignored))
+      throw InputError(fmt::format("{}: the checkpoint would overwrite a file of this job; give it a name of its own", file.string()));
+  }
+}
 
-RunSummary run_job(MPI_Comm comm, const fs::path& job_file, const RunOptions& options) {
-  Run run(comm, options);
+void open_checkpoint(Run& run) {
+  if (run.options.checkpoint.empty()) return;
+  petsc::run_agreed(run.comm, [&] {
+    if (run.rank == 0) check_checkpoint(run);
+  });
+  run.checkpoint = std::make_shared<CheckpointFile>(run.comm, run.options.checkpoint, run.options.checkpoint_every_s,
+                                                    find_job_fingerprint(run.job, run.options.solver_options), run.stations);
+}
+
+RunSummary carry_out(Run& run, const fs::path& job_file) {
   run.job = read_shared_job(run, job_file);
   check_job(run);
   open_progress(run);
+  open_checkpoint(run);
   AccurateBody found;
   if (run.job.accuracy_cents) {
     found = solve_to_accuracy(run);
@@ -147,11 +171,34 @@ RunSummary run_job(MPI_Comm comm, const fs::path& job_file, const RunOptions& op
     found.body = make_body(run, found.setting);
     found.solved = solve_body(run, found.setting, found.body);
   }
-  check_options_used(comm);
+  check_options_used(run.comm);
+  if (run.checkpoint) run.checkpoint->finish();
   bank::Bank bank = collect_bank(run, found);
   RunSummary summary = write_outputs(run, found, std::move(bank));
+  if (run.checkpoint) run.checkpoint->remove();
   if (run.progress) run.progress->finish();
   return summary;
+}
+
+/// What a run says that was asked to stop.
+RunSummary describe_stop(const Run& run) {
+  RunSummary summary;
+  summary.is_stopped = true;
+  summary.result = fmt::format("stopped by {}; {}", find_stop_name(),
+                               run.checkpoint->was_saved() ? "the same command goes on from " + run.options.checkpoint.string()
+                                                           : "what the checkpoint held before, if anything, can be gone on from");
+  return summary;
+}
+
+}  // namespace
+
+RunSummary run_job(MPI_Comm comm, const fs::path& job_file, const RunOptions& options) {
+  Run run(comm, options);
+  try {
+    return carry_out(run, job_file);
+  } catch (const eigen::Stopped&) {
+    return describe_stop(run);
+  }
 }
 
 }  // namespace carillon::io

@@ -14,7 +14,8 @@ namespace carillon::io {
 struct RunSummary {
   std::filesystem::path bank;
   std::filesystem::path resolved;
-  std::string result;  // "227 modes in 20 .. 20000 Hz ...": how many, why no more, how wrong
+  std::string result;       // "227 modes in 20 .. 20000 Hz ...": how many, why no more, how wrong
+  bool is_stopped = false;  // a signal ended the run, and there is a checkpoint; result says so
 };
 
 /// Reads the job on rank 0 and carries it out on all ranks: mesh, partition, assembly, modes, error bars, bank. Writes the bank and, beside

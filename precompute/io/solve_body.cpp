@@ -9,9 +9,12 @@
 #include <optional>
 #include <utility>
 
+#include "precompute/eigen/search_keeper.hpp"
 #include "precompute/eigen/solver_options.hpp"
 #include "precompute/fem/element.hpp"
 #include "precompute/fem/energy.hpp"
+#include "precompute/io/checkpoint_file.hpp"
+#include "precompute/io/fingerprint.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -109,6 +112,7 @@ eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, 
   options.tolerance = setting.tolerance;
   options.factorisation = find_factorisation(run.job.factorisation);
   options.method = find_method(run.job.method);
+  if (run.checkpoint) options.checkpoint = &run.checkpoint->get();
   ProgressLines lines(run);
   options.progress = [&lines](const eigen::Progress& progress) { lines(progress); };
   run.stations.begin("modes", fmt::format("{:g} Hz to {:g} Hz", options.low_hz, options.high_hz));
@@ -156,6 +160,20 @@ estimate::ErrorBars calc_bars(Run& run, const Body& body, const fem::System& sys
                                    run.job.mass, solution);
 }
 
+void begin_checkpoint(Run& run, const Setting& setting, const Body& body) {
+  if (!run.checkpoint) return;
+  const Fingerprint job = find_job_fingerprint(run.job, run.options.solver_options);
+  run.checkpoint->begin(setting, find_system_fingerprint(run.comm, job, setting, body.pieces.local), body.pieces.local);
+}
+
+/// All modes are there: a safe point. Throws eigen::Stopped.
+void keep(Run& run, const eigen::Modes& modes) {
+  if (!run.checkpoint) return;
+  const eigen::Wish wish = run.checkpoint->vote();
+  if (wish.stop || wish.save) eigen::save_modes(modes, run.checkpoint->get());
+  if (wish.stop) throw eigen::Stopped();
+}
+
 void warn_of_oddities(Run& run, const eigen::Modes& modes) {
   if (modes.mechanism_count > 0)
     run.stations.warn(fmt::format(
@@ -200,7 +218,9 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   for (const spec::Material& material : solved.materials.list) warn_of_locking(run, material, is_linear);
   run.stations.end();
 
+  begin_checkpoint(run, setting, body);
   solved.modes = solve_named(run, setting, body, system, make_layout(body.pieces));
+  keep(run, solved.modes);
   warn_of_oddities(run, solved.modes);
 
   run.stations.begin("errors", "error bars and decays");
@@ -208,6 +228,8 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
       fem::calc_decay(run.comm, body.pieces.local, solved.materials, run.job.mass, solved.modes.lambda, solved.modes.shapes).decay_per_s;
   solved.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, solved); });
   run.stations.end();
+  keep(run, solved.modes);
+  if (run.checkpoint) run.checkpoint->end();
   return solved;
 }
 

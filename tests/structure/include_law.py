@@ -62,7 +62,7 @@ LAW = {
     "precompute/ldlt": (["runtime/config", "partition", "precompute/petsc"], ["fmt", "mpi", "petsc"]),
     "precompute/eigen": (["runtime/config", "precompute/petsc", "precompute/ldlt"], ["fmt", "mpi", "petsc", "mumps", "eigen"]),
     "precompute/io": (["runtime/config", "runtime/bank", "jobs/spec", "partition", "precompute/mesh", "precompute/shapes", "precompute/petsc", "precompute/fem", "precompute/slabs", "precompute/estimate", "precompute/eigen"],
-                      ["fmt", "json", "mpi", "petsc", "hdf5"]),
+                      ["fmt", "json", "mpi", "petsc", "hdf5", "openssl"]),
     "precompute": (["runtime/config", "precompute/petsc", "precompute/io"], ["fmt", "cli", "mpi"]),
 }
 # Finer than folders: the only files that may include these.

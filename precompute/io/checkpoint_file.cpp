@@ -1,0 +1,466 @@
+// Method:     Bytes 0..255 header, then the settings that were tried, the numbers of the solve, zeros up to a multiple of 4,096, and the
+//             columns by groups of 16: of each group node after node, of each node x, y, z, of each the group's columns. SHA-256 guards all
+//             but the columns, whose records are mixed one by one and summed, so that each rank does it for its own. A new file is
+//             written beside the old one, brought to the disk, and renamed.
+// Source:     MPI 3.1, chapter 13 (files); POSIX.1-2008 (rename, fsync).
+// Deviations: no HDF5: its reader trusts what it reads, and a file of it that was cut or flipped can end the process.
+#include "precompute/io/checkpoint_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <tuple>
+#include <utility>
+
+#include "precompute/io/interrupt.hpp"
+#include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
+#include "runtime/config/error.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::io {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr char kMagic[24] = "carillon checkpoint 1\n";
+constexpr std::uint64_t kByteOrder = 0x0102030405060708;
+constexpr int kGroup = 16;                     // columns
+constexpr std::int64_t kAlign = 4096;          // of the first column
+constexpr std::int64_t kMostText = 1LL << 32;  // bytes of settings and numbers
+constexpr std::int64_t kMostRows = 1LL << 31, kMostColumns = 1LL << 24;
+constexpr std::size_t kMostSettings = 100;
+constexpr int kPiece = 1 << 22;     // doubles to or from the disk at once
+constexpr double kLeastPause = 20;  // times what the last save took, until the next
+
+struct RawHeader {
+  char magic[24];
+  std::uint64_t byte_order;
+  Fingerprint job;
+  Fingerprint system;
+  char version[64];
+  std::int64_t rows;
+  std::int64_t columns;
+  std::int64_t settings_bytes;
+  std::int64_t numbers_bytes;
+  std::int64_t total_bytes;
+  std::uint64_t sum;
+  char reserved[16];
+  Fingerprint sha256;  // of the header with zeros here, the settings and the numbers
+};
+static_assert(sizeof(RawHeader) == 256, "The layout is fixed.");
+
+std::int64_t find_data_start(std::int64_t settings_bytes, std::int64_t numbers_bytes) {
+  const std::int64_t end = static_cast<std::int64_t>(sizeof(RawHeader)) + settings_bytes + numbers_bytes;
+  return (end + kAlign - 1) / kAlign * kAlign;
+}
+
+Fingerprint seal(RawHeader header, const std::string& text) {
+  header.sha256 = {};
+  return calc_sha256(std::string(reinterpret_cast<const char*>(&header), sizeof header) + text);
+}
+
+std::uint64_t sum_records(const std::vector<double>& records, std::int64_t first, int group, int width) {
+  std::uint64_t sum = 0;
+  const std::size_t size = static_cast<std::size_t>(3 * width);
+  for (std::size_t i = 0; i * size < records.size(); ++i) {
+    Mixer mixer(static_cast<std::uint64_t>(first) + i);
+    mixer.add(static_cast<std::uint64_t>(group));
+    for (std::size_t k = 0; k < size; ++k) mixer.add(records[i * size + k]);
+    sum += mixer.get();
+  }
+  return sum;
+}
+
+std::string describe_error(int code) {
+  char text[MPI_MAX_ERROR_STRING] = "";
+  int size = 0;
+  MPI_Error_string(code, text, &size);
+  return text;
+}
+
+/// Opens, does, closes. Throws SystemError with errno's words.
+void with_descriptor(const fs::path& file, int flags, const std::function<bool(int)>& work) {
+  const int descriptor = ::open(file.c_str(), flags | O_CLOEXEC, 0666);
+  const bool ok = descriptor >= 0 && work(descriptor);
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!ok) throw SystemError(std::strerror(error));
+}
+
+void share_text(MPI_Comm comm, std::string& text) {
+  auto size = static_cast<std::int64_t>(text.size());
+  MPI_Bcast(&size, 1, MPI_INT64_T, 0, comm);
+  petsc::run_agreed(comm, [&] { text.resize(static_cast<std::size_t>(size)); });
+  for (std::int64_t at = 0; at < size; at += 1 << 30)
+    MPI_Bcast(text.data() + at, static_cast<int>(std::min<std::int64_t>(size - at, 1 << 30)), MPI_CHAR, 0, comm);
+}
+
+int find_width(std::int64_t columns, std::int64_t group) {
+  return static_cast<int>(std::min<std::int64_t>(kGroup, columns - group * kGroup));
+}
+
+}  // namespace
+
+/// A file of all ranks; closed with it, which is collective.
+class SharedFile {
+ public:
+  SharedFile(MPI_Comm comm, const fs::path& file, int mode) : comm_(comm) {
+    const int code = MPI_File_open(comm, file.c_str(), mode, MPI_INFO_NULL, &file_);
+    if (code != MPI_SUCCESS) file_ = MPI_FILE_NULL;
+    petsc::run_agreed(comm, [&] {
+      if (code != MPI_SUCCESS) throw SystemError(describe_error(code));
+    });
+  }
+  ~SharedFile() {
+    if (file_ != MPI_FILE_NULL) MPI_File_close(&file_);
+  }
+  SharedFile(const SharedFile&) = delete;
+  SharedFile& operator=(const SharedFile&) = delete;
+
+  /// Local. Throws SystemError.
+  void write(std::int64_t at, const double* values, std::size_t count) { move(at, count, true, const_cast<double*>(values)); }
+  void read(std::int64_t at, double* values, std::size_t count) { move(at, count, false, values); }
+  /// What was written is on the disk. Collective.
+  void sync() {
+    const int code = MPI_File_sync(file_);
+    petsc::run_agreed(comm_, [&] {
+      if (code != MPI_SUCCESS) throw SystemError(describe_error(code));
+    });
+  }
+
+ private:
+  void move(std::int64_t at, std::size_t count, bool writes, double* values) {
+    while (count > 0) {
+      const int piece = static_cast<int>(std::min<std::size_t>(count, kPiece));
+      MPI_Status status;
+      const int code = writes ? MPI_File_write_at(file_, at, values, piece, MPI_DOUBLE, &status)
+                              : MPI_File_read_at(file_, at, values, piece, MPI_DOUBLE, &status);
+      if (code != MPI_SUCCESS) throw SystemError(describe_error(code));
+      int done = 0;
+      MPI_Get_count(&status, MPI_DOUBLE, &done);
+      if (done != piece) throw SystemError(writes ? "the disk is full, or refuses" : "the file ends early");
+      at += piece * static_cast<std::int64_t>(sizeof(double));
+      values += piece;
+      count -= static_cast<std::size_t>(piece);
+    }
+  }
+
+  MPI_Comm comm_;
+  MPI_File file_ = MPI_FILE_NULL;
+};
+
+CheckpointFile::CheckpointFile(MPI_Comm comm, fs::path file, double every_s, const Fingerprint& job, Stations& stations)
+    : comm_(comm), file_(std::move(file)), every_s_(every_s), job_(job), stations_(stations), last_save_(Clock::now()) {
+  MPI_Comm_rank(comm, &rank_);
+  temporary_ = file_.parent_path() / ("." + file_.filename().string().substr(0, 200) + ".new");
+  checkpoint_.ask = [this] {
+    const double pause = std::max(every_s_, kLeastPause * save_seconds_);
+    const bool is_due = rank_ == 0 && !is_ahead() && std::chrono::duration<double>(Clock::now() - last_save_).count() >= pause;
+    return eigen::Wish{is_stop_asked(), is_due};
+  };
+  checkpoint_.save = [this](const std::string& numbers, const std::vector<eigen::Columns>& columns) { return save(numbers, columns); };
+  checkpoint_.tell_news = [this](bool has_news) { set_news(has_news && !is_ahead()); };
+  checkpoint_.read = [this](std::int64_t first, const eigen::Columns& into) { read_columns(first, into); };
+  checkpoint_.reject = [this](const std::string& why) { set_aside(why); };
+  look();
+}
+
+CheckpointFile::~CheckpointFile() = default;
+
+/// Rank 0 only: what is wrong with the file, or nothing; an empty content where there is no file.
+std::string CheckpointFile::read_content(Content& content) const {
+  const int descriptor = ::open(file_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return errno == ENOENT ? "" : std::string("it cannot be opened: ") + std::strerror(errno);
+  struct Closer {
+    int descriptor;
+    ~Closer() { ::close(descriptor); }
+  } closer{descriptor};
+  struct stat info {};
+  if (::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode)) return "it is no regular file";
+  RawHeader header{};
+  const auto read_all = [&](void* to, std::size_t size, std::int64_t at) {
+    for (std::size_t done = 0; done < size;) {
+      const ssize_t got = ::pread(descriptor, static_cast<char*>(to) + done, size - done, at + static_cast<std::int64_t>(done));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) return false;
+      done += static_cast<std::size_t>(got);
+    }
+    return true;
+  };
+  if (!read_all(&header, sizeof header, 0)) return "it is too short";
+  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.byte_order != kByteOrder) return "it is no checkpoint of this format";
+  const auto within = [](std::int64_t value, std::int64_t most) { return value >= 0 && value <= most; };
+  if (!within(header.rows, kMostRows) || !within(header.columns, kMostColumns) || !within(header.settings_bytes, kMostText) ||
+      !within(header.numbers_bytes, kMostText))
+    return "it is damaged";
+  const std::int64_t data_at = find_data_start(header.settings_bytes, header.numbers_bytes);
+  const auto total = static_cast<std::int64_t>(data_at + 24.0 * static_cast<double>(header.rows) * static_cast<double>(header.columns));
+  if (header.total_bytes != total || info.st_size != total) return "it is cut short or damaged";
+  std::string text(static_cast<std::size_t>(header.settings_bytes + header.numbers_bytes), '\0');
+  if (!read_all(text.data(), text.size(), sizeof header) || seal(header, text) != header.sha256) return "it is damaged";
+  const std::string version(header.version, strnlen(header.version, sizeof header.version));
+  if (version != cut_version()) return fmt::format("it was saved by another version, {}", version);
+  if (header.job != job_) return "it is of another job";
+  content.rows = header.rows;
+  content.columns = header.columns;
+  content.sum = header.sum;
+  content.data_at = data_at;
+  content.system = header.system;
+  content.numbers = text.substr(static_cast<std::size_t>(header.settings_bytes));
+  content.settings = text.substr(0, static_cast<std::size_t>(header.settings_bytes));
+  return "";
+}
+
+void CheckpointFile::look() {
+  Content content;
+  std::string trouble;
+  petsc::run_agreed(comm_, [&] {
+    if (rank_ == 0) trouble = read_content(content);
+  });
+  share_text(comm_, trouble);
+  if (!trouble.empty()) return set_aside(trouble);
+  std::array<std::int64_t, 3> sizes{content.rows, content.columns, content.data_at};
+  MPI_Bcast(sizes.data(), 3, MPI_INT64_T, 0, comm_);
+  MPI_Bcast(&content.sum, 1, MPI_UINT64_T, 0, comm_);
+  MPI_Bcast(content.system.data(), static_cast<int>(content.system.size()), MPI_BYTE, 0, comm_);
+  share_text(comm_, content.numbers);
+  share_text(comm_, content.settings);
+  if (sizes[2] == 0) return;  // there is none
+  std::tie(content.rows, content.columns, content.data_at) = std::tie(sizes[0], sizes[1], sizes[2]);
+  content_ = std::move(content);
+  try {
+    eigen::NumberReader from(content_.settings);
+    const std::int64_t count = from.get_count(1, kMostSettings);
+    for (std::int64_t i = 0; i < count; ++i) kept_settings_.push_back(read_setting(from));
+    from.end();
+  } catch (const InputError& error) {
+    kept_settings_.clear();
+    return set_aside(error.what());
+  }
+  is_there_ = true;
+}
+
+const Setting* CheckpointFile::find_setting(std::size_t trials) const {
+  return is_there_ && trials < kept_settings_.size() ? &kept_settings_[trials] : nullptr;
+}
+
+void CheckpointFile::begin(const Setting& setting, const Fingerprint& system, const fem::LocalMesh& local) {
+  settings_.push_back(setting);
+  system_ = system;
+  order_ = std::make_unique<NodeOrder>(comm_, local);
+  if (!is_there_ || is_ahead()) return;
+  if (settings_.size() != kept_settings_.size() || system != content_.system) return set_aside("it is of another mesh");
+  const std::string trouble = verify();
+  if (!trouble.empty()) return set_aside(trouble);
+  checkpoint_.numbers = content_.numbers;
+  checkpoint_.column_count = content_.columns;
+  stations_.say(fmt::format("goes on from {}", file_.string()));
+}
+
+/// Whether the columns are what they were.
+std::string CheckpointFile::verify() {
+  if (content_.rows != order_->all()) return "it is of another mesh";
+  std::uint64_t sum = 0;
+  try {
+    SharedFile file(comm_, file_, MPI_MODE_RDONLY);
+    NodeOrder::Room room;
+    petsc::run_agreed(comm_, [&] {
+      order_->make_room(kGroup, room);
+      for (std::int64_t group = 0; group * kGroup < content_.columns; ++group) {
+        const int width = find_width(content_.columns, group);
+        room.records.resize(static_cast<std::size_t>(order_->count() * 3 * width));
+        file.read(find_place(content_.data_at, group, width), room.records.data(), room.records.size());
+        sum += sum_records(room.records, order_->first(), static_cast<int>(group), width);
+      }
+    });
+  } catch (const SystemError& error) {
+    return std::string("it cannot be read: ") + error.what();
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, comm_);
+  return sum == content_.sum ? "" : "it is damaged";
+}
+
+std::int64_t CheckpointFile::find_place(std::int64_t data_at, std::int64_t group, int width) const {
+  return data_at + 24 * (group * kGroup * order_->all() + order_->first() * width);
+}
+
+void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into) const {
+  SharedFile file(comm_, file_, MPI_MODE_RDONLY);
+  NodeOrder::Room room;
+  std::vector<double> rows;  // of a group
+  petsc::run_agreed(comm_, [&] {
+    order_->make_room(kGroup, room);
+    rows.resize(static_cast<std::size_t>(into.rows) * kGroup);
+  });
+  const std::int64_t last = first + into.count;
+  for (std::int64_t group = first / kGroup; group * kGroup < last; ++group) {
+    const eigen::Columns part{rows.data(), into.rows, into.rows, find_width(content_.columns, group)};
+    petsc::run_agreed(comm_, [&] {
+      room.records.resize(static_cast<std::size_t>(order_->count() * 3 * part.count));
+      file.read(find_place(content_.data_at, group, part.count), room.records.data(), room.records.size());
+    });
+    order_->from_records(room, part);
+    for (int j = 0; j < part.count; ++j) {
+      const std::int64_t column = group * kGroup + j;
+      if (column >= first && column < last) std::copy_n(part.column(j), into.rows, into.column(static_cast<int>(column - first)));
+    }
+  }
+}
+
+/// Says why the file is not gone on from, and gives it another name: it may be worth something to somebody.
+void CheckpointFile::set_aside(const std::string& why) {
+  is_there_ = false;
+  checkpoint_.numbers.clear();
+  checkpoint_.column_count = 0;
+  if (rank_ == 0) {
+    const fs::path aside = file_.string() + ".aside";
+    const bool is_moved = ::rename(file_.c_str(), aside.c_str()) == 0;
+    stations_.warn(fmt::format("{}: the checkpoint is not gone on from, because {}{}", file_.string(), why,
+                               is_moved ? "; it is now " + aside.filename().string() : ""));
+  }
+  MPI_Barrier(comm_);
+}
+
+bool CheckpointFile::save(const std::string& numbers, const std::vector<eigen::Columns>& columns) {
+  if (is_ahead()) return true;  // What is kept is of a later setting, and worth more.
+  const petsc::WorkScope scope(petsc::WorkPhase::kWrite);
+  const auto start = Clock::now();
+  std::string trouble;
+  try {
+    write(numbers, columns);
+  } catch (const SystemError& error) {
+    trouble = error.what();
+  }
+  last_save_ = Clock::now();
+  save_seconds_ = std::chrono::duration<double>(last_save_ - start).count();
+  if (trouble.empty()) {
+    is_there_ = false;  // What it was is in the past.
+    was_saved_ = true;
+    last_trouble_.clear();
+    return true;
+  }
+  if (rank_ == 0) ::unlink(temporary_.c_str());
+  if (trouble != last_trouble_)
+    stations_.warn(
+        fmt::format("{}: the checkpoint cannot be saved: {}; the solve goes on, and the one before stays", file_.string(), trouble));
+  last_trouble_ = trouble;
+  return false;
+}
+
+/// Throws SystemError on every rank.
+void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::Columns>& columns) {
+  std::int64_t count = 0;
+  for (const eigen::Columns& part : columns) count += part.count;
+  RawHeader header{};
+  std::string text;
+  petsc::run_agreed(comm_, [&] {
+    if (rank_ != 0) return;
+    ::unlink(temporary_.c_str());  // of a run that was killed; O_EXCL then follows no planted link
+    with_descriptor(temporary_, O_WRONLY | O_CREAT | O_EXCL, [](int) { return true; });
+  });
+  eigen::NumberWriter settings;
+  settings.add(static_cast<std::int64_t>(settings_.size()));
+  for (const Setting& setting : settings_) write_setting(settings, setting);
+  text = settings.bytes + numbers;
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  header.byte_order = kByteOrder;
+  header.job = job_;
+  header.system = system_;
+  const std::string version = cut_version();
+  std::copy(version.begin(), version.end(), header.version);
+  header.rows = order_->all();
+  header.columns = count;
+  header.settings_bytes = static_cast<std::int64_t>(settings.bytes.size());
+  header.numbers_bytes = static_cast<std::int64_t>(numbers.size());
+  const std::int64_t data_at = find_data_start(header.settings_bytes, header.numbers_bytes);
+  header.total_bytes = data_at + 24 * header.rows * count;
+  {
+    SharedFile file(comm_, temporary_, MPI_MODE_WRONLY);
+    header.sum = write_columns(file, data_at, count, columns);
+    file.sync();
+  }
+  petsc::run_agreed(comm_, [&] {
+    if (rank_ != 0) return;
+    header.sha256 = seal(header, text);
+    std::string start(reinterpret_cast<const char*>(&header), sizeof header);
+    start += text;
+    start.resize(static_cast<std::size_t>(data_at), '\0');
+    with_descriptor(temporary_, O_WRONLY, [&](int descriptor) {
+      for (std::size_t done = 0; done < start.size();) {
+        const ssize_t put = ::pwrite(descriptor, start.data() + done, start.size() - done, static_cast<off_t>(done));
+        if (put < 0 && errno == EINTR) continue;
+        if (put <= 0) return false;
+        done += static_cast<std::size_t>(put);
+      }
+      return ::fsync(descriptor) == 0;
+    });
+    if (::rename(temporary_.c_str(), file_.c_str()) != 0) throw SystemError(std::strerror(errno));
+    const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
+    try {
+      with_descriptor(folder, O_RDONLY | O_DIRECTORY, [](int descriptor) { return ::fsync(descriptor) == 0; });
+    } catch (const SystemError&) {  // Some file systems cannot; the name is there.
+    }
+  });
+}
+
+/// Every rank its stretch of every group. Returns the sum of all records. Throws SystemError on every rank.
+std::uint64_t CheckpointFile::write_columns(SharedFile& file, std::int64_t data_at, std::int64_t count,
+                                            const std::vector<eigen::Columns>& columns) const {
+  std::vector<const double*> all;  // where each column begins
+  for (const eigen::Columns& part : columns)
+    for (int j = 0; j < part.count; ++j) all.push_back(part.column(j));
+  NodeOrder::Room room;
+  petsc::run_agreed(comm_, [&] { order_->make_room(kGroup, room); });
+  std::exception_ptr trouble;
+  std::uint64_t sum = 0;
+  for (std::int64_t group = 0; group * kGroup < count; ++group) {
+    const int width = find_width(count, group);
+    order_->to_records({all.data() + group * kGroup, static_cast<std::size_t>(width)}, room);
+    sum += sum_records(room.records, order_->first(), static_cast<int>(group), width);
+    if (trouble) continue;  // The others wait for what this rank sends.
+    try {
+      file.write(find_place(data_at, group, width), room.records.data(), room.records.size());
+    } catch (...) {
+      trouble = std::current_exception();
+    }
+  }
+  petsc::agree(comm_, trouble);
+  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, comm_);
+  return sum;
+}
+
+void CheckpointFile::end() {
+  checkpoint_.numbers.clear();
+  checkpoint_.column_count = 0;
+  order_.reset();
+  set_news(false);
+}
+
+eigen::Wish CheckpointFile::vote() const {
+  const eigen::Wish mine = checkpoint_.ask();
+  std::array<int, 2> any{mine.stop ? 1 : 0, mine.save ? 1 : 0};
+  MPI_Allreduce(MPI_IN_PLACE, any.data(), 2, MPI_INT, MPI_MAX, comm_);
+  return {any[0] != 0, any[1] != 0};
+}
+
+void CheckpointFile::finish() { set_news(true); }
+
+void CheckpointFile::remove() {
+  is_there_ = false;
+  if (rank_ != 0) return;
+  ::unlink(temporary_.c_str());
+  ::unlink(file_.c_str());
+}
+
+std::string CheckpointFile::cut_version() const { return find_program_version().substr(0, sizeof RawHeader{}.version); }
+
+}  // namespace carillon::io
