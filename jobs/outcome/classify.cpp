@@ -4,6 +4,7 @@
 // Deviations: none.
 #include <fmt/core.h>
 
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <csignal>
@@ -44,9 +45,9 @@ double find_need_gb(std::string_view line) {
     if (rest.starts_with("about ")) rest.remove_prefix(6);
     double value = 0.0;
     const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
-    if (error == std::errc() && std::isfinite(value) && value >= 0.0 &&
-        rest.substr(static_cast<std::size_t>(end - rest.data())).starts_with(" GB"))
-      return value;
+    if (error != std::errc() || !std::isfinite(value) || value < 0.0) continue;
+    const std::string_view unit = rest.substr(static_cast<std::size_t>(end - rest.data()));
+    if (unit.starts_with(" GB") && (unit.size() == 3 || std::isalnum(static_cast<unsigned char>(unit[3])) == 0)) return value;
   }
   return 0.0;
 }

@@ -50,14 +50,18 @@ std::optional<Cause> find_cause(std::string_view word) {
 }
 
 void write_outcome(const std::filesystem::path& work, const Outcome& o) {
-  config::write_file(
-      work / "outcome.json",
-      fmt::format("{{\n  \"token\": {},\n  \"cause\": \"{}\",\n  \"reason\": {},\n  \"exit_code\": {},\n  \"ranks\": {},\n"
-                  "  \"seconds\": {:.3f},\n  \"peak_memory_gb\": {:.6f},\n  \"memory_need_gb\": {:.6f},\n  \"percent\": {:.3f},\n"
-                  "  \"is_further\": {},\n  \"host\": {},\n  \"started\": {},\n  \"ended\": {}\n}}\n",
-                  config::quote(o.token), to_text(o.cause), config::quote(o.reason), o.exit_code, o.ranks, finite(o.seconds),
-                  finite(o.peak_memory_gb), finite(o.memory_need_gb), finite(o.percent), o.is_further, config::quote(o.host),
-                  config::quote(o.started), config::quote(o.ended)));
+  std::string text = fmt::format("{{\n  \"cause\": \"{}\",\n  \"exit_code\": {},\n  \"ranks\": {}", to_text(o.cause), o.exit_code, o.ranks);
+  text += fmt::format(",\n  \"seconds\": {:.3f},\n  \"peak_memory_gb\": {:.6f},\n  \"memory_need_gb\": {:.6f}", finite(o.seconds),
+                      finite(o.peak_memory_gb), finite(o.memory_need_gb));
+  text += fmt::format(",\n  \"percent\": {:.3f},\n  \"is_further\": {}", finite(o.percent), o.is_further);
+  for (const auto& [key, value] : {std::pair<const char*, const std::string&>{"token", o.token},
+                                   {"reason", o.reason},
+                                   {"host", o.host},
+                                   {"started", o.started},
+                                   {"ended", o.ended}}) {
+    if (!value.empty()) text += fmt::format(",\n  \"{}\": {}", key, config::quote(value));
+  }
+  config::write_file(work / "outcome.json", text + "\n}\n");
 }
 
 std::optional<Outcome> read_outcome(const std::filesystem::path& work) {
@@ -66,9 +70,9 @@ std::optional<Outcome> read_outcome(const std::filesystem::path& work) {
     const std::optional<Cause> cause = find_cause(root.string("cause"));
     if (!cause) return std::nullopt;
     Outcome o;
-    o.token = root.string("token");
+    o.token = root.string_or("token", "");
     o.cause = *cause;
-    o.reason = root.string("reason");
+    o.reason = root.string_or("reason", "");
     o.exit_code = static_cast<int>(root.integer("exit_code", -1, 1000));
     o.ranks = static_cast<int>(root.integer("ranks", 0, 1 << 24));
     o.seconds = root.number("seconds");
@@ -76,9 +80,9 @@ std::optional<Outcome> read_outcome(const std::filesystem::path& work) {
     o.memory_need_gb = root.number("memory_need_gb");
     o.percent = root.number("percent");
     o.is_further = root.boolean_or("is_further", false);
-    o.host = root.string("host");
-    o.started = root.string("started");
-    o.ended = root.string("ended");
+    o.host = root.string_or("host", "");
+    o.started = root.string_or("started", "");
+    o.ended = root.string_or("ended", "");
     return o;
   } catch (const InputError&) {
     return std::nullopt;

@@ -22,8 +22,7 @@ inline constexpr double kMemoryShare = 0.95;  // of the machine's memory; the re
 /// What a job takes.
 struct Need {
   int ranks = 0;                          // asked for; 0: to be chosen
-  double memory_gb = 0.0;                 // asked for; 0: as predicted
-  double least_gb = 0.0;                  // no less than this, after an attempt that ran out of memory
+  double memory_gb = 0.0;                 // asked for, or more after an attempt that ran out of it; 0: as predicted
   double seconds = 0.0;                   // on one rank, predicted; 0: not known, and small
   std::vector<double> predicted_gb = {};  // on 1, 2, 4, 8 ... ranks; empty: not known
 };

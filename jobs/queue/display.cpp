@@ -79,8 +79,8 @@ void Display::tell(const std::string& event, const registry::Job& job) {
     return print(fmt::format(
         "{{\"event\": \"{}\", \"boot_s\": {:.3f}, \"id\": \"{}\", \"name\": {}, \"ranks\": {}, \"memory_gb\": {:.3f}, \"attempt\": {}, "
         "\"failures\": {}, \"reason\": {}}}",
-        event, process::find_boot_seconds(), job.id.text(), config::quote(job.name), job.resources.ranks, job.resources.memory_gb,
-        job.attempts, job.failures, config::quote(job.reason)));
+        event, process::find_boot_seconds(), job.id.text(), config::quote(job.name), job.given.ranks, job.given.memory_gb, job.attempts,
+        job.failures, config::quote(job.reason)));
   }
   if (event == "start" || event == "predict") return;  // the bar shows it
   print(fmt::format("{} {}: {}{}{}", job.id.short_text(), clean(job.name), event, job.reason.empty() ? "" : ": ", clean(job.reason)));

@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 constexpr double kBytesPerNode = 250.0, kMidNodes = 7.5, kLargeNodes = 30000.0, kUnknownNodes = 60000.0;
 constexpr double kAccuracyGrowth = 4.0;  // accuracy_cents may refine the mesh
 constexpr double kBaseGb = 0.15, kFillGb = 0.4e-6, kSecondsPerNode = 5e-4;
+constexpr int kMostGuessedRanks = 1024;
 
 /// Nodes as solved, and whether that is no more than a guess in the dark.
 struct Size {
@@ -67,7 +68,8 @@ bool read_prediction(const fs::path& folder, Need& need) {
 
 Need guess_need(double nodes) {
   Need need;
-  need.predicted_gb = {kBaseGb + kFillGb * std::pow(nodes, 4.0 / 3.0)};
+  for (int ranks = 1; ranks <= kMostGuessedRanks; ranks *= 2)
+    need.predicted_gb.push_back(kBaseGb * ranks + kFillGb * std::pow(nodes, 4.0 / 3.0));
   need.seconds = kSecondsPerNode * nodes;
   return need;
 }
@@ -82,13 +84,11 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job) {
   }
   const Size size = request ? find_size(store, *request) : Size{};
   needs.need = guess_need(size.nodes);
-  const store::Resources asked = request ? request->resources : job.resources;
   const bool has_prediction = read_prediction(folder, needs.need);
-  needs.wants_prediction = !has_prediction && asked.memory_gb <= 0.0 && (!size.is_known || size.nodes > kLargeNodes);
-  needs.need.ranks = asked.ranks;
-  needs.need.memory_gb = asked.memory_gb;
-  if (job.attempts > 0) needs.need.least_gb = job.resources.memory_gb;
-  needs.time_limit_s = asked.time_limit_s;
+  needs.wants_prediction = !has_prediction && job.resources.memory_gb <= 0.0 && (!size.is_known || size.nodes > kLargeNodes);
+  needs.need.ranks = job.resources.ranks;
+  needs.need.memory_gb = job.resources.memory_gb;
+  needs.time_limit_s = job.resources.time_limit_s;
   return needs;
 }
 

@@ -183,7 +183,7 @@ class Runner {
 
   /// What a running job was promised and what it holds.
   Admitted find_admitted(const Job& job) const {
-    Admitted admitted{std::max(1, job.resources.ranks), job.resources.memory_gb, 0.0};
+    Admitted admitted{std::max(1, job.given.ranks), job.given.memory_gb, 0.0};
     if (const std::optional<outcome::Attempt> attempt = outcome::read_attempt(store_.work_folder(job.id));
         attempt && attempt->token == job.token) {
       for (const auto& [pid, usage] : attempt::find_below(attempt->process.pid))
@@ -238,8 +238,8 @@ class Runner {
       if (rulings[i].answer == Answer::never) never.emplace_back(job, rulings[i].memory_gb);
       if (rulings[i].answer == Answer::wait) blocked_since_.try_emplace(job.id.text(), now_s);
       if (rulings[i].answer != Answer::start) continue;
-      job.resources.ranks = rulings[i].ranks;
-      job.resources.memory_gb = rulings[i].memory_gb;
+      job.given.ranks = rulings[i].ranks;
+      job.given.memory_gb = rulings[i].memory_gb;
       chosen.push_back(job);
     }
     return chosen;
@@ -272,8 +272,8 @@ class Runner {
     const JobNeeds needs = find_job_needs(job);
     attempt::Options attempt;
     attempt.work = store_.work_folder(job.id);
-    attempt.ranks = job.resources.ranks;
-    attempt.memory_gb = job.resources.memory_gb;
+    attempt.ranks = job.given.ranks;
+    attempt.memory_gb = job.given.memory_gb;
     attempt.time_limit_s = needs.time_limit_s;
     attempt.token = job.token;
     attempt.is_prediction = needs.wants_prediction;

@@ -91,8 +91,7 @@ void apply(Job& job, const outcome::Outcome& outcome) {
   const outcome::Decision decision = outcome::decide(outcome.cause, job.failures, outcome.is_further);
   job.failures = decision.failures;
   if (outcome.cause == outcome::Cause::memory)
-    job.resources.memory_gb = std::max(job.resources.memory_gb, outcome::calc_next_memory(outcome.memory_need_gb, outcome.peak_memory_gb));
-  if (outcome.cause == outcome::Cause::predicted) job.resources.memory_gb = 0.0;  // the prediction takes the place of a guess
+    job.resources.memory_gb = std::max(job.given.memory_gb, outcome::calc_next_memory(outcome.memory_need_gb, outcome.peak_memory_gb));
   if (job.cancel_wanted) return end(job, State::cancelled, "cancelled while it ran; what it had saved is kept for a retry");
   if (decision.next == outcome::Next::failed) {
     const bool has_tried = decision.failures > outcome::kMostRetries;

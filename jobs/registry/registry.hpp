@@ -32,7 +32,8 @@ struct Job {
   State state = State::queued;
   std::string name = {};            // of the job file that asked last, for people
   std::string engine = "local";     // "local" or "slurm"
-  store::Resources resources = {};  // as asked for; claim() may set what was predicted
+  store::Resources resources = {};  // as asked for
+  store::Resources given = {};      // ranks and memory of the last attempt, as the queue chose them
   std::string reason = {};          // one sentence: why it failed, waits, or was cancelled
   std::string token = {};           // of the attempt, 32 hex digits; empty before the first
   process::Identity worker = {};    // of the attempt; of the one who claimed, before that is known
@@ -72,7 +73,7 @@ class Registry {
   std::vector<Submission> list_last_submissions() const;
 
   /// In one write transaction: hands `choose` the jobs that run (all engines) and at most `most` that are ready for `engine` in the order
-  /// of submission; those that it returns (with resources set as they shall be) become running: attempts + 1, new token, `runner` answers
+  /// of submission; those that it returns (with `given` set) become running: attempts + 1, new token, `runner` answers
   /// for them. Returns them. Nothing in `choose` may use the registry.
   using Choose = std::function<std::vector<Job>(const std::vector<Job>& running, const std::vector<Job>& ready)>;
   std::vector<Job> claim(const std::string& engine, const process::Identity& worker, const Choose& choose, std::size_t most = 1000);

@@ -18,6 +18,7 @@ constexpr const char* kJobsTable =
     "NOT NULL, "
     "ready_boot_s REAL NOT NULL, ready_boot_id TEXT NOT NULL, submitted_unix_s REAL NOT NULL, started_unix_s REAL NOT NULL, ended_unix_s "
     "REAL NOT NULL, "
+    "given_ranks INTEGER NOT NULL, given_memory_gb REAL NOT NULL, "
     "sum TEXT NOT NULL) WITHOUT ROWID";
 constexpr const char* kOpenIndex = "CREATE INDEX open_jobs ON jobs(seq) WHERE state IN ('queued', 'waiting', 'running')";
 constexpr const char* kSubmissionsTable =
@@ -29,8 +30,8 @@ constexpr std::array<const char*, 4> kSchema{kJobsTable, kOpenIndex, kSubmission
 constexpr const char* kColumns =
     "id, seq, state, name, engine, ranks, memory_gb, time_limit_s, reason, token, host, boot, pid, start_ticks, slurm_job, cancel_wanted, "
     "attempts, failures, "
-    "ready_boot_s, ready_boot_id, submitted_unix_s, started_unix_s, ended_unix_s, sum";
-constexpr int kSumColumn = 23;
+    "ready_boot_s, ready_boot_id, submitted_unix_s, started_unix_s, ended_unix_s, given_ranks, given_memory_gb, sum";
+constexpr int kSumColumn = 25;
 
 constexpr std::array<State, 6> kStates{State::queued, State::running, State::waiting, State::done, State::failed, State::cancelled};
 
@@ -41,7 +42,7 @@ std::string calc_sum(const Job& job, long long seq) {
                                    job.resources.memory_gb, job.resources.time_limit_s, job.cancel_wanted);
   fields += fmt::format("|{}|{}|{}|{}|{}|{}|{}", job.worker.pid, job.worker.start_ticks, job.attempts, job.failures, job.ready_boot_s,
                         job.submitted_unix_s, job.started_unix_s);
-  fields += fmt::format("|{}", job.ended_unix_s);
+  fields += fmt::format("|{}|{}|{}", job.ended_unix_s, job.given.ranks, job.given.memory_gb);
   for (const std::string* text :
        {&job.name, &job.reason, &job.token, &job.worker.host, &job.worker.boot, &job.slurm_job, &job.ready_boot_id})
     fields += fmt::format("|{}:{}", text->size(), *text);
@@ -77,6 +78,8 @@ Job read_row(const Statement& row) {
   job.submitted_unix_s = row.number(20);
   job.started_unix_s = row.number(21);
   job.ended_unix_s = row.number(22);
+  job.given.ranks = static_cast<int>(row.integer(23));
+  job.given.memory_gb = row.number(24);
   if (row.text(kSumColumn) != calc_sum(job, row.integer(1))) throw Damaged("a row of the registry is not as it was written");
   return job;
 }
@@ -87,7 +90,8 @@ void bind_row(Statement& row, const Job& job, long long seq) {
   row.bind(job.reason).bind(job.token).bind(job.worker.host).bind(job.worker.boot).bind(static_cast<long long>(job.worker.pid));
   row.bind(static_cast<long long>(job.worker.start_ticks)).bind(job.slurm_job).bind(job.cancel_wanted ? 1LL : 0LL);
   row.bind(static_cast<long long>(job.attempts)).bind(static_cast<long long>(job.failures)).bind(job.ready_boot_s).bind(job.ready_boot_id);
-  row.bind(job.submitted_unix_s).bind(job.started_unix_s).bind(job.ended_unix_s).bind(calc_sum(job, seq));
+  row.bind(job.submitted_unix_s).bind(job.started_unix_s).bind(job.ended_unix_s);
+  row.bind(static_cast<long long>(job.given.ranks)).bind(job.given.memory_gb).bind(calc_sum(job, seq));
   row.step();
 }
 
