@@ -1,5 +1,5 @@
-// Method:     what was solved and what came of it: the figures of the head, the mesh, the file of the bank and its checks, the job.
-// Source:     precompute/mesh/check.hpp (what is measured of a mesh), docs/bank-format.md (what a bank holds).
+// Method:     what came of the solve: the figures of the head, the file of the bank and its checks, the job.
+// Source:     docs/bank-format.md (what a bank holds).
 // Deviations: none.
 #include <algorithm>
 #include <cmath>
@@ -11,27 +11,18 @@
 namespace carillon::report {
 namespace {
 
-constexpr Json::ArrayIndex kMostWarnings = 50;
+constexpr std::size_t kMostFaults = 50;
 constexpr std::size_t kMostJobBytes = 200000;
-constexpr double kSliverDeg = 5.0;  // of the mesh check
 
 Html make_tile(std::string_view what, const Html& value, std::string_view remark) {
   return html("<div class=\"tile\"><div class=\"what\">{}</div><div class=\"value\">{}</div><div class=\"remark\">{}</div></div>\n", what,
               value, remark);
 }
 
-/// Texts of a list, each once, at most kMostWarnings.
-std::vector<std::string> find_texts(const Json::Value& list) {
-  std::vector<std::string> texts;
-  for (Json::ArrayIndex i = 0; list.isArray() && i < std::min(list.size(), kMostWarnings); ++i)
-    if (list[i].isString() && std::find(texts.begin(), texts.end(), list[i].asString()) == texts.end()) texts.push_back(list[i].asString());
-  return texts;
-}
-
 Html make_tiles(const Subject& subject) {
   const bank::Bank& bank = subject.bank;
   Html out = make_tile("Modes", html("{}", format_count(static_cast<std::int64_t>(bank.mode_count()))),
-                       fmt::format("{} Hz to {} Hz", format_plain(bank.band_hz[0]), format_plain(bank.band_hz[1])));
+                       fmt::format("{} to {} Hz", format_plain(bank.band_hz[0]), format_plain(bank.band_hz[1])));
   const std::vector<double>& bars = bank.discretisation_error_cents;
   const auto worst = std::max_element(bars.begin(), bars.end());
   out += make_tile("Error bar", worst == bars.end() ? html("-") : html("{}", format_cents(*worst)),
@@ -62,10 +53,9 @@ std::string describe_bars(const bank::Bank& bank) {
 }
 
 Html make_warnings(const Subject& subject) {
-  Html items;
-  for (const std::string& text : find_texts(find(subject.record.run, "warnings"))) items += html("<li>{}</li>\n", escape(text, 1000));
-  for (const std::string& text : subject.record.remarks) items += html("<li>{}</li>\n", text);
-  return items.empty() ? Html() : html("<div class=\"note\"><ul>\n{}</ul></div>\n", items);
+  std::vector<std::string> texts = find_texts(find(subject.record.run, "warnings"));
+  texts.insert(texts.end(), subject.record.remarks.begin(), subject.record.remarks.end());
+  return make_note(texts);
 }
 
 /// The shares of the file that the layout gives to its parts.
@@ -83,15 +73,6 @@ std::vector<Bar> make_size_bars(const Subject& subject) {
   };
   return {make("shapes", shapes), make("surface", surface), make("numbers of modes", numbers), make("job and record", record),
           make("layout, views, rest", rest)};
-}
-
-void add_count(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark = "") {
-  if (const auto count = find_count(in, key)) facts.add(what, html("{}", format_count(*count)), remark);
-}
-
-/// Only where there were any.
-void add_mended(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark) {
-  if (find_count(in, key).value_or(0) > 0) add_count(facts, in, key, what, remark);
 }
 
 /// A text of JSON as lines.
@@ -132,40 +113,6 @@ Html make_head(const Subject& subject, std::string_view title) {
   return out += html("</header>\n");
 }
 
-Html make_mesh_section(const Subject& subject) {
-  const Json::Value& mesh = find(subject.record.run, "mesh");
-  const bank::Bank& bank = subject.bank;
-  Facts quality;
-  if (const auto angle = find_amount(mesh, "min_dihedral_deg"))
-    quality.add("smallest dihedral angle", html("{:.2f}\u00b0", *angle),
-                *angle < kSliverDeg ? "a sliver: under 5\u00b0" : "slivers are under 5\u00b0");
-  if (const auto ratio = find_number(mesh, "mean_ratio_min"))
-    quality.add("worst mean ratio", html("{:.4f}", *ratio), "1 is a regular tetrahedron");
-  Html out = quality.finish();
-  if (quality.empty()) out += html("<p class=\"missing\">Left out: {}</p>\n", explain_missing(subject, "quality of the mesh"));
-  Facts facts;
-  if (const auto source = find_text(mesh, "source")) facts.add("source", html("{}", *source));
-  facts.add("nodes", html("{}", format_count(bank.counts.nodes)), "as solved, mid-side nodes among them");
-  facts.add("tetrahedra", html("{}", format_count(bank.counts.tets)));
-  facts.add("connected parts", html("{}", format_count(bank.counts.components)));
-  facts.add("surface", html("{} triangles", format_count(static_cast<std::int64_t>(bank.triangles.size()))),
-            fmt::format("{} vertices", format_count(static_cast<std::int64_t>(bank.vertex_count()))));
-  add_mended(facts, mesh, "held_nodes", "held nodes", "by the job");
-  add_count(facts, mesh, "file_nodes", "nodes of the file");
-  add_mended(facts, mesh, "refinements", "refined", "times");
-  add_mended(facts, mesh, "reoriented", "turned round", "elements that were inside out");
-  add_mended(facts, mesh, "unreferenced", "unused", "nodes of the file");
-  add_mended(facts, mesh, "welded", "welded", "nodes that lay on others");
-  add_mended(facts, mesh, "curved", "curved", "elements");
-  add_mended(facts, mesh, "straightened", "straightened", "elements that were bent too far");
-  facts.add("mass", html("{} kg", format_plain(bank.rigid.mass_kg)), fmt::format("{} m\u00b3", format_plain(bank.rigid.volume_m3)));
-  out += facts.finish();
-  Html warnings;
-  for (const std::string& text : find_texts(find(mesh, "warnings"))) warnings += html("<li>{}</li>\n", escape(text, 1000));
-  if (!warnings.empty()) out += html("<div class=\"note\"><ul>\n{}</ul></div>\n", warnings);
-  return make_section("mesh", "Mesh", out);
-}
-
 Html make_bank_section(const Subject& subject) {
   const bank::Bank& bank = subject.bank;
   Html out = html("<p>{} in all, {} bytes: {} vertices of the surface, {} modes.</p>\n", format_bytes(subject.file_bytes),
@@ -179,7 +126,7 @@ Html make_check_section(const Subject& subject) {
   Table table({{""}, {"property"}, {"figure"}});
   for (const bank::Check& check : subject.checks) {
     if (check.faults.empty()) table.add({html("<span class=\"ok\">ok</span>"), html("{}", check.property), html("{}", check.figure)});
-    for (std::size_t i = 0; i < std::min<std::size_t>(check.faults.size(), kMostWarnings); ++i)
+    for (std::size_t i = 0; i < std::min<std::size_t>(check.faults.size(), kMostFaults); ++i)
       table.add({html("<span class=\"fault\">FAULT</span>"), html("{}", check.property), html("{}", check.faults[i])});
   }
   return make_section("checks", "Checks", table.finish());

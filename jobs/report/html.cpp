@@ -106,6 +106,12 @@ Html make_section(const char* id, const char* heading, const Html& content) {
   return html("<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n", id, heading, content);
 }
 
+Html make_note(const std::vector<std::string>& texts) {
+  Html items;
+  for (const std::string& text : texts) items += html("<li>{}</li>\n", escape(text, 1000));
+  return items.empty() ? Html() : html("<div class=\"note\"><ul>\n{}</ul></div>\n", items);
+}
+
 Html leave_out(const char* id, const char* heading, std::string_view why) {
   return html("<section id=\"{}\" class=\"missing\">\n<h2>{}</h2>\n<p class=\"missing\">Left out: {}</p>\n</section>\n", id, heading, why);
 }

@@ -95,6 +95,9 @@ Html make_section(const char* id, const char* heading, const Html& content);
 /// The same for what is not known: a heading and why.
 Html leave_out(const char* id, const char* heading, std::string_view why);
 
+/// Texts set apart from the rest, as a list; nothing when there are none.
+Html make_note(const std::vector<std::string>& texts);
+
 /// The style sheet.
 Html get_style();
 

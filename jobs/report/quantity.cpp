@@ -41,6 +41,7 @@ std::string format_cents(double cents) {
 }
 
 std::string format_percent(double share) {
+  if (share > 0.0 && share < 0.0005) return "< 0.1 %";
   return std::abs(share) < 0.0995 ? fmt::format("{:.1f} %", 100.0 * share) : fmt::format("{:.0f} %", 100.0 * share);
 }
 

@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <sstream>
 
 #include "runtime/config/file.hpp"
@@ -14,6 +16,7 @@ namespace carillon::report {
 namespace {
 
 constexpr std::uint64_t kMostBytes = 64 << 20;
+constexpr Json::ArrayIndex kMostTexts = 50;
 constexpr double kMostCount = 9e15;  // below 2^53
 
 }  // namespace
@@ -57,6 +60,13 @@ std::optional<std::string> find_text(const Json::Value& in, const char* key) {
   const Json::Value& value = find(in, key);
   if (!value.isString()) return std::nullopt;
   return value.asString();
+}
+
+std::vector<std::string> find_texts(const Json::Value& list) {
+  std::vector<std::string> texts;
+  for (Json::ArrayIndex i = 0; list.isArray() && i < std::min(list.size(), kMostTexts); ++i)
+    if (list[i].isString() && std::find(texts.begin(), texts.end(), list[i].asString()) == texts.end()) texts.push_back(list[i].asString());
+  return texts;
 }
 
 Record read_record(const std::filesystem::path& resolved_job, const std::string& provenance) {

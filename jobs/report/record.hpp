@@ -21,6 +21,8 @@ std::optional<double> find_number(const Json::Value& in, const char* key);      
 std::optional<double> find_amount(const Json::Value& in, const char* key);       // finite, not negative
 std::optional<std::int64_t> find_count(const Json::Value& in, const char* key);  // whole, not negative
 std::optional<std::string> find_text(const Json::Value& in, const char* key);
+/// The texts of a list, each once, at most fifty; none when it is no list.
+std::vector<std::string> find_texts(const Json::Value& list);
 
 /// The resolved job of a bank and its member "run", each an object or null.
 struct Record {

@@ -57,7 +57,7 @@ svg path.c0 { stroke: var(--c0) }
 svg path.c1 { stroke: var(--c1) }
 svg path.c2 { stroke: var(--c2) }
 svg .stick { fill: none; stroke-width: 1; opacity: .35 }
-svg .bar { fill: none; stroke-width: 1.2; opacity: .75 }
+svg .bar { fill: none; stroke-width: 1.2; opacity: .5 }
 svg .dots { fill: none; stroke-width: 5; stroke-linecap: round; opacity: .6 }
 svg path.level { stroke: var(--bad); stroke-width: 1; stroke-dasharray: 5 4; fill: none }
 svg text.level { fill: var(--bad); font-size: 12px }

@@ -232,6 +232,21 @@ class Reports(unittest.TestCase):
         self.assertEqual(facts["nodes"][0], f"{run['mesh']['nodes']:,}")
         self.assertEqual(facts["tetrahedra"][0], f"{run['mesh']['tets']:,}")
         self.assertEqual(facts["source"][0], run["mesh"]["source"])
+        # The surface, which is measured for the report.
+        with h5py.File(self.bank) as bank:
+            corners = bank["mesh/vertices"][:][bank["mesh/triangles"][:]]
+        sides = numpy.roll(corners, -1, axis=1) - corners
+        lengths = numpy.linalg.norm(sides, axis=2)
+        cosines = -numpy.einsum("tij,tij->ti", sides, numpy.roll(sides, -1, axis=1)) / (lengths * numpy.roll(lengths, -1, axis=1))
+        angles = numpy.degrees(numpy.arccos(cosines)).min(axis=1)
+        self.assertEqual(facts["smallest angle"][0], f"{angles.min():.2f}\u00b0")
+        self.assertEqual(facts["edges"], [f"{1e3 * lengths.mean():.4g} mm on average", f"{1e3 * lengths.min():.4g} mm to {1e3 * lengths.max():.4g} mm"])
+        texts = [text for tag, _, text in self.page.charts["mesh"] if tag == "text"]
+        # Right angles halved lie on an edge between bins or beside it, by rounding: bars and numpy may differ by those.
+        at_edges = numpy.count_nonzero(abs(angles / 10 - numpy.round(angles / 10)) < 1e-6)
+        for text, count in zip(texts[1::2], numpy.histogram(angles, numpy.arange(0, 70, 10))[0]):
+            self.assertLessEqual(abs(int(text.split()[0].replace(",", "")) - count), at_edges)
+        self.assertEqual(sum(int(text.split()[0].replace(",", "")) for text in texts[1::2]), len(angles))
         # Bars as long as their seconds, and words beside them.
         phases = run["phase_seconds"]
         texts = [text for tag, _, text in self.page.charts["time"] if tag == "text"]
@@ -395,6 +410,7 @@ class Reports(unittest.TestCase):
             file["modes/decay"][0] = math.nan
             file["modes/residual"][4] = math.inf
             file["modes/discretisation_error_cents"][5] = 1e300
+            file["mesh/vertices"][3] = [math.nan, 1e308, -math.inf]
         write_edited(self.bank, spoil, self.root / "insane.hdf")
         page = write_report(self.root / "insane.hdf", self.resolved, self.root / "insane", NOTHING)
         self.assert_whole(page)
