@@ -129,7 +129,8 @@ Html make_check_section(const Subject& subject) {
     for (std::size_t i = 0; i < std::min<std::size_t>(check.faults.size(), kMostFaults); ++i)
       table.add({html("<span class=\"fault\">FAULT</span>"), html("{}", check.property), html("{}", check.faults[i])});
   }
-  return make_section("checks", "Checks", table.finish());
+  return make_section("checks", "Checks",
+                      html("{}<p class=\"remark\">As carillon-bank check says it; it counts modes from 0.</p>\n", table.finish()));
 }
 
 Html make_job_section(const Subject& subject) {

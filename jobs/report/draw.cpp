@@ -107,6 +107,31 @@ bool is_whole_png(const fs::path& file) {
   return in && std::memcmp(first.data(), "\x89PNG\r\n\x1a\n", 8) == 0 && std::memcmp(last.data(), "IEND\xae\x42\x60\x82", 8) == 0;
 }
 
+/// Why it failed, or nothing.
+std::string run(const fs::path& program, const fs::path& bank, int modes, const fs::path& picture, double limit_s) {
+  std::string numbers = "1";
+  for (int mode = 2; mode <= modes; ++mode) numbers += fmt::format(",{}", mode);
+  std::vector<std::string> words{program.string(), "modes", bank.string(), "-o", picture.string(), "--modes", numbers};
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+
+  const int said = ::memfd_create("what carillon-draw says", MFD_CLOEXEC);
+  if (said < 0) return fmt::format("carillon-draw cannot be started: {}", std::strerror(errno));
+  const pid_t parent = ::getpid(), child = ::fork();
+  if (child == 0) become(program.c_str(), arguments.data(), said, parent);
+  const int fork_error = errno;
+  const std::optional<int> status = child > 0 ? wait_for(child, limit_s) : std::nullopt;
+  const std::string last_words = find_last_words(said);
+  ::close(said);
+  if (child < 0) return fmt::format("carillon-draw cannot be started: {}", std::strerror(fork_error));
+  if (!status) return fmt::format("carillon-draw took longer than {:g} s and was ended", limit_s);
+  if (WIFSIGNALED(*status)) return fmt::format("carillon-draw was ended by signal {}", WTERMSIG(*status));
+  if (WEXITSTATUS(*status) == 0) return {};
+  if (last_words.empty()) return fmt::format("carillon-draw failed with exit code {}", WEXITSTATUS(*status));
+  return fmt::format("carillon-draw said: {}", last_words);
+}
+
 }  // namespace
 
 Drawing draw_modes(const fs::path& given, const fs::path& bank, int modes, const fs::path& picture, double limit_s) {
@@ -114,36 +139,17 @@ Drawing draw_modes(const fs::path& given, const fs::path& bank, int modes, const
   fs::remove(picture, error);
   const std::optional<fs::path> program = given.empty() ? find_draw_program() : std::optional(fs::absolute(given, error));
   if (!program || !is_program(*program)) return {"carillon-draw is not installed here"};
-  std::string numbers = "1";
-  for (int mode = 2; mode <= modes; ++mode) numbers += fmt::format(",{}", mode);
-  std::vector<std::string> words{
-      program->string(), "modes", fs::absolute(bank, error).string(), "-o", fs::absolute(picture, error).string(), "--modes", numbers};
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-
-  const int said = ::memfd_create("what carillon-draw says", MFD_CLOEXEC);
-  if (said < 0) return {fmt::format("carillon-draw cannot be started: {}", std::strerror(errno))};
-  const pid_t parent = ::getpid(), child = ::fork();
-  if (child == 0) become(program->c_str(), arguments.data(), said, parent);
-  const int fork_error = errno;
-  const std::optional<int> status = child > 0 ? wait_for(child, limit_s) : std::nullopt;
-  const std::string words_said = find_last_words(said);
-  ::close(said);
-  if (child < 0) return {fmt::format("carillon-draw cannot be started: {}", std::strerror(fork_error))};
-
-  Drawing drawing;
-  if (!status) {
-    drawing.fault = fmt::format("carillon-draw took longer than {:g} s and was ended", limit_s);
-  } else if (WIFSIGNALED(*status)) {
-    drawing.fault = fmt::format("carillon-draw was ended by signal {}", WTERMSIG(*status));
-  } else if (WEXITSTATUS(*status) != 0) {
-    drawing.fault = words_said.empty() ? fmt::format("carillon-draw failed with exit code {}", WEXITSTATUS(*status))
-                                       : fmt::format("carillon-draw said: {}", words_said);
-  } else if (!is_whole_png(picture)) {
-    drawing.fault = "carillon-draw left no picture";
+  // In a folder of its own, which goes with all that is in it, whatever becomes of the program.
+  std::string place = (fs::absolute(picture, error).parent_path() / ".drawing-XXXXXX").string();
+  if (::mkdtemp(place.data()) == nullptr) return {fmt::format("there is no place to draw: {}", std::strerror(errno))};
+  const fs::path drawn = fs::path(place) / picture.filename();
+  Drawing drawing{run(*program, fs::absolute(bank, error), modes, drawn, limit_s)};
+  if (drawing.fault.empty() && !is_whole_png(drawn)) drawing.fault = "carillon-draw left no picture";
+  if (drawing.fault.empty()) {
+    fs::rename(drawn, picture, error);
+    if (error) drawing.fault = fmt::format("the picture cannot be kept: {}", error.message());
   }
-  if (!drawing.fault.empty()) fs::remove(picture, error);
+  fs::remove_all(place, error);
   return drawing;
 }
 

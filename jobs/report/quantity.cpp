@@ -22,7 +22,8 @@ std::string format_bytes(double bytes) {
   if (std::abs(bytes) < 1e3) return fmt::format("{:.0f} B", bytes);
   if (std::abs(bytes) < 1e6) return fmt::format("{:.1f} kB", bytes / 1e3);
   if (std::abs(bytes) < 1e9) return fmt::format("{:.1f} MB", bytes / 1e6);
-  return fmt::format("{:.2f} GB", bytes / 1e9);
+  if (std::abs(bytes) < 1e15) return fmt::format("{:.2f} GB", bytes / 1e9);
+  return fmt::format("{:.3g} GB", bytes / 1e9);
 }
 
 std::string format_seconds(double seconds) {

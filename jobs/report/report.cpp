@@ -32,10 +32,10 @@ Subject read_subject(const fs::path& file, const fs::path& resolved_job) {
 /// What the job calls its body, else the name of the bank.
 std::string find_title(const Subject& subject) {
   const Json::Value& job = subject.record.job;
-  if (const auto mesh = find_text(job, "mesh")) return fs::path(*mesh).filename().string();
   const Json::Value& body = find(job, "body");
-  if (const auto surface = find_text(body, "surface")) return fs::path(*surface).filename().string();
-  if (const auto shape = find_text(body, "shape")) return *shape;
+  for (const auto& name : {find_text(job, "mesh"), find_text(body, "surface"), find_text(body, "shape")}) {
+    if (name && !fs::path(*name).filename().empty()) return fs::path(*name).filename().string();
+  }
   return subject.file.filename().string();
 }
 

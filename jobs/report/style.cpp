@@ -29,7 +29,7 @@ section.missing h2 { font-size: 16px; margin: 0; color: var(--soft) }
 .tile .value { font-size: 21px; font-variant-numeric: tabular-nums; white-space: nowrap }
 nav { margin: 0 0 18px; font-size: 14px }
 nav a { margin-right: 14px; white-space: nowrap }
-.table { overflow: auto; max-height: 520px; margin: 10px 0 }
+.table { overflow: auto; max-height: 900px; margin: 10px 0 }
 table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums }
 th, td { text-align: left; padding: 4px 16px 4px 0; border-bottom: 1px solid var(--line); vertical-align: top }
 th { font-weight: 600; color: var(--soft) }
