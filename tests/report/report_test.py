@@ -395,6 +395,16 @@ class Reports(unittest.TestCase):
         self.assertEqual(len(page.rows("modes", 8)), 1001)
         self.assertIn("The first 1000 of 2500 modes", page.text["modes"])
 
+    def test_modes_that_ring_for_ever_are_drawn_by_their_number(self):
+        bank = self.root / "undamped.hdf"
+        subprocess.run([BIN / "carillon-bank", "edit", self.bank, bank, "--alphas", "0", "0"], check=True, capture_output=True)
+        page = write_report(bank, self.resolved, self.root / "undamped", NOTHING)
+        self.assert_whole(page)
+        y = numpy.array([float(a["cy"]) for tag, a, _ in page.charts["modes"] if tag == "circle"])
+        steps = numpy.diff(y)
+        self.assertTrue(len(y) > 10 and max(steps) < 0 and max(abs(steps - steps.mean())) < 0.11, steps)
+        self.assertEqual({row[5] for row in page.rows("modes", 8)[1:]}, {"inf"})
+
     def test_a_bank_without_modes_has_a_report(self):
         bank = self.root / "mute.hdf"
         subprocess.run([BIN / "make_example_bank", bank, "2", "0"], check=True)
