@@ -62,6 +62,7 @@ void end_on_signals(int rank) {
     // nohup and shells without job control have a process ignore some of them: that stays.
     if (sigaction(signal, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
   }
+  ::signal(SIGXFSZ, SIG_IGN);  // A file that grows beyond the limit is an error of the write, with a message.
 }
 
 void save_on_signals() {
