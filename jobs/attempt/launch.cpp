@@ -190,8 +190,7 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   if (options.is_prediction) {
     add({"--validate", "--json"});
   } else {
-    if (has_option(solver, "--checkpoint-every")) add({"--checkpoint", store::kCheckpointFile});
-    if (has_option(solver, "--progress")) add({"--progress", store::kProgressFile});
+    add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
   }
   return launch;
 }

@@ -12,6 +12,7 @@
 
 #include <system_error>
 
+#include "jobs/report/report.hpp"
 #include "runtime/bank/bank.hpp"
 
 namespace carillon::attempt {
@@ -22,6 +23,7 @@ namespace fs = std::filesystem;
 constexpr const char* kReserveFile = "reserve";
 constexpr off_t kReserveBytes = 64 << 10;
 constexpr double kFullBytes = 1 << 20;
+constexpr double kMostDrawSeconds = 60.0;
 
 /// A missing file is passed over.
 void link_or_copy(const fs::path& from, const fs::path& to) {
@@ -30,6 +32,17 @@ void link_or_copy(const fs::path& from, const fs::path& to) {
   fs::create_hard_link(from, to, error);
   if (error) fs::copy_file(from, to, error);
   if (error) throw SystemError(fmt::format("{}: cannot copy this to {}: {}", from.string(), to.string(), error.message()));
+}
+
+/// A page about the bank. A bank is no worse without.
+void write_report(const fs::path& folder) {
+  try {
+    report::Options options;
+    options.draw_limit_s = kMostDrawSeconds;
+    report::write_report(folder / store::kBankFile, folder / store::kJobFile, folder, options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "carillon attempt: no report was made: {}\n", error.what());
+  }
 }
 
 }  // namespace
@@ -58,6 +71,7 @@ void publish(const store::Store& store, const store::Id& id, const outcome::Outc
     link_or_copy(fs::exists(resolved, error) ? resolved : work / store::kJobFile, folder / store::kJobFile);
     link_or_copy(work / "request.json", folder / "request.json");
     link_or_copy(work / store::kLogFile, folder / store::kLogFile);
+    write_report(folder);
     outcome::write_outcome(folder, outcome);
     store.publish(id, folder);
   } catch (...) {

@@ -48,7 +48,7 @@ LAW = {
     "jobs/outcome": (["runtime/config", "jobs/process"], ["fmt"]),
     "jobs/store": (["runtime/config", "jobs/spec", "jobs/process"], ["fmt", "json", "openssl"]),
     "jobs/registry": (["runtime/config", "jobs/process", "jobs/store"], ["fmt", "sqlite", "json"]),
-    "jobs/attempt": (["runtime/config", "runtime/bank", "jobs/process", "jobs/outcome", "jobs/store"], ["fmt"]),
+    "jobs/attempt": (["runtime/config", "runtime/bank", "jobs/process", "jobs/outcome", "jobs/store", "jobs/report"], ["fmt"]),
     "jobs/queue": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt"], ["fmt"]),
     "jobs/report": (["runtime/config", "runtime/bank"], ["fmt", "json"]),
     "jobs/slurm": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt", "jobs/queue"], ["fmt"]),
