@@ -15,6 +15,7 @@
 #include <map>
 #include <set>
 
+#include "jobs/outcome/outcome.hpp"
 #include "jobs/registry/rows.hpp"
 #include "jobs/store/files.hpp"
 #include "runtime/config/error.hpp"
@@ -27,6 +28,20 @@ namespace fs = std::filesystem;
 
 constexpr const char* kLogName = "submissions.jsonl";
 constexpr std::size_t kMostLineBytes = 32 << 20;
+
+/// A job whose attempt lives is running, whatever the registry has forgotten. Of a node of Slurm nobody here can say that it is gone.
+bool adopt_attempt(Job& job, const fs::path& work) {
+  const auto attempt = outcome::read_attempt(work);
+  if (!attempt) return false;
+  const process::Life life = process::find_life(attempt->process);
+  const auto ended = outcome::read_outcome(work);
+  const bool is_over = ended && ended->token == attempt->token;
+  if (life == process::Life::gone || (life == process::Life::elsewhere && (job.engine != "slurm" || is_over))) return false;
+  job.state = State::running;
+  job.token = attempt->token;
+  job.worker = attempt->process;
+  return true;
+}
 
 /// What a folder of the store says of its job. A damaged record costs what it held, not the job.
 Job make_job(const store::Store& store, const store::Id& id) {
@@ -56,6 +71,7 @@ Job make_job(const store::Store& store, const store::Id& id) {
     }
   } catch (const InputError&) {
   }
+  adopt_attempt(job, folder);
   return job;
 }
 
@@ -63,7 +79,8 @@ Job make_job(const store::Store& store, const store::Id& id) {
 struct Differences {
   std::vector<store::Id> unknown;            // a folder, no row
   std::vector<store::Id> finished, missing;  // rows whose bank is there; rows with no folder at all
-  bool is_empty() const { return unknown.empty() && finished.empty() && missing.empty(); }
+  std::vector<store::Id> alive;              // rows that wait while somebody works on them
+  bool is_empty() const { return unknown.empty() && finished.empty() && missing.empty() && alive.empty(); }
 };
 
 Differences find_differences(Database& database, const store::Store& store) {
@@ -87,6 +104,8 @@ Differences find_differences(Database& database, const store::Store& store) {
     if (at != rows.end() && at->second != State::done && at->second != State::running) found.finished.push_back(id);
   }
   for (const auto& [id, state] : rows) {
+    Job probe{id};
+    if ((state == State::queued || state == State::waiting) && adopt_attempt(probe, store.work_folder(id))) found.alive.push_back(id);
     if (state == State::running || state == State::failed || std::binary_search(banks.begin(), banks.end(), id)) continue;
     if (state == State::done || !std::binary_search(work.begin(), work.end(), id)) found.missing.push_back(id);
   }
@@ -211,6 +230,10 @@ void reconcile(Database& database, const store::Store& store, const Say& say) {
     job.state = State::done;
     job.reason.clear();
     update_job(database, job);
+  }
+  for (const store::Id& id : found.alive) {
+    Job job = *read_job(database, id);
+    if (adopt_attempt(job, store.work_folder(id))) update_job(database, job);
   }
   std::size_t missing = 0;
   for (const store::Id& id : found.missing) {

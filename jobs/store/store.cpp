@@ -28,6 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kVersionText = "carillon store 1\n";
 constexpr std::uint64_t kMostVersionBytes = 1000;
+constexpr off_t kMostCopiedBytes = 16 << 20;
 constexpr std::size_t kMostHostLength = 64;
 const std::set<std::string> kFolders{"banks", "inputs", "work", "tmp"};
 
@@ -114,10 +115,13 @@ std::vector<Id> list_ids(const fs::path& folder) {
 
 fs::path sharded(const fs::path& folder, const Id& id) { return folder / id.text().substr(0, 2) / id.text(); }
 
-/// Makes a file read-only; one that another user of the store owns is replaced by a copy of ours.
+/// Makes a file read-only; one that another user of the store owns, and a small one that has another name elsewhere, which has to stay
+/// writable, is replaced by a copy.
 void seal_file(const fs::path& file) {
-  if (::chmod(file.c_str(), 0444) == 0) return;
-  if (errno != EPERM) throw_errno(file, "make read-only", errno);
+  struct stat info {};
+  const bool is_shared = ::lstat(file.c_str(), &info) == 0 && info.st_nlink > 1 && info.st_size < kMostCopiedBytes;
+  if (!is_shared && ::chmod(file.c_str(), 0444) == 0) return;
+  if (!is_shared && errno != EPERM) throw_errno(file, "make read-only", errno);
   const fs::path copy = fs::path(file) += ".copy";
   std::error_code error;
   fs::copy_file(file, copy, fs::copy_options::overwrite_existing, error);

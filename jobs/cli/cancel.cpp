@@ -1,0 +1,85 @@
+// carillon cancel and carillon retry.
+#include <fmt/core.h>
+
+#include <cstdio>
+
+#include "jobs/cli/options.hpp"
+#include "jobs/cli/shared.hpp"
+#include "jobs/queue/settle.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> words;
+  ResourceOptions resources;
+  bool all_failed = false;
+};
+
+/// Does `act` to each job, and says what came of it. Exit code 1 when one of them was not as asked for.
+template <class Act>
+int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act& act) {
+  bool is_done = true;
+  Json::Value root;
+  root["jobs"] = Json::arrayValue;
+  for (const registry::Job& job : jobs) {
+    const queue::Said said = act(job);
+    is_done = is_done && said.is_done;
+    if (shared.json) {
+      Json::Value entry = describe(shared, shared.registry().find(job.id).value_or(job));
+      entry["did"] = said.is_done;
+      entry["said"] = to_json(said.text);
+      root["jobs"].append(entry);
+    } else {
+      fmt::print("{}  {}: {}\n", job.id.short_text(), show(job.name), show_message(said.text));
+      std::fflush(stdout);
+    }
+  }
+  if (shared.json) print_json(root);
+  return is_done ? 0 : kExitNotYet;
+}
+
+int run_cancel(Shared& shared, const Options& options) {
+  shared.settle();
+  return do_to_all(shared, find_jobs(shared, options.words),
+                   [&](const registry::Job& job) { return queue::cancel(shared.store(), shared.registry(), job.id); });
+}
+
+int run_retry(Shared& shared, const Options& options) {
+  shared.settle();
+  if (options.words.empty() && !options.all_failed)
+    throw InputError("which job? Name an id or a job file, or give --failed for all that failed");
+  std::vector<registry::Job> jobs = find_jobs(shared, options.words);
+  if (options.all_failed) {
+    for (registry::Job& job : shared.registry().list({registry::State::failed})) jobs.push_back(std::move(job));
+  }
+  return do_to_all(shared, jobs, [&](const registry::Job& job) {
+    const queue::Said said = queue::retry(shared.store(), shared.registry(), job.id);
+    if (said.is_done) shared.registry().update(job.id, [&](registry::Job& row) { return options.resources.apply(row); });
+    return said;
+  });
+}
+
+}  // namespace
+
+void add_cancel(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("cancel",
+                                         "Ends jobs that are queued, wait or run; what a running one has computed so far is kept for a "
+                                         "retry. Exit code 1: one was done already.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files")->required();
+  command->callback([&shared, &run, options] { run = [&shared, options] { return run_cancel(shared, *options); }; });
+}
+
+void add_retry(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("retry", "Queues failed and cancelled jobs again, from their checkpoints; waiting ones need wait no longer.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files");
+  command->add_flag("--failed", options->all_failed, "All jobs that failed");
+  options->resources.add(*command);
+  command->callback([&shared, &run, options] { run = [&shared, options] { return run_retry(shared, *options); }; });
+}
+
+}  // namespace carillon::cli

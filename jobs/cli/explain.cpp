@@ -1,0 +1,153 @@
+// carillon explain: would a job run, and why: what differs from what this job file asked for last.
+#include <fmt/core.h>
+
+#include <map>
+#include <sstream>
+
+#include "jobs/cli/gather.hpp"
+#include "jobs/cli/shared.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+/// One part of the id that is another than before.
+struct Change {
+  std::string part;    // "mesh", "surface", "solver", "job"
+  std::string key;     // of the job: "material.density_kg_m3"; else empty
+  std::string before;  // as JSON; empty: there was none
+  std::string after;
+};
+
+void flatten(const Json::Value& value, const std::string& name, std::map<std::string, std::string>& leaves) {
+  if (value.isObject() && !value.empty()) {
+    for (const std::string& key : value.getMemberNames()) flatten(value[key], name.empty() ? key : name + "." + key, leaves);
+    return;
+  }
+  Json::StreamWriterBuilder writer;
+  writer["indentation"] = "";
+  writer["precision"] = 17;
+  writer["emitUTF8"] = true;
+  leaves[name] = Json::writeString(writer, value);
+}
+
+std::map<std::string, std::string> read_leaves(const std::string& job) {
+  Json::Value root;
+  std::string errors;
+  std::istringstream stream(job);
+  std::map<std::string, std::string> leaves;
+  if (Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors)) flatten(root, "", leaves);
+  return leaves;
+}
+
+std::vector<Change> find_changes(const store::Request& before, const store::Request& after) {
+  std::vector<Change> changes;
+  if (before.input_kind != after.input_kind)
+    changes.push_back({"input", "", before.input_kind, after.input_kind});
+  else if (before.input_sha256 != after.input_sha256)
+    changes.push_back(
+        {after.input_kind, "", "SHA-256 " + before.input_sha256.substr(0, 12), "SHA-256 " + after.input_sha256.substr(0, 12)});
+  else if (before.input_format != after.input_format)
+    changes.push_back({after.input_kind, "", "format " + before.input_format, "format " + after.input_format});
+  if (before.solver != after.solver) changes.push_back({"solver", "", before.solver, after.solver});
+  const auto old_leaves = read_leaves(before.job), new_leaves = read_leaves(after.job);
+  for (const auto& [key, value] : old_leaves) {
+    const auto found = new_leaves.find(key);
+    if (found == new_leaves.end())
+      changes.push_back({"job", key, value, ""});
+    else if (found->second != value)
+      changes.push_back({"job", key, value, found->second});
+  }
+  for (const auto& [key, value] : new_leaves) {
+    if (old_leaves.count(key) == 0) changes.push_back({"job", key, "", value});
+  }
+  return changes;
+}
+
+std::string format_change(const Change& change, const store::Request& request) {
+  const std::string before = change.before.empty() ? "not there" : show(change.before),
+                    after = change.after.empty() ? "not there" : show(change.after);
+  if (change.part == "job") return fmt::format("{}: was {}, is {}", show(change.key), before, after);
+  if (change.part == "solver") return fmt::format("solver: was {}, is {}", before, after);
+  if (change.part == "input") return fmt::format("input: was a {}, is a {}", before, after);
+  return fmt::format("{} {}: its content was {}, is {}", change.part, show(request.input_file), before, after);
+}
+
+/// What would happen on submit, in one word for programs and one line for people.
+struct Verdict {
+  std::string word;  // "done", "running", "queued", "waiting", "failed", "cancelled", "new"
+  std::string line;
+  bool would_run = false;
+};
+
+Verdict find_verdict(Shared& shared, const store::Id& id, const std::optional<registry::Job>& job) {
+  if (shared.store().has_bank(id))
+    return {"done",
+            fmt::format("nothing would run: its bank is {}", show((shared.store().bank_folder(id) / store::kBankFile).string(), 4000)),
+            false};
+  if (!job) return {"new", "it would run: the store has no bank of these inputs", true};
+  const std::string state = to_text(job->state);
+  switch (job->state) {
+    case registry::State::failed:
+      return {state,
+              fmt::format("nothing would run: it failed, {}; carillon retry {} tries again", show_message(find_reason(shared, *job)),
+                          id.short_text()),
+              false};
+    case registry::State::cancelled:
+      return {state, "it would run: it was cancelled, and carillon submit asks for it again", true};
+    default:
+      return {state, fmt::format("nothing new would run: it is {} already", state), false};
+  }
+}
+
+int run_explain(Shared& shared, const std::string& word) {
+  const Source source = gather_one(word, read_solver_version());
+  shared.settle();
+  const store::Id id = store::require_id(source.request.id, word);
+  const auto job = shared.registry().find(id);
+  const auto last = shared.registry().find_last_submission(source.job_file);
+  const Verdict verdict = find_verdict(shared, id, job);
+  const std::vector<Change> changes = last ? find_changes(last->request, source.request) : std::vector<Change>();
+  if (shared.json) {
+    Json::Value root;
+    root["id"] = id.text();
+    root["job_file"] = to_json(source.job_file);
+    root["state"] = verdict.word;
+    root["would_run"] = verdict.would_run;
+    root["why"] = to_json(verdict.line);
+    root["last_id"] = last ? Json::Value(last->request.id) : Json::Value();
+    root["changes"] = Json::arrayValue;
+    for (const Change& change : changes) {
+      Json::Value entry;
+      entry["part"] = change.part;
+      entry["key"] = change.key.empty() ? Json::Value() : to_json(change.key);
+      entry["before"] = change.before.empty() ? Json::Value() : to_json(change.before);
+      entry["after"] = change.after.empty() ? Json::Value() : to_json(change.after);
+      root["changes"].append(entry);
+    }
+    root["bank"] = verdict.word == "done" ? to_json((shared.store().bank_folder(id) / store::kBankFile).string()) : Json::Value();
+    print_json(root);
+    return 0;
+  }
+  fmt::print("{}  {}\n{}\n", id.short_text(), show(source.job_file), verdict.line);
+  if (!last)
+    fmt::print("this job file was not submitted to this store before\n");
+  else if (changes.empty())
+    fmt::print("nothing has changed since this job file was submitted last\n");
+  else
+    fmt::print("since this job file was submitted last (as {}) these changed:\n", last->request.id.substr(0, 12));
+  for (const Change& change : changes) fmt::print("  {}\n", format_change(change, source.request));
+  return 0;
+}
+
+}  // namespace
+
+void add_explain(CLI::App& app, Shared& shared, Run& run) {
+  auto word = std::make_shared<std::string>();
+  CLI::App* command =
+      app.add_subcommand("explain", "Would this job run, and why: which part of it changed since it was submitted last. Changes nothing.");
+  command->add_option("JOB", *word, "Job file")->required();
+  command->callback([&shared, &run, word] { run = [&shared, word] { return run_explain(shared, *word); }; });
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,136 @@
+#include "jobs/cli/gather.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <set>
+
+#include "runtime/config/error.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMostManifestBytes = 1ULL << 28;
+
+std::string name_of(const fs::path& file) { return store::to_text(fs::absolute(file).lexically_normal()); }
+
+bool ends_with(const fs::path& file, std::string_view ending) { return file.filename().string().ends_with(ending); }
+
+/// Runs `read`, and keeps what it throws about the job itself. A disk that refuses ends it all.
+template <class Read>
+Source keep_error(const std::string& job_file, const Read& read) {
+  Source source;
+  source.job_file = job_file;
+  try {
+    source.job = read();
+  } catch (const InputError& error) {
+    source.error = error.what();
+  }
+  return source;
+}
+
+Source read_file_source(const fs::path& file) {
+  return keep_error(name_of(file), [&] { return spec::read_job(file, spec::BankKey::optional); });
+}
+
+std::vector<Source> read_folder(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (ends_with(it->path(), ".json") && !ends_with(it->path(), ".resolved.json")) files.push_back(it->path());
+  }
+  if (error) throw InputError(fmt::format("{}: this folder cannot be read: {}; check its rights", folder.string(), error.message()));
+  if (files.empty()) throw InputError(fmt::format("{}: there is no job in this folder; jobs are files that end in .json", folder.string()));
+  std::sort(files.begin(), files.end());
+  std::vector<Source> sources;
+  for (const fs::path& file : files) sources.push_back(read_file_source(file));
+  return sources;
+}
+
+std::string strip(const std::string& line) {
+  const std::size_t begin = line.find_first_not_of(" \t\r");
+  return begin == std::string::npos ? "" : line.substr(begin, line.find_last_not_of(" \t\r") - begin + 1);
+}
+
+/// `place` is "manifest:line".
+Source read_line(const std::string& line, const fs::path& manifest, int number) {
+  const std::string place = fmt::format("{}:{}", manifest.string(), number);
+  if (line.starts_with('{')) {
+    return keep_error(fmt::format("{}#{}", name_of(manifest), number),
+                      [&] { return spec::parse_job(line, manifest, spec::BankKey::optional, number); });
+  }
+  const fs::path file = fs::path(line).is_absolute() ? fs::path(line) : manifest.parent_path() / line;
+  Source source = read_file_source(file);
+  if (!source.error.empty()) source.error = fmt::format("{}: {}", place, source.error);
+  return source;
+}
+
+std::vector<Source> read_manifest(const std::string& word) {
+  const bool is_stdin = word == "-";
+  const fs::path manifest = is_stdin ? fs::current_path() / "standard input" : fs::absolute(word);
+  std::string text =
+      is_stdin ? std::string(std::istreambuf_iterator<char>(std::cin), {})
+               : config::read_file(word, "manifest", kMostManifestBytes, "a job file ends in .json, and a manifest names one on each line");
+  if (text.find('\0') != std::string::npos)
+    throw InputError(fmt::format("{}: this is no text; a job file ends in .json, and a manifest names one on each line", word));
+  std::vector<Source> sources;
+  int number = 0;
+  for (std::size_t at = 0; at < text.size(); ++number) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::string line = strip(text.substr(at, end - at));
+    at = end + 1;
+    if (!line.empty() && line[0] != '#') sources.push_back(read_line(line, manifest, number + 1));
+  }
+  if (sources.empty()) throw InputError(fmt::format("{}: this manifest names no job; write one job file on each line", word));
+  return sources;
+}
+
+std::vector<Source> read_word(const std::string& word) {
+  std::error_code error;
+  if (word != "-" && fs::is_directory(word, error)) return read_folder(word);
+  if (word != "-" && ends_with(word, ".json")) return {read_file_source(word)};
+  return read_manifest(word);
+}
+
+void add_request(Source& source, store::RequestMaker& maker) {
+  if (!source.error.empty()) return;
+  try {
+    source.request = maker.make(source.job);
+    source.request.job_file = source.job_file;
+  } catch (const InputError& error) {
+    source.error = fmt::format("{}: {}", source.job.file.string(), error.what());
+  }
+}
+
+}  // namespace
+
+std::vector<Source> gather(const std::vector<std::string>& words, const std::string& solver) {
+  std::vector<Source> sources;
+  std::set<std::string> seen;
+  for (const std::string& word : words) {
+    for (Source& source : read_word(word)) {
+      if (seen.insert(source.job_file).second) sources.push_back(std::move(source));
+    }
+  }
+  store::RequestMaker maker(solver);
+  for (Source& source : sources) add_request(source, maker);
+  return sources;
+}
+
+Source gather_one(const std::string& word, const std::string& solver) {
+  Source source;
+  source.job_file = name_of(word);
+  source.job = spec::read_job(word, spec::BankKey::optional);
+  source.request = store::RequestMaker(solver).make(source.job);
+  source.request.job_file = source.job_file;
+  return source;
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,28 @@
+// The jobs that a command line names: files, folders, manifests.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "jobs/spec/job_spec.hpp"
+#include "jobs/store/identity.hpp"
+
+namespace carillon::cli {
+
+/// One job as it was named, or why it cannot be used.
+struct Source {
+  std::string job_file;  // store::to_text() of an absolute path, with "#7" for line 7 of a manifest
+  spec::JobSpec job;
+  store::Request request;
+  std::string error;  // empty: it can be used
+};
+
+/// A .json file is a job; a folder stands for its *.json, *.resolved.json left out; any other file is a manifest: one job file a line, or
+/// one job written out as JSON on one line; blank lines and lines that begin with # are passed over, "-" is standard input. Reads all and
+/// hashes their inputs; what is wrong with one job is in its `error`. Throws InputError for a word that leads to no job at all.
+std::vector<Source> gather(const std::vector<std::string>& words, const std::string& solver);
+
+/// One job file. Throws what is wrong with it.
+Source gather_one(const std::string& word, const std::string& solver);
+
+}  // namespace carillon::cli

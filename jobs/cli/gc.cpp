@@ -1,0 +1,239 @@
+// carillon gc: what no job refers to.
+// Method:     A job file refers to what it was last submitted as, for as long as the file is there. Banks, failed and cancelled jobs that
+// no
+//             job file refers to are garbage; so are inputs that no bank and no job was made of, folders of work whose bank is published,
+//             temporary folders of processes that are gone, and registries that were set aside. What is queued, waits or runs never is.
+// Source:     own.
+// Deviations: none.
+#include <fmt/core.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "jobs/cli/shared.hpp"
+#include "jobs/process/process.hpp"
+#include "jobs/store/files.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Something that could go.
+struct Item {
+  std::string kind;  // "bank", "job", "input", "work", "temporary", "registry"
+  fs::path path;
+  std::string why;
+  double bytes = 0.0;
+  std::optional<store::Id> id = std::nullopt;
+  std::string error = "";  // why it could not be removed
+};
+
+double calc_bytes(const fs::path& path) {
+  struct stat info {};
+  if (::lstat(path.c_str(), &info) != 0) return 0.0;
+  if (!S_ISDIR(info.st_mode)) return static_cast<double>(info.st_size);
+  double sum = 0.0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(path, fs::directory_options::skip_permission_denied, error), end; !error && it != end;
+       it.increment(error)) {
+    if (::lstat(it->path().c_str(), &info) == 0 && S_ISREG(info.st_mode)) sum += static_cast<double>(info.st_size);
+  }
+  return sum;
+}
+
+/// The file of a submission: a manifest without the number of its line.
+fs::path find_file(const std::string& job_file) {
+  fs::path file = store::from_text(job_file);
+  struct stat info {};
+  if (::lstat(file.c_str(), &info) == 0) return file;
+  const std::size_t mark = job_file.rfind('#');
+  return mark == std::string::npos ? file : store::from_text(job_file.substr(0, mark));
+}
+
+/// Gone for sure: a disk that does not answer or rights that are lacking are no proof.
+bool is_gone(const fs::path& file) {
+  struct stat info {};
+  return ::lstat(file.c_str(), &info) != 0 && (errno == ENOENT || errno == ENOTDIR);
+}
+
+struct References {
+  std::set<store::Id> ids;                        // that a job file refers to
+  std::map<store::Id, std::string> lost;          // a job file that is gone referred to it
+  std::vector<registry::Submission> submissions;  // of files that are there
+};
+
+References find_references(Shared& shared) {
+  References found;
+  for (const registry::Submission& submission : shared.registry().list_last_submissions()) {
+    const store::Id id = store::require_id(submission.request.id, "registry");
+    if (is_gone(find_file(submission.job_file))) {
+      found.lost.emplace(id, submission.job_file);
+    } else {
+      found.ids.insert(id);
+      found.submissions.push_back(submission);
+    }
+  }
+  return found;
+}
+
+/// A folder whose own request names a job file that is there, or none, while no submission is known of it: the log was lost, and the job
+/// stays.
+bool is_kept_by_request(const References& references, const store::Id& id, const fs::path& folder) {
+  if (references.lost.count(id) > 0) return false;
+  try {
+    const auto request = store::read_request(folder);
+    if (!request || request->job_file.empty()) return true;
+    const bool is_known = std::any_of(references.submissions.begin(), references.submissions.end(),
+                                      [&](const registry::Submission& submission) { return submission.job_file == request->job_file; });
+    return !is_known && !is_gone(find_file(request->job_file));
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+std::string explain(const References& references, const store::Id& id) {
+  const auto lost = references.lost.find(id);
+  return lost == references.lost.end() ? "its job file asks for something else now"
+                                       : fmt::format("its job file {} is gone", show(lost->second));
+}
+
+/// The process that a folder of tmp/ belongs to: "host,boot,pid,ticks,random".
+bool is_owner_gone(const std::string& name) {
+  std::istringstream parts(name);
+  process::Identity owner;
+  std::string pid, ticks;
+  if (!std::getline(parts, owner.host, ',') || !std::getline(parts, owner.boot, ',') || !std::getline(parts, pid, ',') ||
+      !std::getline(parts, ticks, ','))
+    return true;
+  owner.pid = std::atoi(pid.c_str());
+  owner.start_ticks = std::strtoull(ticks.c_str(), nullptr, 10);
+  return process::find_life(owner) == process::Life::gone;
+}
+
+void add_jobs(Shared& shared, const References& references, std::vector<Item>& items, std::set<fs::path>& used_inputs) {
+  const store::Store& store = shared.store();
+  const auto use_input = [&](const fs::path& folder) {
+    try {
+      const auto request = store::read_request(folder);
+      if (request && request->input_kind != "shape")
+        used_inputs.insert(
+            store.input_file(store::require_id(request->input_sha256, "request"), request->input_format).replace_extension());
+    } catch (const InputError&) {  // a damaged record keeps nothing alive
+    }
+  };
+  for (const store::Id& id : store.list_banks()) {
+    if (references.ids.count(id) > 0 || is_kept_by_request(references, id, store.bank_folder(id)))
+      use_input(store.bank_folder(id));
+    else
+      items.push_back({"bank", store.bank_folder(id), explain(references, id), calc_bytes(store.bank_folder(id)), id});
+  }
+  for (const store::Id& id : store.list_work()) {
+    const fs::path folder = store.work_folder(id);
+    const auto job = shared.registry().find(id);
+    const bool has_ended = job && (job->state == registry::State::failed || job->state == registry::State::cancelled);
+    if (job && job->state == registry::State::done && store.has_bank(id))
+      items.push_back({"work", folder, "its bank is published", calc_bytes(folder), id});
+    else if (has_ended && references.ids.count(id) == 0 && !is_kept_by_request(references, id, folder))
+      items.push_back({"job", folder, fmt::format("{}, and {}", to_text(job->state), explain(references, id)), calc_bytes(folder), id});
+    else
+      use_input(folder);
+  }
+}
+
+void add_files(const store::Store& store, const std::set<fs::path>& used_inputs, std::vector<Item>& items) {
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(store.root() / "inputs", error), end; !error && it != end; it.increment(error)) {
+    if (it->is_directory() || used_inputs.count(fs::path(it->path()).replace_extension()) > 0) continue;
+    items.push_back({"input", it->path(), "no bank and no job is made of it", calc_bytes(it->path())});
+  }
+  for (fs::directory_iterator it(store.root() / "tmp", error), end; !error && it != end; it.increment(error)) {
+    if (is_owner_gone(it->path().filename().string()))
+      items.push_back({"temporary", it->path(), "the process that made it is gone", calc_bytes(it->path())});
+  }
+  for (fs::directory_iterator it(store.registry_folder(), error), end; !error && it != end; it.increment(error)) {
+    if (it->path().filename().string().starts_with("registry.damaged-"))
+      items.push_back({"registry", it->path(), "damaged, and made again", calc_bytes(it->path())});
+  }
+}
+
+void remove_items(Shared& shared, const References& references, std::vector<Item>& items) {
+  std::vector<store::Id> forgotten;
+  for (Item& item : items) {
+    try {
+      if (item.kind == "bank")
+        shared.store().remove_bank(*item.id);
+      else if (item.kind == "job" || item.kind == "work")
+        shared.store().remove_work(*item.id);
+      else
+        store::remove_tree(item.path);
+      if (item.kind == "bank" || item.kind == "job") forgotten.push_back(*item.id);
+    } catch (const SystemError& error) {
+      item.error = error.what();
+    }
+  }
+  shared.registry().remove(forgotten);
+  shared.registry().keep_submissions(references.submissions);
+}
+
+int run_gc(Shared& shared, bool is_deleting) {
+  shared.settle();
+  std::vector<Item> items;
+  std::set<fs::path> used_inputs;
+  {
+    const store::Lock lock = is_deleting ? shared.store().lock_exclusive() : shared.store().lock_shared();
+    const References references = find_references(shared);
+    add_jobs(shared, references, items, used_inputs);
+    add_files(shared.store(), used_inputs, items);
+    if (is_deleting) remove_items(shared, references, items);
+  }
+  double bytes = 0.0;
+  bool has_failed = false;
+  Json::Value root;
+  root["deleted"] = is_deleting;
+  root["items"] = Json::arrayValue;
+  for (const Item& item : items) {
+    has_failed = has_failed || !item.error.empty();
+    if (item.error.empty()) bytes += item.bytes;
+    Json::Value entry;
+    entry["kind"] = item.kind;
+    entry["path"] = to_json(item.path.string());
+    entry["id"] = item.id ? Json::Value(item.id->text()) : Json::Value();
+    entry["why"] = to_json(item.why);
+    entry["bytes"] = item.bytes;
+    entry["error"] = item.error.empty() ? Json::Value() : to_json(item.error);
+    root["items"].append(entry);
+    if (shared.json) continue;
+    fmt::print("{:<9}  {:>9}  {}: {}\n", item.kind, format_bytes(item.bytes),
+               show(item.path.lexically_relative(shared.store().root()).string()), item.why);
+    if (!item.error.empty()) fmt::print(stderr, "carillon: {}\n", show_message(item.error));
+  }
+  root["bytes"] = bytes;
+  if (shared.json)
+    print_json(root);
+  else
+    fmt::print("{} thing{}, {} {}\n", items.size(), items.size() == 1 ? "" : "s", format_bytes(bytes),
+               items.empty() ? "to remove"
+               : is_deleting ? "removed"
+                             : "could be removed; carillon gc --delete does");
+  return has_failed ? kExitSystem : 0;
+}
+
+}  // namespace
+
+void add_gc(CLI::App& app, Shared& shared, Run& run) {
+  auto is_deleting = std::make_shared<bool>(false);
+  CLI::App* command = app.add_subcommand(
+      "gc",
+      "Lists what no job refers to: banks and failed jobs whose job file is gone or asks for something else by now, inputs of neither, and "
+      "what\n"
+      "processes that were killed left behind. Removes nothing without --delete, and nothing that is queued, waits or runs.");
+  command->add_flag("--delete", *is_deleting, "Remove it");
+  command->callback([&shared, &run, is_deleting] { run = [&shared, is_deleting] { return run_gc(shared, *is_deleting); }; });
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,125 @@
+// carillon get and carillon report: what the store has of a job.
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "jobs/cli/gather.hpp"
+#include "jobs/cli/shared.hpp"
+#include "jobs/store/files.hpp"
+#include "runtime/config/error.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string word;
+  std::string to;
+};
+
+/// Copies a file whole: it has no name before it is on the disk.
+void copy_to(const fs::path& from, const fs::path& wanted) {
+  std::error_code error;
+  const fs::path to = fs::is_directory(wanted, error) ? wanted / from.filename() : wanted;
+  if (fs::equivalent(from, to, error)) throw InputError(fmt::format("{}: this is the bank in the store; name another file", to.string()));
+  config::check_writable(to, "copy of the bank");
+  const fs::path temporary = to.parent_path() / fmt::format(".{}.tmp.{}", to.filename().string().substr(0, 200), ::getpid());
+  const auto refuse = [&](int code) {
+    ::unlink(temporary.c_str());
+    store::throw_errno(to, "write", code);
+  };
+  ::unlink(temporary.c_str());
+  fs::copy_file(from, temporary, error);
+  if (error) refuse(error.value());
+  try {
+    store::sync_file(temporary);
+  } catch (...) {
+    ::unlink(temporary.c_str());
+    throw;
+  }
+  fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add, error);
+  fs::rename(temporary, to, error);
+  if (error) refuse(error.value());
+}
+
+/// The id that a word means by its content, and its row if there is one: the job file of now, not of its last submission.
+std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word) {
+  std::error_code error;
+  if (!store::parse_id(word) && (fs::exists(word, error) || word.ends_with(".json"))) {
+    const store::Id id = store::require_id(gather_one(word, read_solver_version()).request.id, word);
+    return {id, shared.registry().find(id)};
+  }
+  registry::Job job = find_job(shared, word);
+  return {job.id, job};
+}
+
+int run_get(Shared& shared, const Options& options) {
+  shared.settle();
+  const auto [id, job] = find_by_content(shared, options.word);
+  const fs::path bank = shared.store().bank_folder(id) / store::kBankFile;
+  const bool is_done = shared.store().has_bank(id);
+  if (is_done && !options.to.empty()) copy_to(bank, options.to);
+  const std::string state = is_done ? "done" : job ? to_text(job->state) : "new";
+  if (shared.json) {
+    Json::Value root;
+    root["id"] = id.text();
+    root["state"] = state;
+    root["reason"] = job && !is_done ? to_json(find_reason(shared, *job)) : Json::Value("");
+    root["bank"] = is_done ? to_json(bank.string()) : Json::Value();
+    root["copy"] = is_done && !options.to.empty() ? to_json(options.to) : Json::Value();
+    print_json(root);
+  } else if (is_done) {
+    fmt::print("{}\n", options.to.empty() ? bank.string() : options.to);
+  } else {
+    const std::string reason = job ? show_message(find_reason(shared, *job)) : "carillon submit asks for it";
+    fmt::print(stderr, "carillon: no bank yet: {} is {}{}{}\n", id.short_text(), state, reason.empty() ? "" : "; ", reason);
+  }
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+  return is_done ? 0 : kExitNotYet;
+}
+
+int run_report(Shared& shared, const std::string& word) {
+  shared.settle();
+  const auto [id, job] = find_by_content(shared, word);
+  const fs::path report = shared.store().bank_folder(id) / store::kReportFile;
+  std::error_code error;
+  const bool is_there = fs::exists(report, error);
+  const std::string state = shared.store().has_bank(id) ? "done" : job ? to_text(job->state) : "new";
+  if (shared.json) {
+    Json::Value root;
+    root["id"] = id.text();
+    root["state"] = state;
+    root["report"] = is_there ? to_json(report.string()) : Json::Value();
+    print_json(root);
+  } else if (is_there) {
+    fmt::print("{}\n", report.string());
+  } else {
+    fmt::print(stderr, "carillon: no report yet: {} is {}\n", id.short_text(), state);
+  }
+  return is_there ? 0 : kExitNotYet;
+}
+
+}  // namespace
+
+void add_get(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "get", "Prints the path of the finished bank, read-only in the store. Exit code 1: not there yet, with its state.");
+  command->add_option("JOB", options->word, "Job file (what it holds now), or an id or its beginning")->required();
+  command->add_option("--to", options->to, "Copy the bank to this file or into this folder");
+  command->callback([&shared, &run, options] { run = [&shared, options] { return run_get(shared, *options); }; });
+}
+
+void add_report(CLI::App& app, Shared& shared, Run& run) {
+  auto word = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand(
+      "report", "Prints the path of a bank's report (HTML): mesh, modes and proof, error bars, time and memory, pictures.");
+  command->add_option("JOB", *word, "Job file (what it holds now), or an id or its beginning")->required();
+  command->callback([&shared, &run, word] { run = [&shared, word] { return run_report(shared, *word); }; });
+}
+
+}  // namespace carillon::cli

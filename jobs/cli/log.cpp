@@ -1,0 +1,103 @@
+// carillon log: what the solver printed.
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "jobs/cli/shared.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr auto kPause = std::chrono::milliseconds(300);
+constexpr off_t kMostJsonBytes = 16 << 20;
+
+struct Options {
+  std::string word;
+  bool follow = false;
+};
+
+/// What may go to a terminal: line ends and tabs stay, other control characters do not.
+std::string filter(const std::string& bytes) {
+  std::string text;
+  for (const char c : bytes) {
+    const auto code = static_cast<unsigned char>(c);
+    if (code == '\n' || code == '\t' || (code >= 0x20 && code != 0x7F))
+      text += c;
+    else if (code != '\r')
+      text += fmt::format("\\x{:02x}", code);
+  }
+  return text;
+}
+
+/// The bytes from `from` on, at most `most`; `from` moves on. Empty when there are none.
+std::string read_from(const fs::path& file, off_t& from, off_t most) {
+  std::string bytes;
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
+  if (fd < 0) return bytes;
+  struct stat info {};
+  if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && info.st_size > from) {
+    bytes.resize(static_cast<std::size_t>(std::min(most, info.st_size - from)));
+    const ssize_t got = ::pread(fd, bytes.data(), bytes.size(), from);
+    bytes.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+    from += static_cast<off_t>(bytes.size());
+  }
+  ::close(fd);
+  return bytes;
+}
+
+bool has_ended(const registry::Job& job) {
+  return job.state == registry::State::done || job.state == registry::State::failed || job.state == registry::State::cancelled;
+}
+
+int run_log(Shared& shared, const Options& options) {
+  shared.settle();
+  registry::Job job = find_job(shared, options.word);
+  off_t at = 0;
+  if (shared.json) {
+    const fs::path file = shared.store().find_folder(job.id) / store::kLogFile;
+    Json::Value root;
+    root["id"] = job.id.text();
+    root["state"] = to_text(job.state);
+    root["file"] = to_json(file.string());
+    struct stat info {};
+    if (::stat(file.c_str(), &info) == 0) at = std::max<off_t>(0, info.st_size - kMostJsonBytes);
+    root["text"] = to_json(read_from(file, at, kMostJsonBytes));
+    print_json(root);
+    return 0;
+  }
+  for (;;) {
+    const bool is_last = !options.follow || has_ended(job);  // looked at before the log is read: nothing is printed after that
+    for (std::string bytes; !(bytes = read_from(shared.store().find_folder(job.id) / store::kLogFile, at, 1 << 20)).empty();) {
+      fmt::print("{}", filter(bytes));
+    }
+    if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+    if (is_last) break;
+    std::this_thread::sleep_for(kPause);
+    shared.settle();
+    job = shared.registry().find(job.id).value_or(job);
+  }
+  if (at == 0) fmt::print(stderr, "carillon: {} has printed nothing yet; it is {}\n", job.id.short_text(), to_text(job.state));
+  return at == 0 ? kExitNotYet : 0;
+}
+
+}  // namespace
+
+void add_log(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("log", "What the solver printed for a job, all attempts one after the other. Exit code 1: nothing yet.");
+  command->add_option("ID", options->word, "Id (or its beginning) or job file")->required();
+  command->add_flag("-f,--follow", options->follow, "Go on until the job has ended");
+  command->callback([&shared, &run, options] { run = [&shared, options] { return run_log(shared, *options); }; });
+}
+
+}  // namespace carillon::cli

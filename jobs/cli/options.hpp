@@ -1,0 +1,29 @@
+// Options that several commands have.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "jobs/registry/registry.hpp"
+#include "jobs/store/records.hpp"
+
+namespace carillon::cli {
+
+/// --ranks, --memory-gb, --time-limit, --on.
+struct ResourceOptions {
+  int ranks = 0;
+  double memory_gb = 0.0;
+  std::string time_limit;  // "90", "90s", "15m", "2h"
+  std::string engine;
+
+  void add(CLI::App& command);
+  /// What was given takes the place of what the job file says.
+  void apply(store::Request& request) const;
+  /// The same for a row; false when nothing was given.
+  bool apply(registry::Job& job) const;
+};
+
+/// Seconds of "90", "90s", "15m", "2h" or "1d". InputError for anything else.
+double parse_seconds(const std::string& text);
+
+}  // namespace carillon::cli

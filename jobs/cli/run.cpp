@@ -1,0 +1,87 @@
+// carillon run: the queue of this machine; and carillon attempt, which it and the scripts of Slurm start.
+#include "jobs/queue/run.hpp"
+
+#include <fmt/core.h>
+
+#include "jobs/attempt/attempt.hpp"
+#include "jobs/cli/follow.hpp"
+#include "jobs/cli/shared.hpp"
+#include "jobs/queue/settle.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path find_self() {
+  std::error_code error;
+  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  if (error) throw SystemError("/proc does not show this program; mount it");
+  return self;
+}
+
+}  // namespace
+
+void Shared::settle() { queue::settle(store(), registry()); }
+
+int run_until_done(Shared& shared, const std::vector<store::Id>& ids) {
+  queue::RunOptions options;
+  options.program = find_self();
+  options.quiet = shared.json;
+  if (const int code = queue::run(shared.store(), options); code != 0) return code;
+  std::vector<registry::Job> jobs;
+  for (const store::Id& id : ids) {
+    if (auto job = shared.registry().find(id)) jobs.push_back(std::move(*job));
+  }
+  return find_exit_code(jobs);
+}
+
+void add_run(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<queue::RunOptions>();
+  CLI::App* command = app.add_subcommand("run",
+                                         "Works through the queue on this machine until it is empty: as many jobs at once as cores and "
+                                         "memory allow. Any number may run on one store.\n"
+                                         "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: the "
+                                         "queue is empty, whatever became of single jobs.");
+  command->add_flag("--keep", options->keep, "Stay and wait for more jobs when the queue is empty");
+  command->add_option("--cores", options->cores, "Use at most so many")->check(CLI::Range(1, 1'000'000));
+  command->add_option("--memory-gb", options->memory_gb, "Use at most so much")->check(CLI::Range(1e-3, 1e9));
+  command->add_flag("-q,--quiet", options->quiet, "Print nothing");
+  command->callback([&shared, &run, options] {
+    run = [&shared, options] {
+      options->program = find_self();
+      options->json = shared.json;
+      return queue::run(shared.store(), *options);
+    };
+  });
+}
+
+void add_attempt(CLI::App& app, Run& run) {
+  auto options = std::make_shared<attempt::Options>();
+  auto launcher = std::make_shared<std::string>();
+  CLI::App* command =
+      app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and the scripts of Slurm")->group("");
+  command->add_option("WORK", options->work, "STORE/work/ab/ID")->required();
+  command->add_option("--ranks", options->ranks)->check(CLI::Range(1, 1'000'000));
+  command->add_option("--memory-gb", options->memory_gb);
+  command->add_option("--time-limit-s", options->time_limit_s);
+  command->add_option("--token", options->token);
+  command->add_option("--launcher", *launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
+  command->add_flag("--predict", options->is_prediction);
+  command->add_option("--grace-s", options->grace_s);
+  command->add_option("--hang-s", options->hang_s);
+  command->callback([&run, options, launcher] {
+    run = [options, launcher] {
+      if (*launcher == "alone") options->launcher = attempt::Launcher::alone;
+      if (*launcher == "mpirun") options->launcher = attempt::Launcher::mpirun;
+      if (*launcher == "srun") options->launcher = attempt::Launcher::srun;
+      if (!options->token.empty() &&
+          (options->token.size() != 32 || options->token.find_first_not_of("0123456789abcdef") != std::string::npos))
+        throw InputError("--token: 32 hex digits are needed");
+      return attempt::run_attempt(*options);
+    };
+  });
+}
+
+}  // namespace carillon::cli

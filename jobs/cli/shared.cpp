@@ -1,0 +1,155 @@
+// The store and the jobs that words name.
+#include "jobs/cli/shared.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "jobs/cli/gather.hpp"
+#include "runtime/config/document.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLeastPrefix = 4, kMostNamed = 5;
+
+bool is_there(const fs::path& file) {
+  struct stat info {};
+  return ::stat(file.c_str(), &info) == 0;
+}
+
+fs::path find_profile_file() {
+  const char* config = std::getenv("XDG_CONFIG_HOME");
+  if (config != nullptr && fs::path(config).is_absolute()) return fs::path(config) / "carillon/profile.json";
+  const char* home = std::getenv("HOME");
+  return home != nullptr && fs::path(home).is_absolute() ? fs::path(home) / ".config/carillon/profile.json" : fs::path();
+}
+
+Profile read_profile(const std::string& option) {
+  Profile profile;
+  profile.file = option.empty() ? find_profile_file() : fs::path(option);
+  if (option.empty() && (profile.file.empty() || !is_there(profile.file))) return {};
+  config::Object root = config::read_document(profile.file).root();
+  if (root.has("store")) profile.store = root.path("store");
+  profile.engine = root.choice_or("on", {"local", "slurm"}, "local");
+  root.ignore("slurm");
+  root.finish();
+  return profile;
+}
+
+bool is_hex(const std::string& word) {
+  return std::all_of(word.begin(), word.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
+}
+
+/// The job of a file: of its last submission from there, else that of what it holds now.
+registry::Job find_by_file(Shared& shared, const std::string& word) {
+  const std::string job_file = store::to_text(fs::absolute(word).lexically_normal());
+  std::optional<registry::Job> job;
+  if (const auto submission = shared.registry().find_last_submission(job_file))
+    job = shared.registry().find(store::require_id(submission->request.id, "registry"));
+  if (!job && is_there(word)) job = shared.registry().find(store::require_id(gather_one(word, read_solver_version()).request.id, word));
+  if (!job) throw InputError(fmt::format("{}: no job of this store; carillon submit adds it", word));
+  return *job;
+}
+
+}  // namespace
+
+const Profile& Shared::profile() {
+  if (!profile_) profile_ = read_profile(profile_option);
+  return *profile_;
+}
+
+const store::Store& Shared::store() {
+  if (!store_) {
+    const fs::path folder = !store_option.empty()      ? fs::path(store_option)
+                            : !profile().store.empty() ? profile().store
+                                                       : store::find_default_store();
+    store_ = store::Store::open(folder);
+  }
+  return *store_;
+}
+
+registry::Registry& Shared::registry() {
+  const auto say = [](const std::string& line) { fmt::print(stderr, "carillon: {}\n", show_message(line)); };
+  if (!registry_) registry_.emplace(registry::Registry::open(store(), say));
+  return *registry_;
+}
+
+registry::Job find_job(Shared& shared, const std::string& word) {
+  if (word.empty()) throw InputError("an id is empty; carillon status lists them");
+  if (is_hex(word) && word.size() >= kLeastPrefix) {
+    const auto jobs = shared.registry().find_by_prefix(word, kMostNamed);
+    if (jobs.size() == 1) return jobs.front();
+    if (jobs.size() > 1) {
+      std::vector<std::string> names;
+      for (const registry::Job& job : jobs) names.push_back(job.id.short_text());
+      throw InputError(fmt::format("{}: fits several jobs ({}{}); give more digits", word, fmt::join(names, ", "),
+                                   jobs.size() == kMostNamed ? " ..." : ""));
+    }
+  }
+  const bool is_file = is_there(word) || word.find('/') != std::string::npos || word.ends_with(".json");
+  if (is_file) return find_by_file(shared, word);
+  throw InputError(fmt::format("{}: neither the beginning of an id (at least {} digits) nor a job file; carillon status lists the ids",
+                               show(word), kLeastPrefix));
+}
+
+std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words) {
+  std::vector<registry::Job> jobs;
+  for (const std::string& word : words) {
+    registry::Job job = find_job(shared, word);
+    if (std::none_of(jobs.begin(), jobs.end(), [&](const registry::Job& other) { return other.id == job.id; }))
+      jobs.push_back(std::move(job));
+  }
+  return jobs;
+}
+
+std::string find_reason(Shared& shared, const registry::Job& job) {
+  std::string reason = job.reason;
+  const std::string inputs = (shared.store().root() / "inputs").string();
+  if (reason.find(inputs) == std::string::npos) return reason;
+  try {
+    const auto request = store::read_request(shared.store().find_folder(job.id));
+    if (!request || request->input_kind == "shape") return reason;
+    const std::string copy = shared.store().input_file(store::require_id(request->input_sha256, "request"), request->input_format).string();
+    for (std::size_t at = reason.find(copy); at != std::string::npos; at = reason.find(copy, at + request->input_file.size()))
+      reason.replace(at, copy.size(), request->input_file);
+  } catch (const InputError&) {  // a damaged record costs the name, not the reason
+  }
+  return reason;
+}
+
+Json::Value describe(Shared& shared, const registry::Job& job) {
+  Json::Value root;
+  root["id"] = job.id.text();
+  root["state"] = to_text(job.state);
+  root["name"] = to_json(job.name);
+  root["engine"] = job.engine;
+  root["reason"] = to_json(find_reason(shared, job));
+  root["attempts"] = job.attempts;
+  root["failures"] = job.failures;
+  root["ranks"] = job.resources.ranks;
+  root["memory_gb"] = job.resources.memory_gb;
+  root["time_limit_s"] = job.resources.time_limit_s;
+  root["slurm_job"] = job.slurm_job.empty() ? Json::Value() : to_json(job.slurm_job);
+  root["submitted"] = to_json_time(job.submitted_unix_s);
+  root["started"] = to_json_time(job.started_unix_s);
+  root["ended"] = to_json_time(job.ended_unix_s);
+  const bool is_done = job.state == registry::State::done;
+  const auto progress = is_done ? std::nullopt : store::read_progress(shared.store().work_folder(job.id));
+  root["phase"] = is_done ? Json::Value("done") : progress ? to_json(progress->phase) : Json::Value();
+  root["percent"] = is_done ? 100.0 : progress ? progress->percent : 0.0;
+  root["modes_done"] = progress && progress->modes_done >= 0 ? Json::Value(Json::Int64(progress->modes_done)) : Json::Value();
+  root["modes_wanted"] = progress && progress->modes_wanted >= 0 ? Json::Value(Json::Int64(progress->modes_wanted)) : Json::Value();
+  root["seconds_left"] = progress && progress->seconds_left >= 0 && job.state == registry::State::running
+                             ? Json::Value(progress->seconds_left)
+                             : Json::Value();
+  root["bank"] = is_done ? to_json((shared.store().bank_folder(job.id) / store::kBankFile).string()) : Json::Value();
+  return root;
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,95 @@
+// What the commands share: the store, ways to name a job, and two ways to print: lines for people, one JSON document for programs.
+#pragma once
+
+#include <json/json.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "jobs/registry/registry.hpp"
+#include "jobs/store/store.hpp"
+
+namespace carillon::cli {
+
+/// Not an error and not done: the job is not there yet.
+inline constexpr int kExitNotYet = 1;
+
+/// profile.json: what somebody always wants. Every key may be left out.
+struct Profile {
+  std::filesystem::path file;    // empty: there is none
+  std::filesystem::path store;   // "store"
+  std::string engine = "local";  // "on"
+};
+
+/// The store and its registry, opened when first asked for.
+class Shared {
+ public:
+  std::string store_option;    // --store
+  std::string profile_option;  // --profile
+  bool json = false;           // --json
+
+  const Profile& profile();
+  const store::Store& store();
+  registry::Registry& registry();
+  /// Rows whose process is gone are settled: what every command does that looks at states.
+  void settle();
+
+ private:
+  std::optional<Profile> profile_;
+  std::optional<store::Store> store_;
+  std::optional<registry::Registry> registry_;
+};
+
+/// Each adds its command to `app` and sets `run` when it is called; `run` gives the exit code.
+using Run = std::function<int()>;
+void add_submit(CLI::App& app, Shared& shared, Run& run);
+void add_status(CLI::App& app, Shared& shared, Run& run);
+void add_log(CLI::App& app, Shared& shared, Run& run);
+void add_cancel(CLI::App& app, Shared& shared, Run& run);
+void add_retry(CLI::App& app, Shared& shared, Run& run);
+void add_explain(CLI::App& app, Shared& shared, Run& run);
+void add_run(CLI::App& app, Shared& shared, Run& run);
+void add_get(CLI::App& app, Shared& shared, Run& run);
+void add_gc(CLI::App& app, Shared& shared, Run& run);
+void add_report(CLI::App& app, Shared& shared, Run& run);
+void add_validate(CLI::App& app, Shared& shared, Run& run);
+void add_study(CLI::App& app, Shared& shared, Run& run);
+
+/// A text of strangers for a terminal: no control characters, valid UTF-8, at most `most` bytes or so.
+std::string show(const std::string& text, std::size_t most = 200);
+/// A message of an error: as show(), and long ones whole.
+std::string show_message(const std::string& text);
+/// For JSON: valid UTF-8.
+Json::Value to_json(const std::string& text);
+/// "2026-11-20T20:22:30Z"; null for 0.
+Json::Value to_json_time(double unix_s);
+/// Prints one document and a line end. SystemError when standard output refuses.
+void print_json(const Json::Value& root);
+/// "1 h 04 min", "12.3 s".
+std::string format_seconds(double seconds);
+/// "1.2 GB"
+std::string format_bytes(double bytes);
+
+/// The file of a program of ours: beside this one, else in PATH; InputError when there is none.
+std::filesystem::path find_program(const std::string& name);
+/// The line that carillon-precompute --version prints. SystemError when it cannot be started.
+std::string read_solver_version();
+/// Starts a program in place of this one. Returns only by SystemError.
+[[noreturn]] void become(const std::filesystem::path& program, const std::vector<std::string>& arguments);
+
+/// The rows that `words` name: ids, prefixes of ids that fit one job, or job files (their last submission). InputError for what is none.
+std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words);
+/// The same of one word.
+registry::Job find_job(Shared& shared, const std::string& word);
+
+/// A row with its progress, its bank and its log, under the keys of docs/howto/jobs.md.
+Json::Value describe(Shared& shared, const registry::Job& job);
+/// The reason of a row with the file that the user named in place of its copy in the store.
+std::string find_reason(Shared& shared, const registry::Job& job);
+
+}  // namespace carillon::cli

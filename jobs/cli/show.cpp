@@ -1,0 +1,91 @@
+// Texts of strangers, numbers for people, JSON for programs.
+#include <fmt/core.h>
+
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <string_view>
+
+#include "jobs/cli/shared.hpp"
+#include "jobs/store/records.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+/// Characters that move the cursor, colour, or turn the direction of writing: C0, DEL, C1 (U+0080 - U+009F), U+200E, U+200F, U+202A -
+/// U+202E, U+2066 - U+2069. Length in bytes at `at`, 0 for others.
+std::size_t find_control(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  const unsigned a = byte(at), b = byte(at + 1), c = byte(at + 2);
+  if (a < 0x20 || a == 0x7F) return 1;
+  if (a == 0xC2 && b < 0xA0) return 2;
+  if (a == 0xE2 && b == 0x80 && (c == 0x8E || c == 0x8F || (c >= 0xAA && c <= 0xAE))) return 3;
+  if (a == 0xE2 && b == 0x81 && c >= 0xA6 && c <= 0xA9) return 3;
+  return 0;
+}
+
+std::string escape(const std::string& raw, std::size_t most) {
+  const std::string text = store::to_text(raw);
+  std::string result;
+  for (std::size_t at = 0; at < text.size();) {
+    // Cut only where a character begins.
+    if (result.size() >= most && (static_cast<unsigned char>(text[at]) & 0xC0U) != 0x80U) return result + "...";
+    const std::size_t control = find_control(text, at);
+    if (control == 0) {
+      result += text[at++];
+      continue;
+    }
+    if (text[at] == '\n')
+      result += "\\n";
+    else
+      for (std::size_t i = 0; i < control; ++i) result += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[at + i]));
+    at += control;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::string show(const std::string& text, std::size_t most) { return escape(text, most); }
+
+std::string show_message(const std::string& text) {
+  constexpr std::size_t kMostMessage = 4000;
+  return escape(text, kMostMessage);
+}
+
+Json::Value to_json(const std::string& text) { return Json::Value(store::to_text(text)); }
+
+Json::Value to_json_time(double unix_s) {
+  if (!(unix_s > 0) || unix_s > 1e11) return {};
+  const auto seconds = static_cast<std::time_t>(unix_s);
+  std::tm parts{};
+  ::gmtime_r(&seconds, &parts);
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday, parts.tm_hour,
+                     parts.tm_min, parts.tm_sec);
+}
+
+void print_json(const Json::Value& root) {
+  Json::StreamWriterBuilder writer;
+  writer["indentation"] = "  ";
+  writer["emitUTF8"] = true;
+  fmt::print("{}\n", Json::writeString(writer, root));
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+}
+
+std::string format_seconds(double seconds) {
+  if (!(seconds >= 0)) return "?";
+  if (seconds < 60) return fmt::format("{:.0f} s", seconds);
+  const auto whole = static_cast<long long>(std::min(seconds, 1e15));
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+std::string format_bytes(double bytes) {
+  constexpr std::string_view kUnits[] = {"B", "kB", "MB", "GB", "TB"};
+  std::size_t unit = 0;
+  for (; bytes >= 1000 && unit < 4; ++unit) bytes /= 1000;
+  return fmt::format("{:.{}f} {}", bytes, unit == 0 ? 0 : 1, kUnits[unit]);
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,154 @@
+// carillon status: where jobs stand.
+#include "jobs/cli/status.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "jobs/cli/follow.hpp"
+#include "jobs/process/process.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+constexpr std::size_t kMostRows = 50, kWideColumns = 1000, kBarWidth = 20;
+
+struct Options {
+  std::vector<std::string> words;
+  bool watch = false, all = false;
+};
+
+/// Running first, then what waits, what failed, what is done; the newest first among those that have ended.
+void sort_for_people(std::vector<registry::Job>& jobs) {
+  const auto rank = [](registry::State state) {
+    const std::map<registry::State, int> order{{registry::State::running, 0}, {registry::State::waiting, 1},   {registry::State::queued, 2},
+                                               {registry::State::failed, 3},  {registry::State::cancelled, 4}, {registry::State::done, 5}};
+    return order.at(state);
+  };
+  std::stable_sort(jobs.begin(), jobs.end(), [&](const registry::Job& a, const registry::Job& b) {
+    if (rank(a.state) != rank(b.state)) return rank(a.state) < rank(b.state);
+    return rank(a.state) >= 3 && a.ended_unix_s > b.ended_unix_s;
+  });
+}
+
+std::string format_counts(const std::vector<registry::Job>& jobs) {
+  std::map<registry::State, std::size_t> counts;
+  for (const registry::Job& job : jobs) ++counts[job.state];
+  std::string text = fmt::format("{} job{}", jobs.size(), jobs.size() == 1 ? "" : "s");
+  for (const auto& [state, count] : counts)
+    text += fmt::format("{} {} {}", text.find(':') == std::string::npos ? ":" : ",", count, to_text(state));
+  return text;
+}
+
+std::string format_bar(double percent) {
+  const auto full = static_cast<std::size_t>(std::lround(percent / 100.0 * kBarWidth));
+  return "[" + std::string(full, '#') + std::string(kBarWidth - full, '.') + "]";
+}
+
+std::string format_progress(Shared& shared, const registry::Job& job) {
+  const auto progress = store::read_progress(shared.store().work_folder(job.id));
+  if (!progress) return job.state == registry::State::running ? "starts" : "";
+  std::string text = fmt::format("{} {:3.0f} %  {}", format_bar(progress->percent), progress->percent, show(progress->phase, 30));
+  if (progress->modes_done >= 0)
+    text +=
+        fmt::format("  {}{} modes", progress->modes_done, progress->modes_wanted >= 0 ? fmt::format("/{}", progress->modes_wanted) : "");
+  if (progress->seconds_left >= 0 && job.state == registry::State::running)
+    text += fmt::format("  {} left", format_seconds(progress->seconds_left));
+  return text;
+}
+
+/// The sentence beside a state: why it failed or waits, and until when.
+std::string format_reason(Shared& shared, const registry::Job& job) {
+  std::string reason = show_message(find_reason(shared, job));
+  if (job.state == registry::State::waiting) {
+    const double left_s = job.ready_boot_id == process::find_boot() ? job.ready_boot_s - process::find_boot_seconds() : 0.0;
+    if (left_s > 0) reason += fmt::format("{}again in {}", reason.empty() ? "" : "; ", format_seconds(left_s));
+  }
+  return reason;
+}
+
+std::string cut(const std::string& text, std::size_t columns) {
+  std::size_t at = 0, seen = 0;
+  while (at < text.size() && seen < columns) {
+    ++at;
+    while (at < text.size() && (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U) ++at;
+    ++seen;
+  }
+  return text.substr(0, at);
+}
+
+int run_status(Shared& shared, const Options& options) {
+  shared.settle();
+  std::vector<registry::Job> jobs = options.words.empty() ? shared.registry().list() : find_jobs(shared, options.words);
+  if (options.watch) {
+    std::vector<store::Id> ids;
+    for (const registry::Job& job : jobs) {
+      const bool is_open =
+          job.state == registry::State::queued || job.state == registry::State::running || job.state == registry::State::waiting;
+      if (is_open || !options.words.empty()) ids.push_back(job.id);
+    }
+    if (ids.empty()) return 0;
+    return follow(shared, ids, true);
+  }
+  if (shared.json) {
+    Json::Value root;
+    root["store"] = to_json(shared.store().root().string());
+    root["jobs"] = Json::arrayValue;
+    for (const char* state : {"queued", "running", "waiting", "done", "failed", "cancelled"}) root["counts"][state] = 0;
+    for (const registry::Job& job : jobs) {
+      root["jobs"].append(describe(shared, job));
+      Json::Value& count = root["counts"][to_text(job.state)];
+      count = count.asInt() + 1;
+    }
+    print_json(root);
+    return 0;
+  }
+  if (jobs.empty()) {
+    fmt::print("no jobs in {}; carillon submit JOB.json asks for a bank\n", show(shared.store().root().string()));
+    return 0;
+  }
+  const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 2 + 1 : kMostRows;
+  for (const std::string& line : format_bars(shared, jobs, rows, kWideColumns)) fmt::print("{}\n", line);
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+  return 0;
+}
+
+}  // namespace
+
+std::vector<std::string> format_bars(Shared& shared, const std::vector<registry::Job>& unsorted, std::size_t rows, std::size_t columns) {
+  std::vector<registry::Job> jobs = unsorted;
+  sort_for_people(jobs);
+  std::vector<std::string> lines;
+  std::size_t shown = 0;
+  for (const registry::Job& job : jobs) {
+    const std::string reason = format_reason(shared, job);
+    if (lines.size() + (reason.empty() ? 1 : 2) + 2 > rows && jobs.size() > 1 && shown + 1 < jobs.size()) break;
+    ++shown;
+    const bool is_open = job.state == registry::State::running || job.state == registry::State::waiting;
+    const std::string progress = is_open ? format_progress(shared, job) : "";
+    lines.push_back(cut(fmt::format("{}  {:<9}  {}{}{}", job.id.short_text(), to_text(job.state), show(job.name, 40),
+                                    progress.empty() ? "" : "  ", progress),
+                        columns));
+    if (!reason.empty()) lines.push_back(cut(fmt::format("              {}", reason), columns));
+  }
+  if (shown < jobs.size()) lines.push_back(fmt::format("... and {} more; --all shows them", jobs.size() - shown));
+  lines.push_back(cut(format_counts(jobs), columns));
+  return lines;
+}
+
+void add_status(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("status", "Where jobs stand: state, phase, percent, modes, time left, and why one failed or waits.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, all jobs");
+  command->add_flag("--watch", options->watch,
+                    "Until they have ended: bars on a terminal, elsewhere one JSON object a line for every change. Exit code 0 when all "
+                    "are done, 3 when one failed");
+  command->add_flag("--all", options->all, "Every job, however many there are");
+  command->callback([&shared, &run, options] { run = [&shared, options] { return run_status(shared, *options); }; });
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,192 @@
+// carillon submit: jobs into the store and the registry. What is in the store already is not asked for again.
+#include <fmt/core.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "jobs/cli/follow.hpp"
+#include "jobs/cli/gather.hpp"
+#include "jobs/cli/options.hpp"
+#include "jobs/cli/shared.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+constexpr std::size_t kMostShown = 20;
+
+struct Options {
+  std::vector<std::string> words;
+  ResourceOptions resources;
+  bool wait = false, run = false, keep_going = false;
+};
+
+/// One line of the answer.
+struct Answer {
+  const Source* source = nullptr;
+  std::optional<registry::Job> job;  // none: its source has an error
+  bool is_new = false;               // this call made it
+};
+
+/// A row that was there: cancelled ones are wanted again, and what was asked for explicitly counts from now on.
+void renew(Shared& shared, const Options& options, const Source& source) {
+  shared.registry().update(store::require_id(source.request.id, "request"), [&](registry::Job& job) {
+    if (job.state == registry::State::running || job.state == registry::State::done) return false;
+    const bool is_lost = job.state == registry::State::failed && job.attempts == 0;  // its folder was gone, and is there again
+    const bool is_wanted = job.state == registry::State::cancelled || is_lost;
+    if (is_wanted) {
+      job.state = registry::State::queued;
+      job.reason.clear();
+      job.cancel_wanted = false;
+      job.failures = 0;
+    }
+    return options.resources.apply(job) || is_wanted;
+  });
+}
+
+std::vector<Answer> enter(Shared& shared, const Options& options, const std::vector<Source>& sources) {
+  const store::Lock lock = shared.store().lock_shared();
+  std::vector<registry::Submission> submissions;
+  std::vector<bool> was_made;
+  for (const Source& source : sources) {
+    if (!source.error.empty()) continue;
+    was_made.push_back(store::prepare_work(shared.store(), source.job, source.request));
+    submissions.push_back({source.job_file, source.request});
+  }
+  const std::vector<bool> was_inserted = shared.registry().submit(submissions);
+  std::vector<Answer> answers;
+  std::size_t at = 0;
+  for (const Source& source : sources) {
+    Answer& answer = answers.emplace_back();
+    answer.source = &source;
+    if (!source.error.empty()) continue;
+    const std::size_t index = at++;
+    if (!was_inserted[index]) renew(shared, options, source);
+    answer.is_new = was_made[index];
+    answer.job = shared.registry().find(store::require_id(source.request.id, "request"));
+  }
+  return answers;
+}
+
+void print_errors(const std::vector<Source>& sources) {
+  std::size_t count = 0;
+  for (const Source& source : sources) {
+    if (!source.error.empty() && ++count <= kMostShown) fmt::print(stderr, "carillon: {}\n", show_message(source.error));
+  }
+  if (count > kMostShown) fmt::print(stderr, "carillon: ... and {} more\n", count - kMostShown);
+}
+
+Json::Value describe_answers(Shared& shared, const std::vector<Answer>& answers) {
+  Json::Value root;
+  root["store"] = to_json(shared.store().root().string());
+  root["jobs"] = Json::arrayValue;
+  root["errors"] = Json::arrayValue;
+  for (const Answer& answer : answers) {
+    Json::Value entry;
+    if (answer.job) entry = describe(shared, *answer.job);
+    entry["job_file"] = to_json(answer.source->job_file);
+    if (answer.job) {
+      entry["new"] = answer.is_new;
+      root["jobs"].append(entry);
+    } else {
+      entry["error"] = to_json(answer.source->error);
+      root["errors"].append(entry);
+    }
+  }
+  return root;
+}
+
+void print_lines(Shared& shared, const std::vector<Answer>& answers) {
+  std::map<std::string, std::size_t> counts;
+  std::size_t shown = 0, total = 0;
+  for (const Answer& answer : answers) {
+    if (!answer.job) continue;
+    const registry::Job& job = *answer.job;
+    const std::string state = to_text(job.state) + (answer.is_new                        ? ""
+                                                    : job.state == registry::State::done ? ", nothing to do"
+                                                                                         : ", known");
+    ++counts[state];
+    if (++total <= kMostShown || job.state == registry::State::failed) {
+      ++shown;
+      fmt::print("{}  {:<22} {}\n", job.id.short_text(), state, show(answer.source->job_file));
+      if (job.state == registry::State::failed)
+        fmt::print("              it failed before: {}; carillon retry {} tries again\n", show_message(find_reason(shared, job)),
+                   job.id.short_text());
+    }
+  }
+  if (shown < total) fmt::print("... and {} more\n", total - shown);
+  if (total > 1) {
+    std::string sum;
+    for (const auto& [state, count] : counts) sum += fmt::format("{}{} {}", sum.empty() ? "" : "; ", count, state);
+    fmt::print("{} jobs: {}\n", total, sum);
+  }
+}
+
+bool is_open(const registry::Job& job) {
+  return job.state == registry::State::queued || job.state == registry::State::waiting || job.state == registry::State::running;
+}
+
+int run_submit(Shared& shared, const Options& options) {
+  const std::string engine = options.resources.engine.empty() ? shared.profile().engine : options.resources.engine;
+  std::vector<Source> sources = gather(options.words, read_solver_version());
+  bool is_bad = false, is_good = false;
+  for (Source& source : sources) {
+    options.resources.apply(source.request);
+    source.request.engine = engine;
+    (source.error.empty() ? is_good : is_bad) = true;
+  }
+  if (is_bad && !shared.json) print_errors(sources);
+  std::vector<Answer> answers;
+  if (!is_bad || (options.keep_going && is_good))
+    answers = enter(shared, options, sources);
+  else
+    for (const Source& source : sources) {
+      if (!source.error.empty()) answers.push_back({&source, {}, false});
+    }
+  if (is_bad && !(options.keep_going && is_good) && !shared.json) {
+    if (sources.size() > 1) fmt::print(stderr, "carillon: nothing was submitted; --keep-going submits the others\n");
+    return kExitInput;
+  }
+  std::vector<store::Id> ids;
+  for (const Answer& answer : answers) {
+    if (answer.job) ids.push_back(answer.job->id);
+  }
+  const bool follows = options.wait || options.run;
+  if (!shared.json) print_lines(shared, answers);
+  if (!follows && shared.json) print_json(describe_answers(shared, answers));
+  if (is_bad) std::fflush(stdout);
+  int code = is_bad ? kExitInput : 0;
+  if (follows && !ids.empty()) {
+    const int end = options.run ? run_until_done(shared, ids) : follow(shared, ids, false);
+    if (code == 0) code = end;
+    for (Answer& answer : answers) {
+      if (answer.job) answer.job = shared.registry().find(answer.job->id);
+    }
+    if (shared.json) print_json(describe_answers(shared, answers));
+  } else {
+    for (const Answer& answer : answers) {
+      if (code == 0 && answer.job && !is_open(*answer.job) && answer.job->state != registry::State::done) code = kExitSolve;
+    }
+  }
+  return code;
+}
+
+}  // namespace
+
+void add_submit(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("submit",
+                                         "Asks for banks. JOB.json is a job, a folder stands for its *.json, any other file is a manifest: "
+                                         "one job file a line, or one job as JSON on one\n"
+                                         "line; \"-\" reads a manifest from standard input. What is in the store already is not computed "
+                                         "again. All jobs are read before any is submitted.");
+  command->add_option("JOB", options->words, "Job files, folders, manifests")->required();
+  options->resources.add(*command);
+  command->add_flag("--keep-going", options->keep_going, "Submit the others when some jobs cannot be used (exit code 2 all the same)");
+  command->add_flag("--wait", options->wait, "Wait until they have ended; somebody has to run the queue (carillon run, or Slurm)");
+  command->add_flag("--run", options->run, "Work through the queue here until they have ended");
+  command->callback([&shared, &run, options] { run = [&shared, options] { return run_submit(shared, *options); }; });
+}
+
+}  // namespace carillon::cli
