@@ -46,6 +46,7 @@ void renew(Shared& shared, const Options& options, const Source& source) {
 }
 
 std::vector<Answer> enter(Shared& shared, const Options& options, const std::vector<Source>& sources) {
+  shared.registry();  // brought up to date before there are new folders
   const store::Lock lock = shared.store().lock_shared();
   std::vector<registry::Submission> submissions;
   std::vector<bool> was_made;

@@ -109,6 +109,9 @@ std::string format_request(const Request& request, bool one_line) {
   root["input_file"] = request.input_file;
   root["user"] = request.user;
   root["submitted_unix_s"] = request.submitted_unix_s;
+  for (const char* key : {"input_format", "input_sha256", "job_file", "input_file", "user"}) {
+    if (root[key].asString().empty()) root.removeMember(key);  // a text of a document of ours is never empty
+  }
   return write_json(root, one_line ? "" : "  ") + "\n";
 }
 
@@ -138,7 +141,7 @@ std::optional<Standing> read_standing(const fs::path& folder) {
 std::string format_standing(const Standing& standing) {
   Json::Value root;
   root["state"] = standing.state;
-  root["reason"] = standing.reason;
+  if (!standing.reason.empty()) root["reason"] = standing.reason;
   root["attempts"] = standing.attempts;
   root["failures"] = standing.failures;
   return write_json(root, "  ") + "\n";
