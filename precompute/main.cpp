@@ -16,6 +16,7 @@
 #include "precompute/io/interrupt.hpp"
 #include "precompute/io/run_job.hpp"
 #include "precompute/io/run_record.hpp"
+#include "precompute/io/validate.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -74,6 +75,9 @@ struct CommandLine {
     app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
+    CLI::Option* validate =
+        app.add_flag("--validate", options.validate, "check the job and its mesh, predict modes, memory and time, and solve nothing");
+    app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
@@ -96,29 +100,44 @@ bool is_first_of_all() {
   return true;
 }
 
+/// What was asked for, and the exit code.
+int carry_out(const petsc::Session& session, const CommandLine& words) {
+  const bool speaks = session.rank() == 0;
+  print_start(session, words.options.quiet || words.options.validate);
+  petsc::reserve_blas_memory(PETSC_COMM_WORLD);
+  if (words.options.validate) {
+    const std::string text = io::validate_job(PETSC_COMM_WORLD, words.job, words.options);
+    if (speaks) fmt::print("{}\n", text);
+    return 0;
+  }
+  const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, words.job, words.options);
+  if (summary.is_stopped) {
+    if (speaks) fmt::print(stderr, "carillon-precompute: {}\n", summary.result);
+    return kExitCheckpointed;
+  }
+  if (speaks && !words.options.quiet) fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
+  return 0;
+}
+
 int run(const petsc::Session& session, const CommandLine& words) {
   petsc::pin_blas_threads();
   MPI_Comm failures = MPI_COMM_NULL;
   MPI_Comm_dup(MPI_COMM_WORLD, &failures);
   int code = 0;
+  const auto end = [&](int why, const std::string& message) {
+    if (words.options.json && session.rank() == 0) fmt::print("{}\n", io::describe_failure(message, why));
+    code = fail(failures, session.rank(), why, message);
+  };
   try {
-    print_start(session, words.options.quiet);
-    petsc::reserve_blas_memory(PETSC_COMM_WORLD);
-    const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, words.job, words.options);
-    if (summary.is_stopped) {
-      code = kExitCheckpointed;
-      if (session.rank() == 0) fmt::print(stderr, "carillon-precompute: {}\n", summary.result);
-    } else if (session.rank() == 0 && !words.options.quiet) {
-      fmt::print("{}\n{}\n", summary.bank.string(), summary.result);
-    }
+    code = carry_out(session, words);
   } catch (const InputError& error) {
-    code = fail(failures, session.rank(), kExitInput, error.what());
+    end(kExitInput, error.what());
   } catch (const SolveError& error) {
-    code = fail(failures, session.rank(), kExitSolve, error.what());
+    end(kExitSolve, error.what());
   } catch (const std::bad_alloc&) {
-    code = fail(failures, session.rank(), kExitSystem, "out of memory; use a coarser mesh or a machine with more");
+    end(kExitSystem, "out of memory; use a coarser mesh or a machine with more");
   } catch (const std::exception& error) {
-    code = fail(failures, session.rank(), kExitSystem, error.what());
+    end(kExitSystem, error.what());
   }
   MPI_Comm_free(&failures);
   return code;

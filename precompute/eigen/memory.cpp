@@ -92,6 +92,8 @@ double to_gb(std::int64_t bytes) { return static_cast<double>(bytes) / 1e9; }
 
 }  // namespace
 
+std::int64_t find_memory_left() { return std::min({find_machine_left(), find_group_left(), find_process_left(find_usage())}); }
+
 void check_memory(MPI_Comm comm, std::int64_t need_bytes, std::int64_t limit_bytes, const std::string& what) {
   const Usage usage = find_usage();
   MPI_Comm host = MPI_COMM_NULL;

@@ -13,4 +13,7 @@ namespace carillon::eigen {
 /// together, if that is not 0. need_bytes: what this rank is about to allocate. what: "The factorisation of K - sigma M". Collective.
 void check_memory(MPI_Comm comm, std::int64_t need_bytes, std::int64_t limit_bytes, const std::string& what);
 
+/// What this process may still take [byte]: of the machine, its cgroups and its own limit. Local.
+std::int64_t find_memory_left();
+
 }  // namespace carillon::eigen

@@ -56,6 +56,16 @@ std::int64_t calc_copies_bytes(const Problem& problem) {
   return static_cast<std::int64_t>(8 * entries);
 }
 
+std::int64_t calc_kept_bytes(const Problem& problem) {
+  // Blocks of nine numbers, or one number, and the place of each.
+  MatInfo k, m;
+  check(MatGetInfo(problem.stiffness, MAT_LOCAL, &k));
+  check(MatGetInfo(problem.mass, MAT_LOCAL, &m));
+  PetscInt rows = 0;
+  check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
+  return static_cast<std::int64_t>(8.5 * k.nz_used + 1.5 * m.nz_used + 8 * 12.0 * rows);
+}
+
 std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count) {
   const bool is_cut = modes > kSliceModes;
   const std::int64_t locked = is_cut ? kSliceModes / 2 : rigid_count;
@@ -79,6 +89,7 @@ Outlook look_ahead(const Problem& problem, const Options& options, const std::fu
   outlook.rigid_count = static_cast<std::int64_t>(make_rigid_modes(problem.stiffness, problem.mass, problem.nodes, per_component).size());
   outlook.is_dense = n <= kDenseRows || options.method == Method::kDense;
   outlook.copies_bytes = calc_copies_bytes(problem);
+  outlook.copies_kept_bytes = calc_kept_bytes(problem);
   Options unlimited = options;
   unlimited.memory_limit_bytes = 0;
   if (unlimited.factorisation == Factorisation::kCholmod) unlimited.factorisation = Factorisation::kAutomatic;
@@ -92,6 +103,7 @@ Outlook look_ahead(const Problem& problem, const Options& options, const std::fu
   outlook.entries = factor.get_entries();
   outlook.flops = factor.get_flops();
   outlook.factor_bytes = factor.get_peak_bytes();
+  outlook.factor_kept_bytes = 8 * outlook.entries;
   if (!may_count(outlook)) return outlook;
   start = find_cpu_seconds();
   const Slice band = count_between([&](double lambda, double reach) { return counter.take(lambda, reach); }, scaling.to_scaled(ends.low),

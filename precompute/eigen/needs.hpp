@@ -30,6 +30,8 @@ Slice count_between(const std::function<Inertia(double lambda, double reach)>& t
 
 /// Of this rank [byte]. K and M by nodes, at their worst moment while their arrays grow, and the rigid modes.
 std::int64_t calc_copies_bytes(const Problem& problem);
+/// What stays of it while the solve goes on.
+std::int64_t calc_kept_bytes(const Problem& problem);
 /// The modes, the basis they are sought in, and those held away, for `rows` rows of this rank and so many modes.
 std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count);
 /// The matrices of a dense solve, on every rank.
@@ -37,11 +39,13 @@ std::int64_t calc_dense_bytes(std::int64_t unknowns);
 
 /// What can be said of a solve without solving.
 struct Outlook {
-  bool is_dense = false;          // LAPACK; nothing below is known but the count
-  std::int64_t entries = 0;       // of a factor, all ranks
-  double flops = 0;               // of a factorisation
-  std::int64_t factor_bytes = 0;  // at its worst moment on this rank
+  bool is_dense = false;               // LAPACK; nothing below is known but the count
+  std::int64_t entries = 0;            // of a factor, all ranks
+  double flops = 0;                    // of a factorisation
+  std::int64_t factor_bytes = 0;       // at its worst moment on this rank
+  std::int64_t factor_kept_bytes = 0;  // when it stands
   std::int64_t copies_bytes = 0;
+  std::int64_t copies_kept_bytes = 0;
   std::int64_t rigid_count = 0;
   double analyse_seconds = 0;
   double factor_seconds = 0;          // CPU, of one factorisation; 0: none was made

@@ -85,7 +85,7 @@ class Search {
  public:
   explicit Search(Run& run) : run_(run), asked_(*run.job.accuracy_cents) {
     report_.asked_cents = asked_;
-    tolerance_ = std::clamp(2e-8 * asked_, 1e-10, 1e-6);
+    tolerance_ = find_first_setting(run).tolerance;
   }
   AccurateBody solve();
 
@@ -343,13 +343,8 @@ Forecast Search::forecast_next() const {
 
 AccurateBody Search::solve() {
   if (run_.progress) run_.progress->expect_trials();
-  Setting setting;
-  setting.tolerance = tolerance_;
-  if (run_.job.body) {
-    setting.element = spec::Element::T10;
-    setting.nodes = run_.job.body->shape.empty() ? kCoarseSurfaceNodes : kCoarseShapeNodes;
-  } else {
-    setting.element = spec::Element::T4;
+  const Setting setting = find_first_setting(run_);
+  if (!run_.job.body) {
     petsc::run_agreed(run_.comm, [&] { is_refinable_ = run_.rank == 0 && !slabs::is_parallel_format(run_.job.mesh); });
   }
   for (Decision decision{0, setting}; decision.is_done == 0;) {
@@ -396,6 +391,14 @@ Json::Value describe_setting(const Setting& setting) {
 }
 
 }  // namespace
+
+Setting find_first_setting(const Run& run) {
+  Setting setting;
+  setting.tolerance = std::clamp(2e-8 * run.job.accuracy_cents.value_or(0), 1e-10, 1e-6);
+  setting.element = run.job.body ? spec::Element::T10 : spec::Element::T4;
+  if (run.job.body) setting.nodes = run.job.body->shape.empty() ? kCoarseSurfaceNodes : kCoarseShapeNodes;
+  return setting;
+}
 
 AccurateBody solve_to_accuracy(Run& run) { return Search(run).solve(); }
 

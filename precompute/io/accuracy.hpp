@@ -56,6 +56,9 @@ struct AccurateBody {
 /// what was reached, why no more, and what the next stricter setting would cost.
 AccurateBody solve_to_accuracy(Run& run);
 
+/// What solve_to_accuracy() tries first.
+Setting find_first_setting(const Run& run);
+
 /// The setting in words: "T10, body meshed with edges of 0.0021 m, tolerance 1e-07".
 std::string describe(const Setting& setting);
 

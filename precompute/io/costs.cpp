@@ -6,8 +6,9 @@
 #include "precompute/io/costs.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <ctime>
 #include <vector>
 
 namespace carillon::io {
@@ -19,30 +20,34 @@ constexpr double kUsualEntries = 270, kUsualEntryPower = 1.33;
 constexpr double kUsualFlops = 2.0e10, kUsualFlopPower = 1.7;  // of 100,000 unknowns
 constexpr double kDenseRows = 300;
 
-// CPU seconds.
-constexpr double kReadTet = 1.5e-6, kReadQuadraticTet = 4e-6;
-constexpr double kPartTet = 2e-6, kPartQuadraticTet = 4e-6;
-constexpr double kAssembleTet = 1e-6, kAssembleQuadraticTet = 6e-6;
-constexpr double kAnalyseNode = 8e-6;
-constexpr double kFactorFlop = 4e-11, kFactorEntry = 4e-9;
-constexpr double kSolveEntry = 1.1e-10;
-constexpr double kBasisNumber = 1.5e-10, kSmallNumber = 2e-9;
-constexpr double kCheckNumber = 4e-8, kCheckPair = 1e-10;
-constexpr double kErrorTet = 1e-8, kErrorQuadraticTet = 8e-8;
-constexpr double kCollectNumber = 3e-8, kWriteNumber = 5e-9;
+// CPU seconds on a Xeon of the Sapphire Rapids generation, AVX-512, two ranks of other programs beside it.
+constexpr double kStart = 0.08;
+constexpr double kReadTet = 1.5e-6, kReadQuadraticTet = 2e-6;
+constexpr double kPartTet = 1e-6, kPartQuadraticTet = 1e-6;
+constexpr double kAssembleTet = 1e-6, kAssembleQuadraticTet = 1.8e-5;
+constexpr double kAnalyseRow = 6e-6, kAnalyseQuadraticRow = 1.1e-5;  // K and M by nodes, rigid modes, elimination order
+constexpr double kFactorFlop = 2.2e-11, kFactorEntry = 6e-9;
+constexpr double kSolveEntry = 1.5e-10;
+constexpr double kBasisNumber = 1.2e-10, kSmallNumber = 4e-10;
+constexpr double kCheckNumber = 2e-8, kCheckPair = 1e-10;
+constexpr double kMended = 0.5;  // of the iteration: thin bodies have low modes that are sought once more
+constexpr double kErrorMode = 1.5e-8, kErrorQuadraticMode = 9e-8, kErrorTet = 6e-6;
+constexpr double kCollectNumber = 1e-8, kWriteNumber = 5e-9;
 
 double to_double(std::int64_t value) { return static_cast<double>(value); }
 
 }  // namespace
 
+std::int64_t count_slices(std::int64_t modes) { return std::max<std::int64_t>(1, (modes + kSliceModes - 1) / kSliceModes); }
+
 std::int64_t predict_solves(std::int64_t modes) {
-  const std::int64_t slices = std::max<std::int64_t>(1, (modes + kSliceModes - 1) / kSliceModes);
-  return (slices > 1 ? 27 : 21) * modes / 10 + 80 * slices;
+  const std::int64_t slices = count_slices(modes);
+  return 110 * slices + (slices > 1 ? 235 : 200) * modes / 100;
 }
 
 std::int64_t predict_factorisations(std::int64_t modes) {
   if (modes == 0) return 3;
-  return 2 + std::max<std::int64_t>(1, (modes + kSliceModes - 1) / kSliceModes);
+  return 2 + count_slices(modes);
 }
 
 Extent complete(Extent extent) {
@@ -67,21 +72,22 @@ Costs predict_costs(const Extent& known) {
   const double surface = 3 * to_double(extent.surface_nodes) * modes;
   const bool is_quadratic = extent.is_quadratic;
   Costs costs;
-  costs.read = extent.read_seconds > 0 ? extent.read_seconds : (is_quadratic ? kReadQuadraticTet : kReadTet) * tets;
+  costs.read = kStart + (extent.read_seconds > 0 ? extent.read_seconds : (is_quadratic ? kReadQuadraticTet : kReadTet) * tets);
   costs.partition = (is_quadratic ? kPartQuadraticTet : kPartTet) * tets;
   costs.assemble = (is_quadratic ? kAssembleQuadraticTet : kAssembleTet) * tets;
-  costs.errors = (is_quadratic ? kErrorQuadraticTet : kErrorTet) * tets * modes;
+  costs.errors = (is_quadratic ? kErrorQuadraticMode : kErrorMode) * tets * modes + kErrorTet * tets;
   costs.collect = kCollectNumber * surface;
   costs.write = kWriteNumber * surface;
   if (unknowns <= kDenseRows) return costs;
   const double solves = to_double(predict_solves(extent.modes));
-  const double slices = std::ceil(modes / to_double(kSliceModes));
-  const double columns = solves / std::max(slices, 1.0);  // of one basis
-  costs.analyse = kAnalyseNode * unknowns / 3;
-  costs.factor = to_double(predict_factorisations(extent.modes)) * (kFactorFlop * extent.factor_flops + kFactorEntry * entries);
+  const double columns = solves / to_double(count_slices(extent.modes));  // of one basis
+  const double factorisation = kFactorFlop * extent.factor_flops + kFactorEntry * entries;
+  costs.analyse = (is_quadratic ? kAnalyseQuadraticRow : kAnalyseRow) * unknowns;
+  costs.factor = to_double(predict_factorisations(extent.modes)) * factorisation;
   costs.solve = kSolveEntry * entries * solves;
   costs.orthogonalise = kBasisNumber * unknowns * columns * solves + kSmallNumber * columns * columns * solves;
   costs.check = kCheckNumber * shapes + kCheckPair * shapes * modes;
+  if (extent.is_thin && extent.modes > 0) costs.check += factorisation + kMended * (costs.solve + costs.orthogonalise);
   return costs;
 }
 
@@ -94,6 +100,22 @@ Costs calc_wall(const Costs& costs, const Extent& extent, int ranks) {
   return wall;
 }
 
-double measure_speed() { return 1; }
+double measure_speed() {
+  constexpr double kMultiplyAddsPerSecond = 4.9e9;  // there
+  constexpr std::size_t kNumbers = 1024;
+  constexpr int kPasses = 4000;
+  std::vector<double> x(kNumbers, 1.0), y(kNumbers, 0.0);
+  double best = 1e300;
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    const std::clock_t start = std::clock();
+    for (int pass = 0; pass < kPasses; ++pass) {
+      const double by = 1e-9 * pass;
+      for (std::size_t i = 0; i < kNumbers; ++i) y[i] += by * x[i];
+      x[static_cast<std::size_t>(pass) % kNumbers] += 1e-12 * y[0];
+    }
+    best = std::min(best, static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
+  }
+  return std::clamp(kNumbers * static_cast<double>(kPasses) / std::max(best, 1e-6) / kMultiplyAddsPerSecond, 0.05, 20.0);
+}
 
 }  // namespace carillon::io

@@ -13,6 +13,7 @@ struct Extent {
   std::int64_t surface_nodes = 0;
   bool is_quadratic = true;
   bool is_lumped = false;       // M is diagonal
+  bool is_thin = false;         // walls thinner than half a shear wave
   bool is_read_by_all = false;  // the file is read by all ranks
   double read_seconds = 0;      // what reading or meshing took, or will
   double factor_flops = 0;      // of one factorisation
@@ -40,6 +41,7 @@ struct Costs {
 
 /// Right-hand sides that the iteration solves for so many modes, and factorisations with those of the counts.
 std::int64_t predict_solves(std::int64_t modes);
+std::int64_t count_slices(std::int64_t modes);
 std::int64_t predict_factorisations(std::int64_t modes);
 
 /// Fills the guesses into what is unknown.

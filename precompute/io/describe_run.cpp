@@ -3,7 +3,6 @@
 #include <json/json.h>
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
 namespace carillon::io {
@@ -104,15 +103,29 @@ Json::Value describe_phases(const Run& run, const eigen::Modes& modes) {
 
 /// What all ranks together did so far; unlike seconds it does not depend on the machine's mood. Phases are those of describe_phases(),
 /// trials of other settings among them, and "other" is what lies between.
-Json::Value describe_work(const std::array<petsc::Work, petsc::kWorkPhases>& work) {
+Json::Value describe_work(const petsc::WorkTable& table) {
   Json::Value phases(Json::objectValue);
-  for (std::size_t i = 0; i < work.size(); ++i) {
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const petsc::Work& work = table[i].work;
     Json::Value& entry = phases[petsc::kWorkPhaseNames[i]];
-    entry["flops"] = work[i].flops;
-    entry["messages"] = work[i].messages;
-    entry["bytes"] = work[i].bytes;
-    entry["collectives"] = work[i].collectives;
-    entry["collective_bytes"] = work[i].collective_bytes;
+    entry["flops"] = work.flops;
+    entry["messages"] = work.messages;
+    entry["bytes"] = work.bytes;
+    entry["collectives"] = work.collectives;
+    entry["collective_bytes"] = work.collective_bytes;
+  }
+  return phases;
+}
+
+/// What it took them, in seconds of all ranks together.
+Json::Value describe_effort(const petsc::WorkTable& table) {
+  Json::Value phases(Json::objectValue);
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const petsc::Effort& effort = table[i].effort;
+    Json::Value& entry = phases[petsc::kWorkPhaseNames[i]];
+    entry["cpu_seconds"] = effort.cpu_seconds;
+    entry["wall_seconds"] = effort.wall_seconds;
+    entry["mpi_seconds"] = effort.mpi_seconds;
   }
   return phases;
 }
@@ -197,6 +210,7 @@ Json::Value describe_run(const Run& run, const Setting& setting, const Body& bod
   }
   root["phase_seconds"] = describe_phases(run, solved.modes);
   root["work"] = describe_work(measured.work);
+  root["effort"] = describe_effort(measured.work);
   for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(Json::Int64(bytes));
   root["solver_options"] = make_list(run.options.solver_options);
   root["chosen"]["element"] = spec::to_text(setting.element);

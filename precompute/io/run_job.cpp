@@ -17,6 +17,7 @@
 #include "precompute/io/describe_run.hpp"
 #include "precompute/io/fingerprint.hpp"
 #include "precompute/io/interrupt.hpp"
+#include "precompute/io/open_job.hpp"
 #include "precompute/io/run.hpp"
 #include "precompute/io/solve_body.hpp"
 #include "precompute/io/surface_modes.hpp"
@@ -27,37 +28,6 @@ namespace carillon::io {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::uint64_t kMaxJobBytes = 16 << 20;
-
-/// Rank 0 reads the text; all ranks parse it, so that all fail alike.
-spec::JobSpec read_shared_job(const Run& run, const fs::path& file) {
-  std::string text;
-  petsc::run_agreed(run.comm, [&] {
-    if (run.rank == 0) text = config::read_file(file, "job file", kMaxJobBytes);
-  });
-  auto size = static_cast<std::int64_t>(text.size());
-  MPI_Bcast(&size, 1, MPI_INT64_T, 0, run.comm);
-  text.resize(static_cast<std::size_t>(size));
-  MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, 0, run.comm);
-  spec::JobSpec job;
-  petsc::run_agreed(run.comm, [&] { job = spec::parse_job(text, fs::absolute(file)); });
-  return job;
-}
-
-void check_job(const Run& run) {
-  petsc::run_agreed(run.comm, [&] {
-    eigen::check_solver_options();
-    if (run.ranks > 1 && run.job.factorisation == spec::Factorisation::cholmod) {
-      throw InputError(
-          fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
-                      run.job.file.string(), run.ranks));
-    }
-    if (run.rank != 0) return;
-    config::check_writable(run.job.bank, "bank");
-    config::check_writable(spec::find_resolved_path(run.job.bank), "resolved job");
-  });
-}
 
 /// The file in which others see how far the run is; from now on it is written.
 void open_progress(Run& run) {
@@ -159,8 +129,7 @@ void open_checkpoint(Run& run) {
 }
 
 RunSummary carry_out(Run& run, const fs::path& job_file) {
-  run.job = read_shared_job(run, job_file);
-  check_job(run);
+  open_job(run, job_file);
   open_progress(run);
   open_checkpoint(run);
   AccurateBody found;

@@ -3,7 +3,6 @@
 
 #include <mpi.h>
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -67,8 +66,8 @@ std::vector<std::int64_t> gather_peak_bytes(MPI_Comm comm);
 
 /// What a run has taken and done so far.
 struct Measured {
-  std::vector<std::int64_t> peak_bytes;                // of each rank; on rank 0
-  std::array<petsc::Work, petsc::kWorkPhases> work{};  // of all ranks
+  std::vector<std::int64_t> peak_bytes;  // of each rank; on rank 0
+  petsc::WorkTable work{};               // of all ranks
 };
 
 /// Collective.

@@ -21,17 +21,6 @@
 namespace carillon::io {
 namespace {
 
-eigen::NodeLayout make_layout(fem::Distribution& pieces) {
-  eigen::NodeLayout layout;
-  const auto free_nodes = pieces.local.free_nodes;
-  layout.position.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + free_nodes);
-  layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + free_nodes);
-  layout.component_count = pieces.components;
-  layout.held = pieces.held_m;
-  layout.elimination_position = std::move(pieces.elimination_position);
-  return layout;
-}
-
 /// A line whenever the phase changes or another tenth of the modes is done.
 class ProgressLines {
  public:
@@ -105,13 +94,7 @@ void check_method(const Run& run, std::int64_t unknowns) {
 }
 
 eigen::Modes solve(Run& run, const Setting& setting, const fem::System& system, eigen::NodeLayout layout) {
-  eigen::Options options;
-  options.low_hz = run.job.band_hz[0];
-  options.high_hz = run.job.band_hz[1];
-  if (run.job.max_modes) options.max_modes = *run.job.max_modes;
-  options.tolerance = setting.tolerance;
-  options.factorisation = find_factorisation(run.job.factorisation);
-  options.method = find_method(run.job.method);
+  eigen::Options options = make_options(run, setting);
   if (run.checkpoint) options.checkpoint = &run.checkpoint->get();
   ProgressLines lines(run);
   options.progress = [&lines](const eigen::Progress& progress) { lines(progress); };
@@ -203,8 +186,29 @@ void warn_of_locking(Run& run, const spec::Material& material, bool is_linear) {
 
 }  // namespace
 
-SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
-  SolvedBody solved;
+eigen::Options make_options(const Run& run, const Setting& setting) {
+  eigen::Options options;
+  options.low_hz = run.job.band_hz[0];
+  options.high_hz = run.job.band_hz[1];
+  if (run.job.max_modes) options.max_modes = *run.job.max_modes;
+  options.tolerance = setting.tolerance;
+  options.factorisation = find_factorisation(run.job.factorisation);
+  options.method = find_method(run.job.method);
+  return options;
+}
+
+eigen::NodeLayout make_layout(fem::Distribution& pieces) {
+  eigen::NodeLayout layout;
+  const auto free_nodes = pieces.local.free_nodes;
+  layout.position.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + free_nodes);
+  layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + free_nodes);
+  layout.component_count = pieces.components;
+  layout.held = pieces.held_m;
+  layout.elimination_position = std::move(pieces.elimination_position);
+  return layout;
+}
+
+fem::System assemble_body(Run& run, const Setting& setting, Body& body, SolvedBody& solved) {
   check_method(run, 3 * body.pieces.free_nodes);
   const bool is_linear = setting.element == spec::Element::T4;
   run.stations.begin("assemble", fmt::format("{} unknowns, {}, {} mass", 3 * body.pieces.free_nodes, spec::to_text(setting.element),
@@ -217,6 +221,12 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   solved.rigid = fem::calc_rigid_body(run.comm, body.pieces.local, solved.materials);
   for (const spec::Material& material : solved.materials.list) warn_of_locking(run, material, is_linear);
   run.stations.end();
+  return system;
+}
+
+SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
+  SolvedBody solved;
+  const fem::System system = assemble_body(run, setting, body, solved);
 
   begin_checkpoint(run, setting, body);
   solved.modes = solve_named(run, setting, body, system, make_layout(body.pieces));

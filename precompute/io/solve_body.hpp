@@ -21,6 +21,14 @@ struct SolvedBody {
   estimate::ErrorBars bars;
 };
 
+/// The solver's, of the job.
+eigen::Options make_options(const Run& run, const Setting& setting);
+/// Where the free nodes are; takes the elimination order from the pieces.
+eigen::NodeLayout make_layout(fem::Distribution& pieces);
+
+/// The first half of solve_body(): materials, K and M, volumes, the rigid body. Station "assemble". Collective, throws as solve_body().
+fem::System assemble_body(Run& run, const Setting& setting, Body& body, SolvedBody& solved);
+
 /// Assembles K and M, solves for the modes of the job's band, and says how wrong they can be. Stations "assemble", "modes", "errors". K and
 /// M are gone afterwards, and the elimination order of the body with them.
 /// Collective. Throws on every rank: InputError, SolveError, SystemError, with the body and the job named.

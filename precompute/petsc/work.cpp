@@ -7,6 +7,7 @@
 #include <dlfcn.h>
 #include <petscsys.h>
 
+#include <ctime>
 #include <unordered_map>
 
 // petscsys.h counts some of the calls by macros of the same names.
@@ -33,21 +34,57 @@
 #undef MPI_Scatterv
 #undef MPI_Alltoall
 #undef MPI_Alltoallv
+#undef MPI_Recv
+#undef MPI_Probe
+#undef MPI_Wait
+#undef MPI_Waitall
+#undef MPI_Waitany
+#undef MPI_Waitsome
 
 namespace carillon::petsc {
 namespace {
 
-std::array<Work, kWorkPhases> totals{};
-Work* current = totals.data();
+WorkTable totals{};
+PhaseWork* phase_at_hand = totals.data();
 double petsc_flops = 0;  // booked so far
 
 /// PETSc counts on its own; what it has counted since the last look belongs to the phase at hand.
 void book_petsc_flops() {
   PetscLogDouble all = 0;
   if (PetscInitializeCalled == PETSC_FALSE || PetscGetFlops(&all) != 0) return;
-  current->flops += all - petsc_flops;
+  phase_at_hand->work.flops += all - petsc_flops;
   petsc_flops = all;
 }
+
+double read_clock(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double cpu_booked_s = 0;
+double wall_booked_s = 0;  // of CLOCK_MONOTONIC; 0 before the first look
+
+void book_time() {
+  const double cpu_s = read_clock(CLOCK_PROCESS_CPUTIME_ID);
+  const double wall_s = read_clock(CLOCK_MONOTONIC);
+  phase_at_hand->effort.cpu_seconds += cpu_s - cpu_booked_s;
+  if (wall_booked_s > 0) phase_at_hand->effort.wall_seconds += wall_s - wall_booked_s;
+  cpu_booked_s = cpu_s;
+  wall_booked_s = wall_s;
+}
+
+/// Books the time of its life as inside MPI.
+class Inside {
+ public:
+  Inside() : start_s_(read_clock(CLOCK_MONOTONIC)) {}
+  ~Inside() { phase_at_hand->effort.mpi_seconds += read_clock(CLOCK_MONOTONIC) - start_s_; }
+  Inside(const Inside&) = delete;
+  Inside& operator=(const Inside&) = delete;
+
+ private:
+  double start_s_;
+};
 
 double calc_bytes(double count, MPI_Datatype type) {
   int size = 0;
@@ -56,13 +93,13 @@ double calc_bytes(double count, MPI_Datatype type) {
 }
 
 void book_send(double count, MPI_Datatype type) {
-  current->messages += 1;
-  current->bytes += calc_bytes(count, type);
+  phase_at_hand->work.messages += 1;
+  phase_at_hand->work.bytes += calc_bytes(count, type);
 }
 
 void book_collective(double count, MPI_Datatype type) {
-  current->collectives += 1;
-  current->collective_bytes += count > 0 ? calc_bytes(count, type) : 0;
+  phase_at_hand->work.collectives += 1;
+  phase_at_hand->work.collective_bytes += count > 0 ? calc_bytes(count, type) : 0;
 }
 
 double sum_counts(const int* counts, MPI_Comm comm) {
@@ -87,8 +124,8 @@ std::unordered_map<MPI_Request, double>& get_persistent() {
 void book_start(MPI_Request request) {
   const auto found = get_persistent().find(request);
   if (found == get_persistent().end()) return;
-  current->messages += 1;
-  current->bytes += found->second;
+  phase_at_hand->work.messages += 1;
+  phase_at_hand->work.bytes += found->second;
 }
 
 /// The definition that comes after this program's.
@@ -101,20 +138,22 @@ Function* find_next(const char* name) {
 
 WorkPhase set_work_phase(WorkPhase phase) {
   book_petsc_flops();
-  const auto before = static_cast<WorkPhase>(current - totals.data());
-  current = totals.data() + static_cast<std::size_t>(phase);
+  book_time();
+  const auto before = static_cast<WorkPhase>(phase_at_hand - totals.data());
+  phase_at_hand = totals.data() + static_cast<std::size_t>(phase);
   return before;
 }
 
-void add_flops(double flops) { current->flops += flops; }
+void add_flops(double flops) { phase_at_hand->work.flops += flops; }
 
-std::array<Work, kWorkPhases> find_work() {
+WorkTable find_work() {
   book_petsc_flops();
+  book_time();
   return totals;
 }
 
-std::array<Work, kWorkPhases> sum_work(MPI_Comm comm) {
-  std::array<Work, kWorkPhases> sums = find_work();
+WorkTable sum_work(MPI_Comm comm) {
+  WorkTable sums = find_work();
   PMPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sizeof sums / sizeof(double)), MPI_DOUBLE, MPI_SUM, comm);
   return sums;
 }
@@ -128,6 +167,7 @@ using namespace carillon::petsc;
   int name parameters {                                        \
     static const auto next = find_next<decltype(name)>(#name); \
     booked;                                                    \
+    const Inside inside;                                       \
     return next arguments;                                     \
   }
 
@@ -174,6 +214,13 @@ CARILLON_COUNT(b == MPI_IN_PLACE ? book_collective(sum_counts(m, c), u) : book_c
 CARILLON_COUNT(book_start(*q), MPI_Start, (MPI_Request * q), (q))
 CARILLON_COUNT(for (int i = 0; i < n; ++i) book_start(q[i]), MPI_Startall, (int n, MPI_Request q[]), (n, q))
 CARILLON_COUNT(get_persistent().erase(*q), MPI_Request_free, (MPI_Request * q), (q))
+
+CARILLON_COUNT({}, MPI_Recv, (void* b, int n, MPI_Datatype t, int r, int g, MPI_Comm c, MPI_Status* s), (b, n, t, r, g, c, s))
+CARILLON_COUNT({}, MPI_Probe, (int r, int g, MPI_Comm c, MPI_Status* s), (r, g, c, s))
+CARILLON_COUNT({}, MPI_Wait, (MPI_Request * q, MPI_Status* s), (q, s))
+CARILLON_COUNT({}, MPI_Waitall, (int n, MPI_Request q[], MPI_Status s[]), (n, q, s))
+CARILLON_COUNT({}, MPI_Waitany, (int n, MPI_Request q[], int* i, MPI_Status* s), (n, q, i, s))
+CARILLON_COUNT({}, MPI_Waitsome, (int n, MPI_Request q[], int* o, int i[], MPI_Status s[]), (n, q, o, i, s))
 
 int MPI_Send_init(const void* b, int n, MPI_Datatype t, int r, int g, MPI_Comm c, MPI_Request* q) {
   static const auto next = find_next<decltype(MPI_Send_init)>("MPI_Send_init");

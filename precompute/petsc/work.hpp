@@ -17,6 +17,13 @@ struct Work {
   double collective_bytes = 0;  // what the ranks put into them
 };
 
+/// What it took, which does depend on the machine's mood. Seconds summed over the ranks, where there are several.
+struct Effort {
+  double cpu_seconds = 0;  // user and system
+  double wall_seconds = 0;
+  double mpi_seconds = 0;  // of wall_seconds: inside MPI, transfers and waiting for others
+};
+
 enum class WorkPhase { kOther, kRead, kPartition, kAssemble, kFactor, kSolve, kOrthogonalise, kErrors, kWrite };
 inline constexpr std::size_t kWorkPhases = 9;
 inline constexpr std::array<const char*, kWorkPhases> kWorkPhaseNames{"other", "read",          "partition", "assemble", "factor",
@@ -40,11 +47,17 @@ class WorkScope {
 /// Operations of this process that PETSc does not know of.
 void add_flops(double flops);
 
+struct PhaseWork {
+  Work work;
+  Effort effort;
+};
+using WorkTable = std::array<PhaseWork, kWorkPhases>;
+
 /// Of this process so far, by phase. Messages are counted where the program calls MPI, through its profiling interface: calls from Fortran
 /// (MUMPS) and on several threads are not seen. Local.
-std::array<Work, kWorkPhases> find_work();
+WorkTable find_work();
 
 /// The same of all ranks together, on every rank. Collective.
-std::array<Work, kWorkPhases> sum_work(MPI_Comm comm);
+WorkTable sum_work(MPI_Comm comm);
 
 }  // namespace carillon::petsc

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <system_error>
 
 #include "precompute/mesh/check_parts.hpp"
 #include "precompute/slabs/settle.hpp"
@@ -107,6 +108,8 @@ void collect_warnings(mesh::CheckReport& report) {
 bool is_parallel_format(const std::filesystem::path& file) {
   constexpr char kSignature[] = "\x89HDF\r\n\x1a\n";
   std::array<char, 8> begin{};
+  std::error_code error;  // A pipe without a writer would keep us waiting.
+  if (!std::filesystem::is_regular_file(file, error)) return false;
   std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
   return std::equal(begin.begin(), begin.end(), kSignature);
 }

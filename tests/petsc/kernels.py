@@ -10,7 +10,7 @@ import unittest
 
 ROOT = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"])
 PROGRAM = pathlib.Path(os.environ["CARILLON_BIN_DIR"]) / "carillon-precompute"
-sys.path.insert(0, str(ROOT / "tests/bench/precompute"))
+sys.path.insert(0, str(ROOT / "jobs/study"))
 import measuring
 
 RULES = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_CORETYPE", "CARILLON_KERNELS"))}

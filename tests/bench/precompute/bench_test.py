@@ -9,7 +9,7 @@ import xml.dom.minidom
 
 import numpy
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(__file__).resolve().parents[3] / "jobs/study")]
 import measuring
 import system
 

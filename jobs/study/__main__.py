@@ -1,0 +1,114 @@
+"""carillon-study: how a job's cost grows with its mesh and falls with the ranks.
+
+    carillon-study scaling JOB.json [-o FOLDER] [--ranks 1,2,4] [--nodes 2500,5000,10000] [--repeats 3]
+    carillon-study scaling JOB.json --quick --record FILE | --check FILE
+
+Exit codes: 0 done, 2 the input cannot be used, 3 the work has grown, 4 the machine refused.
+"""
+import argparse
+import os
+import pathlib
+import shutil
+import signal
+import sys
+
+import report
+import scaling
+import work
+
+
+def find_program(given):
+    """carillon-precompute: given, beside this program, or on the way of commands."""
+    if given:
+        candidates = [pathlib.Path(given) / "carillon-precompute"]
+    else:
+        beside = pathlib.Path(sys.argv[0]).resolve().parent / "carillon-precompute"
+        found = shutil.which("carillon-precompute")
+        candidates = [beside] + ([pathlib.Path(found)] if found else [])
+    for candidate in candidates:
+        if os.access(candidate, os.X_OK) and candidate.is_file():
+            return candidate.resolve()
+    raise scaling.InputError(f"carillon-precompute is not at {candidates[0]}; give its folder with --bin")
+
+
+def read_numbers(name, least):
+    def read(text):
+        try:
+            numbers = sorted({int(word) for word in text.split(",")})
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r}: give whole numbers with commas between them, like 1,2,4")
+        if numbers[0] < least:
+            raise argparse.ArgumentTypeError(f"{numbers[0]}: {name} are {least} or more")
+        return numbers
+    return read
+
+
+def read_count(text):
+    numbers = read_numbers("repeats", 1)(text)
+    if len(numbers) != 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: give one number")
+    return numbers[0]
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        raise scaling.InputError(message + "; carillon-study scaling --help says what there is")
+
+
+def make_parser():
+    parser = Parser(prog="carillon-study", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
+    one = commands.add_parser("scaling", help="strong and weak scaling, growth with the mesh, and what limits each phase",
+                              description="Solves a job on several numbers of ranks and, where the job has a \"body\", on meshes of several sizes; writes a report "
+                              "(report.md, cases.csv and SVG pictures). A job with a \"mesh\" file has one mesh, and gets strong scaling only.")
+    one.add_argument("job", metavar="JOB.json", help="a job of carillon-precompute")
+    one.add_argument("-o", "--out", metavar="FOLDER", default="study", help="where everything goes (default: study)")
+    one.add_argument("--ranks", type=read_numbers("ranks", 1), metavar="1,2,4", help="numbers of ranks (default: 1,2,4); more than there are cores are marked")
+    one.add_argument("--nodes", "--sizes", dest="nodes", type=read_numbers("nodes", 8), metavar="N,N,N",
+                     help="meshes of the body; the largest serves for strong scaling (default: a quarter, half and all of the job's)")
+    one.add_argument("--repeats", type=read_count, help="of every case, all cases in turn (default: 3)")
+    one.add_argument("--quick", action="store_true", help="meshes of 600 and 1200 nodes, 1 and 2 ranks, one repeat, unless given otherwise")
+    one.add_argument("--record", metavar="FILE", help="keep the work per phase (operations, messages, bytes) in this file")
+    one.add_argument("--check", metavar="FILE", help="compare the work per phase with this file's, and fail where it has grown by more than 5 %%")
+    one.add_argument("--timeout", type=float, default=3600, help="seconds that one run may take (default: 3600)")
+    one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: beside this program)")
+    return parser
+
+
+def run(arguments):
+    options = make_parser().parse_args(arguments)
+    if options.record and options.check:
+        raise scaling.InputError("--record and --check exclude each other: one writes what the other reads")
+    recorded = work.read(options.check) if options.check else None
+    study = scaling.Study(options, find_program(options.bin))
+    study.run()
+    report.write(study)
+    print(f"{study.out / 'report.md'}", flush=True)
+    if options.record:
+        work.write(options.record, study)
+        print(f"{options.record}: the work of {len(study.cases)} cases", flush=True)
+    if recorded is not None:
+        work.check(recorded, study, options)
+    return 0
+
+
+def main():
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        return run(sys.argv[1:])
+    except scaling.InputError as error:
+        code, text = 2, error
+    except work.HasGrown as error:
+        code, text = 3, error
+    except scaling.RunError as error:
+        code, text = error.code, error
+    except OSError as error:
+        code, text = 4, error
+    except KeyboardInterrupt:
+        return 130
+    print(f"carillon-study: error: {text}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

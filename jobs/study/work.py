@@ -1,0 +1,81 @@
+"""The work of a study, kept in a file and compared with it: operations, messages and bytes per phase."""
+import json
+import os
+import pathlib
+
+import scaling
+
+QUANTITIES = ("flops", "messages", "bytes", "collectives", "collective_bytes")
+MOST_GROWTH = 0.05
+FORMAT = 1
+
+
+class HasGrown(Exception):
+    pass
+
+
+def collect(study):
+    """[{"nodes", "ranks", "unknowns", "modes", "work": {phase: {quantity: number}}}]."""
+    return [{"nodes": case.nodes, "ranks": case.ranks, "unknowns": study.get_unknowns(case), "modes": study.runs[case][0]["solver"]["modes"],
+             "work": study.get_work(case)} for case in study.cases]
+
+
+def write(path, study):
+    text = json.dumps({"format": FORMAT, "job": study.job, "cases": collect(study)}, indent=1, sort_keys=True) + "\n"
+    path = pathlib.Path(path)
+    fresh = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        fresh.write_text(text)
+        os.replace(fresh, path)
+    except OSError as error:
+        fresh.unlink(missing_ok=True)
+        raise scaling.InputError(f"{path}: the record cannot be written: {error.strerror}") from None
+
+
+def read(path):
+    try:
+        record = json.loads(pathlib.Path(path).read_text())
+    except (OSError, UnicodeDecodeError) as error:
+        raise scaling.InputError(f"{path}: the record cannot be read: {error}; make one with --record {path}") from None
+    except json.JSONDecodeError as error:
+        raise scaling.InputError(f"{path}:{error.lineno}: the record is no JSON: {error.msg}; make it anew with --record {path}") from None
+    if not isinstance(record, dict) or record.get("format") != FORMAT or not isinstance(record.get("cases"), list):
+        raise scaling.InputError(f"{path}: this is no record of a study; make one with --record {path}")
+    return record
+
+
+def compare(recorded, cases):
+    """[(case, phase, quantity, recorded, now)] of all that differ by more than the growth allowed, worst first."""
+    found = {(case["nodes"], case["ranks"]): case for case in cases}
+    differences = []
+    for old in recorded:
+        new = found.get((old["nodes"], old["ranks"]))
+        if new is None:
+            raise scaling.InputError(f"the record has a case of {old['nodes']} nodes on {old['ranks']} ranks, and the study has none: take the options it was made with")
+        for phase in sorted({*old["work"], *new["work"]}):
+            for quantity in QUANTITIES:
+                before, now = (side["work"].get(phase, {}).get(quantity, 0) for side in (old, new))
+                if now > before * (1 + MOST_GROWTH) or now < before * (1 - MOST_GROWTH):
+                    differences.append((old, phase, quantity, before, now))
+    return sorted(differences, key=lambda entry: -entry[4] / max(entry[3], 1))
+
+
+def check(record, study, options):
+    """Raises HasGrown with all that has; says what has shrunk."""
+    if record["job"] != study.job:
+        raise scaling.InputError(f"{options.check}: the record is of another job than {study.job_file}; make it anew with --record")
+    differences = compare(record["cases"], collect(study))
+    lines = {True: [], False: []}
+    for case, phase, quantity, before, now in differences:
+        change = f"{100 * (now / before - 1):+.1f} %" if before else "new"
+        lines[now > before].append(f"  {case['nodes']} nodes, {case['ranks']} ranks, {phase}: {quantity} {before:.0f} -> {now:.0f} ({change})")
+    command = f"carillon-study scaling {options.job}{' --quick' if options.quick else ''} --record {options.check}"
+    for given, flag in ((options.ranks, "--ranks"), (options.nodes, "--nodes")):
+        if given:
+            command += f" {flag} {','.join(map(str, given))}"
+    if lines[False]:
+        print("less work than recorded; record it:\n" + "\n".join(lines[False]), flush=True)
+    if lines[True]:
+        raise HasGrown(f"the work has grown by more than {100 * MOST_GROWTH:.0f} % against {options.check}:\n" + "\n".join(lines[True]) +
+                       f"\nIf that is meant, record it in the same commit:\n  {command}")
+    print(f"{options.check}: the work is as recorded, within {100 * MOST_GROWTH:.0f} %", flush=True)

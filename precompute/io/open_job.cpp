@@ -1,0 +1,55 @@
+#include "precompute/io/open_job.hpp"
+
+#include <fmt/core.h>
+
+#include <cstdint>
+#include <string>
+
+#include "precompute/eigen/solver_options.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMaxJobBytes = 16 << 20;
+
+/// Rank 0 reads the text; all ranks parse it, so that all fail alike.
+spec::JobSpec read_shared_job(const Run& run, const fs::path& file) {
+  std::string text;
+  petsc::run_agreed(run.comm, [&] {
+    if (run.rank == 0) text = config::read_file(file, "job file", kMaxJobBytes);
+  });
+  auto size = static_cast<std::int64_t>(text.size());
+  MPI_Bcast(&size, 1, MPI_INT64_T, 0, run.comm);
+  text.resize(static_cast<std::size_t>(size));
+  MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, 0, run.comm);
+  spec::JobSpec job;
+  petsc::run_agreed(run.comm, [&] { job = spec::parse_job(text, fs::absolute(file)); });
+  return job;
+}
+
+void check_job(const Run& run) {
+  petsc::run_agreed(run.comm, [&] {
+    eigen::check_solver_options();
+    if (run.ranks > 1 && run.job.factorisation == spec::Factorisation::cholmod) {
+      throw InputError(
+          fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
+                      run.job.file.string(), run.ranks));
+    }
+    if (run.rank != 0) return;
+    config::check_writable(run.job.bank, "bank");
+    config::check_writable(spec::find_resolved_path(run.job.bank), "resolved job");
+  });
+}
+
+}  // namespace
+
+void open_job(Run& run, const fs::path& file) {
+  run.job = read_shared_job(run, file);
+  check_job(run);
+}
+
+}  // namespace carillon::io

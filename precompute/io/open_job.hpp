@@ -1,0 +1,14 @@
+// The job of a run.
+#pragma once
+
+#include <filesystem>
+
+#include "precompute/io/run.hpp"
+
+namespace carillon::io {
+
+/// Reads the job on rank 0 into run.job on every rank, and checks what needs no mesh: the solver's options, and that the outputs can be
+/// written. Collective. Throws InputError on every rank.
+void open_job(Run& run, const std::filesystem::path& file);
+
+}  // namespace carillon::io

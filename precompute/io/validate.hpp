@@ -1,0 +1,23 @@
+// What can be said of a job without solving it.
+#pragma once
+
+#include <mpi.h>
+
+#include <filesystem>
+#include <string>
+
+#include "precompute/io/run_options.hpp"
+
+namespace carillon::io {
+
+/// Reads the job, makes or reads its mesh, finds the materials, assembles K and M, and analyses the factorisation: all that a run does
+/// before it searches, so that whatever would end a run before then ends this, with the same words. Then predicts modes, memory and time.
+/// The modes are counted by two factorisations where those take less than about 20 s and there is room, else estimated from volume and
+/// surface. Returns what main prints: lines for people, or one JSON object (options.json).
+/// One rank only: InputError on several. Throws InputError, SolveError, SystemError as run_job(). Collective.
+std::string validate_job(MPI_Comm comm, const std::filesystem::path& job_file, const RunOptions& options);
+
+/// {"ok": false, "error": message, "code": exit code}, what stands on standard output with --json when the job is not well.
+std::string describe_failure(const std::string& message, int code);
+
+}  // namespace carillon::io

@@ -1,0 +1,21 @@
+// About how many modes a band holds, from the body's volume and surface alone.
+#pragma once
+
+#include <vector>
+
+#include "jobs/spec/material.hpp"
+
+namespace carillon::io {
+
+struct ModeEstimate {
+  double count = 0;
+  double low = 0;        // what it may be as well,
+  double high = 0;       // to the factor that bodies with known counts stay within
+  bool is_thin = false;  // walls thinner than half a shear wave: bending decides, and the estimate is rougher
+};
+
+/// Modes below high_hz less those below low_hz. materials and volume_m3: what the body is made of; area_m2: of its whole surface.
+ModeEstimate estimate_modes(const std::vector<spec::Material>& materials, const std::vector<double>& volume_m3, double area_m2,
+                            double low_hz, double high_hz);
+
+}  // namespace carillon::io
