@@ -22,6 +22,7 @@ constexpr double kBytesPerNode = 250.0, kMidNodes = 7.5, kLargeNodes = 30000.0, 
 constexpr double kAccuracyGrowth = 4.0;  // accuracy_cents may refine the mesh
 constexpr double kBaseGb = 0.15, kFillGb = 0.4e-6, kSecondsPerNode = 5e-4;
 constexpr int kMostGuessedRanks = 1024;
+constexpr double kPredictionMargin = 1.1;
 
 /// Nodes as solved, and whether that is no more than a guess in the dark.
 struct Size {
@@ -53,11 +54,13 @@ bool read_prediction(const fs::path& folder, Need& need) {
   if (!fs::exists(folder / attempt::kPredictionFile, error)) return false;
   try {
     config::Object root = config::read_document(folder / attempt::kPredictionFile).root();
+    config::Object bytes = root.object("memory_bytes");
     std::vector<double> memory_gb;
-    for (config::Object& one : root.objects("memory")) memory_gb.push_back(one.number("gb"));
+    for (int ranks = 1; bytes.has(std::to_string(ranks)); ranks *= 2)
+      memory_gb.push_back(kPredictionMargin * 1e-9 * bytes.number(std::to_string(ranks), config::kPositive));
     if (memory_gb.empty()) return false;
     need.predicted_gb = memory_gb;
-    need.seconds = root.number_or("seconds", 0.0);
+    need.seconds = root.number_or("cpu_seconds", 0.0);
     return true;
   } catch (const InputError&) {
     return false;

@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFileName = "registry.sqlite";
 constexpr int kMostRepairs = 3;
+constexpr double kMostWaitS = 600.0;
 
 /// Device and number of a file; zeros when there is none.
 std::pair<dev_t, ino_t> find_file(const fs::path& file) {
@@ -73,7 +74,9 @@ void write_standing(const store::Store& store, const Job& job) {
 }
 
 bool is_ready(const Job& job, const std::string& boot, double now_s) {
-  return job.state == State::queued || (job.state == State::waiting && (job.ready_boot_id != boot || job.ready_boot_s <= now_s));
+  if (job.state != State::waiting) return job.state == State::queued;
+  // Later than anybody waits: written by another clock (a container may have its own).
+  return job.ready_boot_id != boot || job.ready_boot_s <= now_s || job.ready_boot_s > now_s + kMostWaitS;
 }
 
 }  // namespace
