@@ -25,10 +25,11 @@ def describe_setup(study):
              f"{processors[0] if processors else 'a processor without a name'}, {study.cores} core{'s' if study.cores > 1 else ''} to run on.",
              f"{study.repeats} repeat{'s' if study.repeats > 1 else ''} of every case, all cases in turn; seconds are medians of wall clock, and means over the ranks."]
     if any(study.is_crowded(ranks) for ranks in study.ranks):
-        lines.append(f"**Ranks with a star are more than there are cores**: their seconds say nothing of a machine that has as many; their messages do.")
-    spread = max(study.calc_spread(case) for case in study.cases)
-    if spread > SPREAD_LIMIT:
-        lines.append(f"**The machine was busy**: repeats differ by up to {100 * spread:.0f} % from their median. Operations, messages and bytes do not mind; seconds do.")
+        lines.append("**Ranks with a star are more than there are cores**: their seconds say nothing of a machine that has as many; their messages do.")
+    spread, share = max(study.calc_spread(case) for case in study.cases), study.calc_share()
+    if spread > SPREAD_LIMIT or share < 1 - SPREAD_LIMIT:
+        lines.append(f"**The machine was busy**: repeats differ by up to {100 * spread:.0f} % from their median, and one rank got {100 * min(share, 1):.0f} % of a processor. "
+                     "Operations, messages and bytes do not mind; seconds do, and what they say of limits may be the others' doing.")
     if not study.is_repeatable():
         lines.append("**Repeats of a case did different work**: the counts are those of the first.")
     if not study.has_body:

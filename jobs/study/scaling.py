@@ -190,6 +190,11 @@ class Study:
     def calc_spread(self, case):
         return measuring.find_spread([record["cost"]["wall_s"] for record in self.runs[case]])
 
+    def calc_share(self):
+        """The part of the processor that runs on one rank got; less than all of it: others were at work, or the disk."""
+        ones = [case for case in self.cases if case.ranks == 1]
+        return min((sum(self.calc_cpu(case, phase) for phase in PHASES) / self.calc_seconds(case) for case in ones), default=1.0)
+
     def is_repeatable(self):
         """Whether all repeats of a case did the same work."""
         return all(len({json.dumps(record["work"], sort_keys=True) for record in records}) == 1 for records in self.runs.values())

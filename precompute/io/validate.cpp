@@ -30,7 +30,7 @@ constexpr double kCountSeconds = 20;  // Two factorisations that take longer are
 constexpr double kRoomUsed = 0.8;     // of the memory that is left, at most
 constexpr std::array<int, 3> kRanks{1, 2, 4};
 // All ranks together, over one: halos, the interface between the ranks, which is eliminated last, and what MPI holds for each.
-constexpr std::array<double, 3> kMore{1.22, 1.36, 1.5};
+constexpr std::array<double, 3> kMore{1.3, 1.42, 1.55};
 constexpr double kRankBytes = 10e6;
 
 /// Of this process, now [byte].

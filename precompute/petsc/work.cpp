@@ -63,13 +63,13 @@ double read_clock(clockid_t clock) {
 }
 
 double cpu_booked_s = 0;
-double wall_booked_s = 0;  // of CLOCK_MONOTONIC; 0 before the first look
+double wall_booked_s = read_clock(CLOCK_MONOTONIC);
 
 void book_time() {
   const double cpu_s = read_clock(CLOCK_PROCESS_CPUTIME_ID);
   const double wall_s = read_clock(CLOCK_MONOTONIC);
   phase_at_hand->effort.cpu_seconds += cpu_s - cpu_booked_s;
-  if (wall_booked_s > 0) phase_at_hand->effort.wall_seconds += wall_s - wall_booked_s;
+  phase_at_hand->effort.wall_seconds += wall_s - wall_booked_s;
   cpu_booked_s = cpu_s;
   wall_booked_s = wall_s;
 }
