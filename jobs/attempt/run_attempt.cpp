@@ -1,6 +1,6 @@
 // Method:     Lock the folder; a bank that is there already is published; end what the attempt before left running; say who works here
 //             (attempt.json) before anything is started; start, watch, classify; verify and publish; say how it ended, last.
-// Source:     docs/decisions/jobs.md. Deviations: none.
+// Source:     docs/howto/when-jobs-die.md. Deviations: none.
 #include <fmt/core.h>
 #include <sys/stat.h>
 #include <time.h>

@@ -1,6 +1,6 @@
 // Method:     The exit code, what we did to the program, and the words of its own last error line give the cause; the sentence is that line
 //             where there is one.
-// Source:     exit codes: docs/howto/jobs.md; those of mpirun: Open MPI 4.1, tried one by one.
+// Source:     exit codes: docs/howto/when-jobs-die.md; those of mpirun: Open MPI 4.1, tried one by one.
 // Deviations: none.
 #include <fmt/core.h>
 

@@ -1,6 +1,6 @@
 // Method:     Causes that cannot pass end a job at once. Causes that can pass are tried again after 10, 40 and 160 s; an attempt that saved
 //             more than all before it starts the count anew. A full disk is waited for, however long.
-// Source:     own choice; docs/howto/jobs.md has the table.
+// Source:     own choice; docs/howto/when-jobs-die.md has the table.
 // Deviations: none.
 #include "jobs/outcome/policy.hpp"
 

@@ -37,7 +37,7 @@ struct Decision {
 };
 
 /// After `failures` attempts that count (0 at first). `is_further`: this one saved more in its checkpoint than any before, and the count
-/// starts anew. docs/howto/jobs.md has the table.
+/// starts anew. docs/howto/when-jobs-die.md has the table.
 Decision decide(Cause cause, int failures, bool is_further);
 
 /// What to ask for from now on after an attempt that ended for lack of memory [GB]: a little more than it said that it needs, and more than

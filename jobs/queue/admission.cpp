@@ -1,8 +1,9 @@
 // Method:     See the header. Free memory is the lesser of what is not promised to running jobs and of what is available now less what
 // running
 //             jobs have been promised and do not hold yet.
-// Source:     own choice; docs/howto/jobs.md states the rule. Backfilling with a reservation for the first: Lifka 1995 (EASY), with a fixed
-//             patience in place of estimates of run times.
+// Source:     own choice; docs/howto/when-jobs-die.md states the rule. Backfilling with a reservation for the first: Lifka 1995 (EASY),
+// with
+//             a fixed patience in place of estimates of run times.
 // Deviations: none.
 #include "jobs/queue/admission.hpp"
 

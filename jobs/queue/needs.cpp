@@ -1,7 +1,6 @@
-// Method:     A text mesh takes about 250 bytes a node of four-node tetrahedra; ten-node ones have 7.5 times as many nodes. A factorisation
-// by nested
-//             dissection of a compact body fills with n^(4/3) (George 1973). The constants were fitted on bars and bunnies of 1,000 to
-//             300,000 nodes and are generous; whatever is not small is predicted by carillon-precompute --validate instead.
+// Method:     A text mesh takes about 250 bytes a node of four-node tetrahedra; ten-node ones have 7.5 times as many nodes. Nested
+//             dissection of a compact body fills with n^(4/3) (George 1973). The constants are upper bounds for bars of 1,000 to 70,000
+//             nodes; whatever is not small is predicted by carillon-precompute --validate instead.
 // Source:     own measurements. Deviations: none.
 #include "jobs/queue/needs.hpp"
 
@@ -20,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr double kBytesPerNode = 250.0, kMidNodes = 7.5, kLargeNodes = 30000.0, kUnknownNodes = 60000.0;
 constexpr double kAccuracyGrowth = 4.0;  // accuracy_cents may refine the mesh
-constexpr double kBaseGb = 0.15, kFillGb = 0.4e-6, kSecondsPerNode = 5e-4;
+constexpr double kBaseGb = 0.15, kFillGb = 1.2e-6, kSecondsPerNode = 7e-4;
 constexpr int kMostGuessedRanks = 1024;
 constexpr double kPredictionMargin = 1.1;
 

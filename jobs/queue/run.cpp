@@ -1,7 +1,7 @@
 // Method:     One thread: bury children, settle rows, claim and start, show, and sleep until a signal or a second has passed. Attempts live
 // in
 //             sessions of their own and outlive this process; rows and locks tell the next one all it has to know.
-// Source:     docs/decisions/jobs.md. Deviations: none.
+// Source:     docs/howto/when-jobs-die.md. Deviations: none.
 #include "jobs/queue/run.hpp"
 
 #include <fcntl.h>

@@ -1,7 +1,7 @@
 // Method:     Whether somebody works is told by the lock on the folder of the work, which the kernel takes back from whoever dies;
 // attempt.json
 //             tells whether the claimed attempt began. Clocks are not asked. Changes are made in write transactions that look again first.
-// Source:     docs/decisions/jobs.md. Deviations: none.
+// Source:     docs/howto/when-jobs-die.md. Deviations: none.
 #include "jobs/queue/settle.hpp"
 
 #include <fmt/core.h>
