@@ -36,7 +36,7 @@ using registry::Job;
 using registry::State;
 
 constexpr std::size_t kMostCandidates = 256;
-constexpr double kAskAgainS = 5.0, kDiskPatienceS = 2.0;
+constexpr double kAskAgainS = 5.0, kDiskPatienceS = 2.0, kLostPatienceS = 60.0;
 
 sigset_t make_signals() {
   sigset_t set;
@@ -78,8 +78,12 @@ class Runner {
   bool step(bool is_first) {
     bury_children();
     for (const Job& job : settle(store_, registry_)) tell_end(job);
-    if (stops_ == 0) start_what_fits();
-    const std::vector<Job> jobs = list_open();
+    std::vector<Job> jobs = list_open();
+    release_lost(jobs);
+    const bool has_ready = std::any_of(jobs.begin(), jobs.end(), [](const Job& job) { return job.state != State::running; });
+    if (stops_ == 0 && has_ready) start_what_fits();
+    start_claimed();
+    if (has_ready) jobs = list_open();
     if (is_first) tell_adopted(jobs);
     ask_cancelled(jobs);
     display_.show(store_, jobs);
@@ -215,7 +219,43 @@ class Runner {
     };
     const std::vector<Job> claimed = registry_.claim("local", process::find_self(), pick, kMostCandidates);
     for (const auto& [job, memory_gb] : never) refuse(job, memory_gb, host);
-    for (const Job& job : claimed) start(job);
+    claimed_.insert(claimed_.end(), claimed.begin(), claimed.end());
+  }
+
+  /// A row that was claimed must be started, or given back: it is ours until then.
+  void start_claimed() {
+    while (!claimed_.empty()) {
+      const Job job = claimed_.back();
+      std::string refusal;
+      try {
+        if (stops_ == 0) start(job);
+      } catch (const SystemError& error) {
+        refusal = error.what();
+      }
+      if (stops_ > 0) give_back(job);
+      if (!refusal.empty()) settle_unstarted(store_, registry_, job, refusal);
+      claimed_.pop_back();
+    }
+  }
+
+  void give_back(const Job& job) {
+    registry_.update(job.id, [&](Job& row) {
+      if (row.state != State::running || row.token != job.token) return false;
+      row.state = State::queued;
+      return true;
+    });
+  }
+
+  /// Rows that were claimed in another container or under another name of this machine, and that nobody began to work on.
+  void release_lost(const std::vector<Job>& jobs) {
+    const double now_s = process::find_boot_seconds();
+    for (const Job& job : jobs) {
+      if (job.state != State::running || find_standing(store_, job) != Standing::elsewhere) {
+        lost_since_.erase(job.id.text());
+      } else if (now_s - lost_since_.try_emplace(job.id.text(), now_s).first->second > kLostPatienceS) {
+        give_back(job);
+      }
+    }
   }
 
   std::vector<Job> pick_jobs(const Host& host, double now_s, const std::vector<Job>& running, const std::vector<Job>& ready,
@@ -281,14 +321,22 @@ class Runner {
     asked_s_.erase(job.id.text());
     const pid_t pid = spawn(attempt::make_arguments(options_.program, attempt), attempt.work / store::kLogFile);
     children_.emplace(pid, job);
+    name_worker(job, pid);
     display_.tell(attempt.is_prediction ? "predict" : "start", job);
+  }
+
+  /// Until attempt.json tells, the row does. Where the disk is full it says less.
+  void name_worker(const Job& job, pid_t pid) {
     const std::optional<process::Identity> child = process::find_process(pid);
     if (!child) return;
-    registry_.update(job.id, [&](Job& row) {
-      if (row.token != job.token) return false;
-      row.worker = *child;
-      return true;
-    });
+    try {
+      registry_.update(job.id, [&](Job& row) {
+        if (row.token != job.token) return false;
+        row.worker = *child;
+        return true;
+      });
+    } catch (const SystemError&) {
+    }
   }
 
   const store::Store& store_;
@@ -298,7 +346,9 @@ class Runner {
   std::map<pid_t, Job> children_;
   std::map<std::string, JobNeeds> needs_;        // by id, until an attempt has ended
   std::map<std::string, double> blocked_since_;  // boot seconds
+  std::map<std::string, double> lost_since_;
   std::map<std::string, double> asked_s_;
+  std::vector<Job> claimed_;  // and not started yet
   std::optional<bool> can_predict_;
   int stops_ = 0;
   int exit_code_ = 0;

@@ -137,6 +137,14 @@ void settle_unbegun(const store::Store& store, registry::Registry& registry, con
       registry, job, [&](Job& row) { apply(row, outcome); }, nullptr);
 }
 
+void settle_unstarted(const store::Store& store, registry::Registry& registry, const Job& job, const std::string& refusal) {
+  outcome::Outcome outcome = outcome::make_killed(job.token);
+  outcome.cause = attempt::is_disk_full(store.root()) ? outcome::Cause::disk_full : outcome::Cause::system;
+  outcome.reason = refusal;
+  change_running(
+      registry, job, [&](Job& row) { apply(row, outcome); }, nullptr);
+}
+
 Said cancel(const store::Store& store, registry::Registry& registry, const store::Id& id, double patience_s) {
   Said answer{false, "there is no such job"};
   bool is_running = false;

@@ -32,6 +32,9 @@ std::vector<registry::Job> settle(const store::Store& store, registry::Registry&
 /// Settles one row whose attempt was seen to end with this exit code before it said that it had begun.
 void settle_unbegun(const store::Store& store, registry::Registry& registry, const registry::Job& job, int exit_code);
 
+/// Settles one row that was claimed here and could not be started.
+void settle_unstarted(const store::Store& store, registry::Registry& registry, const registry::Job& job, const std::string& refusal);
+
 /// What cancel and retry did, in one sentence for people, and whether it is what was asked for.
 struct Said {
   bool is_done = false;

@@ -140,8 +140,8 @@ def two_runs(service):
     for run in runs:
         check(service.wait_end(run) == 0, "carillon run ends badly")
     running, starts = {}, {}
-    for event in sorted((event for event in service.events() if event.get("event") in ("start", "done", "failed", "waiting", "queued", "cancelled")), key=lambda event: event["boot_s"]):
-        if event["event"] == "start":
+    for event in sorted((event for event in service.events() if event.get("event") in ("start", "predict", "done", "failed", "waiting", "queued", "cancelled")), key=lambda event: event["boot_s"]):
+        if event["event"] in ("start", "predict"):
             running[event["id"]] = event["ranks"]
             starts[event["id"]] = starts.get(event["id"], 0) + 1
             check(sum(running.values()) <= cores, f"{running} on {cores} cores")
@@ -209,7 +209,41 @@ def clock(service):
     service.check_nothing_left()
 
 
-cases = {function.__name__: function for function in (kills, hopeless, cancel, stop, time_limit, two_runs, disk_full, clock)}
+def hang(service):
+    """A rank that stops for ever while the other waits for it: seen, ended, and tried again from what was saved."""
+    service.mesh("bar.msh", LONG_NODES)
+    (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000))
+    work = service.store / "work" / identity[:2] / identity
+    with subprocess.Popen([service.bin / "carillon", "attempt", work, "--ranks", "2", "--hang-s", "3"], stderr=subprocess.DEVNULL) as attempt:
+        service.wait_for("two ranks", lambda: len(service.processes()["rank"]) == 2)
+        time.sleep(1)
+        service.kill(service.processes()["rank"][0], signal.SIGSTOP)
+        check(attempt.wait(timeout=60) == 85, f"exit code {attempt.returncode}")
+    outcome = json.loads((work / "outcome.json").read_text())
+    check(outcome["cause"] == "hung", f"{outcome}")
+    check(not any(service.processes().values()), f"left: {service.processes()}")
+    check(service.wait_end(service.run()) == 0 and service.job(identity)["state"] == "done", f"{service.job(identity)}")
+    service.check_bank(identity)
+    service.check_nothing_left()
+
+
+def lost_claims(service):
+    """Rows that were claimed by a process that died before it started anything, and folders whose lock outlived nobody."""
+    service.mesh("bar.msh", 300)
+    identities = service.submit(*(service.write_job(f"{i}.json", "bar.msh", 20000 + i) for i in range(4)))
+    for _ in range(12):
+        run = service.run()
+        time.sleep(0.03 * (len(service.runs) % 8))
+        service.kill(run.pid)
+        run.wait()
+    check(service.wait_end(service.run()) == 0, "carillon run ends badly")
+    for identity in identities:
+        check(service.job(identity)["state"] == "done", f"{service.job(identity)}")
+        service.check_bank(identity)
+    service.check_nothing_left()
+
+
+cases = {function.__name__: function for function in (kills, hopeless, cancel, stop, time_limit, two_runs, disk_full, clock, hang, lost_claims)}
 service = Service(sys.argv[1])
 try:
     cases[sys.argv[2]](service)
