@@ -4,4 +4,4 @@
 set -- @FOLDERS@
 shift "${SLURM_ARRAY_TASK_ID:-0}"
 # exec: Slurm's signals reach the attempt itself. It saves, tells Slurm to queue the job again, and ends.
-exec @PROGRAM@ attempt @WORK@/"$1" --engine slurm --ranks @RANKS@ --memory-gb @MEMORY_GB@ --launcher @LAUNCHER@
+exec @PROGRAM@ attempt @WORK@/"$1" --engine slurm --ranks @RANKS@ --memory-gb @MEMORY_GB@ --launcher @LAUNCHER@@OPTIONS@

@@ -19,10 +19,11 @@ struct Options {
   double time_limit_s = 0.0;  // of this attempt; 0: none
   std::string token;          // 32 hex digits; empty: made here
   Launcher launcher = Launcher::automatic;
-  bool is_prediction = false;      // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
-  double grace_s = 60.0;           // from "save and stop" to the kill
-  double hang_s = 600.0;           // without progress, while a rank does not work
-  double silence_s = 24 * 3600.0;  // without progress, whatever the ranks do
+  std::vector<std::string> mpirun_options;  // words for mpirun or srun, before ours: which hosts, by which network
+  bool is_prediction = false;               // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
+  double grace_s = 60.0;                    // from "save and stop" to the kill
+  double hang_s = 600.0;                    // without progress, while a rank does not work
+  double silence_s = 24 * 3600.0;           // without progress, whatever the ranks do
 };
 
 /// Nobody's error: another attempt works in this folder, and this one did nothing (EX_TEMPFAIL).

@@ -177,11 +177,13 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   if (launcher == Launcher::alone) launch.environment.push_back("OMPI_MCA_ess_singleton_isolated=1");  // no daemon for one rank
   if (launcher == Launcher::mpirun) {
     launch.arguments = {find_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
+    launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
     for (const char* name : {"CARILLON_ATTEMPT", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "HWLOC_COMPONENTS"}) {
       launch.arguments.insert(launch.arguments.end(), {"-x", name});
     }
   } else if (launcher == Launcher::srun) {
     launch.arguments = {find_program("srun"), "--mpi=pmix", "--kill-on-bad-exit=1", "-n", std::to_string(options.ranks)};
+    launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
   }
   launch.arguments.insert(launch.arguments.end(), {solver, store::kJobFile});
   const auto add = [&](std::initializer_list<const char*> words) {

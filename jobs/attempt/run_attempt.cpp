@@ -228,6 +228,7 @@ std::vector<std::string> make_arguments(const fs::path& program, const Options& 
   if (options.memory_gb > 0.0) add("--memory-gb", fmt::format("{}", options.memory_gb));
   if (options.time_limit_s > 0.0) add("--time-limit-s", fmt::format("{}", options.time_limit_s));
   if (options.is_prediction) arguments.emplace_back("--predict");
+  for (const std::string& word : options.mpirun_options) arguments.push_back("--mpirun-option=" + word);
   if (!options.token.empty()) add("--token", options.token);
   if (options.launcher == Launcher::alone) add("--launcher", "alone");
   if (options.launcher == Launcher::mpirun) add("--launcher", "mpirun");

@@ -1,10 +1,12 @@
 // carillon cancel and carillon retry.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
+#include "jobs/cli/slurm.hpp"
 #include "jobs/queue/settle.hpp"
 #include "runtime/config/error.hpp"
 
@@ -42,8 +44,9 @@ int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act&
 
 int run_cancel(Shared& shared, const Options& options) {
   shared.settle();
-  return do_to_all(shared, find_jobs(shared, options.words),
-                   [&](const registry::Job& job) { return queue::cancel(shared.store(), shared.registry(), job.id); });
+  return do_to_all(shared, find_jobs(shared, options.words), [&](const registry::Job& job) {
+    return job.engine == "slurm" ? cancel_in_slurm(shared, job.id) : queue::cancel(shared.store(), shared.registry(), job.id);
+  });
 }
 
 int run_retry(Shared& shared, const Options& options) {
@@ -54,11 +57,17 @@ int run_retry(Shared& shared, const Options& options) {
   if (options.all_failed) {
     for (registry::Job& job : shared.registry().list({registry::State::failed})) jobs.push_back(std::move(job));
   }
-  return do_to_all(shared, jobs, [&](const registry::Job& job) {
+  const int code = do_to_all(shared, jobs, [&](const registry::Job& job) {
     const queue::Said said = queue::retry(shared.store(), shared.registry(), job.id);
     if (said.is_done) shared.registry().update(job.id, [&](registry::Job& row) { return options.resources.apply(row); });
     return said;
   });
+  const auto is_for_slurm = [&](const registry::Job& job) {
+    const auto row = shared.registry().find(job.id);
+    return row && row->engine == "slurm";
+  };
+  if (std::any_of(jobs.begin(), jobs.end(), is_for_slurm)) hand_over_to_slurm(shared);
+  return code;
 }
 
 }  // namespace

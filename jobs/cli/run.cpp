@@ -6,12 +6,12 @@
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/cli/follow.hpp"
 #include "jobs/cli/shared.hpp"
+#include "jobs/cli/slurm.hpp"
 #include "jobs/queue/settle.hpp"
+#include "jobs/slurm/inside.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::cli {
-namespace {
-
 namespace fs = std::filesystem;
 
 fs::path find_self() {
@@ -21,14 +21,17 @@ fs::path find_self() {
   return self;
 }
 
-}  // namespace
-
-void Shared::settle() { queue::settle(store(), registry()); }
+void Shared::settle() {
+  queue::settle(store(), registry());
+  follow_slurm(*this);
+  if (hands_over) hand_over_to_slurm(*this);
+}
 
 int run_until_done(Shared& shared, const std::vector<store::Id>& ids) {
   queue::RunOptions options;
   options.program = find_self();
   options.quiet = shared.json;
+  options.mpirun_options = shared.profile().mpirun_options;
   if (const int code = queue::run(shared.store(), options); code != 0) return code;
   std::vector<registry::Job> jobs;
   for (const store::Id& id : ids) {
@@ -48,8 +51,16 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
   command->add_option("--cores", options->cores, "Use at most so many")->check(CLI::Range(1, 1'000'000));
   command->add_option("--memory-gb", options->memory_gb, "Use at most so much")->check(CLI::Range(1e-3, 1e9));
   command->add_flag("-q,--quiet", options->quiet, "Print nothing");
-  command->callback([&shared, &run, options] {
-    run = [&shared, options] {
+  auto engine = std::make_shared<std::string>("local");
+  command->add_option("--on", *engine, "local: the queue of this machine; slurm: hand over to Slurm and follow, until all have ended")
+      ->check(CLI::IsMember({"local", "slurm"}));
+  command->callback([&shared, &run, options, engine] {
+    run = [&shared, options, engine] {
+      if (*engine == "slurm") {
+        run_with_slurm(shared, options->keep, options->quiet);
+        return 0;
+      }
+      options->mpirun_options = shared.profile().mpirun_options;
       options->program = find_self();
       options->json = shared.json;
       return queue::run(shared.store(), *options);
@@ -67,19 +78,23 @@ void add_attempt(CLI::App& app, Run& run) {
   command->add_option("--memory-gb", options->memory_gb);
   command->add_option("--time-limit-s", options->time_limit_s);
   command->add_option("--token", options->token);
+  command->add_option("--mpirun-option", options->mpirun_options, "A word for mpirun; can be given many times")->allow_extra_args(false);
+  auto engine = std::make_shared<std::string>("local");
+  command->add_option("--engine", *engine)->check(CLI::IsMember({"local", "slurm"}));
   command->add_option("--launcher", *launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
   command->add_flag("--predict", options->is_prediction);
   command->add_option("--grace-s", options->grace_s);
   command->add_option("--hang-s", options->hang_s);
-  command->callback([&run, options, launcher] {
-    run = [options, launcher] {
+  command->callback([&run, options, launcher, engine] {
+    run = [options, launcher, engine] {
       if (*launcher == "alone") options->launcher = attempt::Launcher::alone;
       if (*launcher == "mpirun") options->launcher = attempt::Launcher::mpirun;
       if (*launcher == "srun") options->launcher = attempt::Launcher::srun;
       if (!options->token.empty() &&
           (options->token.size() != 32 || options->token.find_first_not_of("0123456789abcdef") != std::string::npos))
         throw InputError("--token: 32 hex digits are needed");
-      return attempt::run_attempt(*options);
+      const int code = attempt::run_attempt(*options);
+      return *engine == "slurm" ? slurm::end_attempt(options->work, code) : code;
     };
   });
 }

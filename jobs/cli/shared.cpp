@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLeastPrefix = 4, kMostNamed = 5;
+constexpr std::size_t kLeastPrefix = 4, kMostNamed = 5, kMostOptions = 100;
 
 bool is_there(const fs::path& file) {
   struct stat info {};
@@ -37,7 +37,12 @@ Profile read_profile(const std::string& option) {
   config::Object root = config::read_document(profile.file).root();
   if (root.has("store")) profile.store = root.path("store");
   profile.engine = root.choice_or("on", {"local", "slurm"}, "local");
-  root.ignore("slurm");
+  for (const config::Entry& entry : root.entries("mpirun_options", kMostOptions)) {
+    if (entry.object) throw InputError(entry.place + ": \"mpirun_options\" is a list of words for mpirun");
+    profile.mpirun_options.push_back(entry.text);
+  }
+  profile.slurm = slurm::read_settings(root.object_if("slurm"));
+  profile.slurm.mpirun_options = profile.mpirun_options;
   root.finish();
   return profile;
 }

@@ -12,7 +12,12 @@
 #include <vector>
 
 #include "jobs/registry/registry.hpp"
+#include "jobs/slurm/settings.hpp"
 #include "jobs/store/store.hpp"
+
+namespace carillon::slurm {
+class Engine;
+}
 
 namespace carillon::cli {
 
@@ -21,9 +26,11 @@ inline constexpr int kExitNotYet = 1;
 
 /// profile.json: what somebody always wants. Every key may be left out.
 struct Profile {
-  std::filesystem::path file;    // empty: there is none
-  std::filesystem::path store;   // "store"
-  std::string engine = "local";  // "on"
+  std::filesystem::path file;               // empty: there is none
+  std::filesystem::path store;              // "store"
+  std::string engine = "local";             // "on"
+  slurm::Settings slurm;                    // "slurm"
+  std::vector<std::string> mpirun_options;  // words for mpirun, here and in Slurm: where the ranks run
 };
 
 /// The store and its registry, opened when first asked for.
@@ -38,6 +45,10 @@ class Shared {
   registry::Registry& registry();
   /// Rows whose process is gone are settled: what every command does that looks at states.
   void settle();
+
+  bool hands_over = false;                      // settle() hands over to Slurm too: for a command that waits for its jobs
+  std::shared_ptr<slurm::Engine> slurm_engine;  // made when first needed
+  double slurm_asked_s = 0.0;                   // boot time
 
  private:
   std::optional<Profile> profile_;

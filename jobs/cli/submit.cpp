@@ -1,6 +1,7 @@
 // carillon submit: jobs into the store and the registry. What is in the store already is not asked for again.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -9,6 +10,7 @@
 #include "jobs/cli/gather.hpp"
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
+#include "jobs/cli/slurm.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::cli {
@@ -128,6 +130,15 @@ bool is_open(const registry::Job& job) {
   return job.state == registry::State::queued || job.state == registry::State::waiting || job.state == registry::State::running;
 }
 
+/// To Slurm, and what became of it into the answers.
+void hand_over(Shared& shared, std::vector<Answer>& answers) {
+  follow_slurm(shared);
+  hand_over_to_slurm(shared);
+  for (Answer& answer : answers) {
+    if (answer.job) answer.job = shared.registry().find(answer.job->id);
+  }
+}
+
 int run_submit(Shared& shared, const Options& options) {
   const std::string engine = options.resources.engine.empty() ? shared.profile().engine : options.resources.engine;
   std::vector<Source> sources = gather(options.words, read_solver_version());
@@ -154,12 +165,16 @@ int run_submit(Shared& shared, const Options& options) {
     if (answer.job) ids.push_back(answer.job->id);
   }
   const bool follows = options.wait || options.run;
+  const bool is_for_slurm =
+      std::any_of(answers.begin(), answers.end(), [](const Answer& answer) { return answer.job && answer.job->engine == "slurm"; });
+  if (is_for_slurm) hand_over(shared, answers);
+  shared.hands_over = is_for_slurm && follows;
   if (!shared.json) print_lines(shared, answers);
   if (!follows && shared.json) print_json(describe_answers(shared, answers));
   if (is_bad) std::fflush(stdout);
   int code = is_bad ? kExitInput : 0;
   if (follows && !ids.empty()) {
-    const int end = options.run ? run_until_done(shared, ids) : follow(shared, ids, false);
+    const int end = options.run && !is_for_slurm ? run_until_done(shared, ids) : follow(shared, ids, false);
     if (code == 0) code = end;
     for (Answer& answer : answers) {
       if (answer.job) answer.job = shared.registry().find(answer.job->id);

@@ -5,8 +5,8 @@
 
 #include <fmt/core.h>
 
-#include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <optional>
 #include <string>
 
@@ -14,6 +14,7 @@
 #include "jobs/outcome/policy.hpp"
 #include "jobs/slurm/records.hpp"
 #include "jobs/slurm/site.hpp"
+#include "jobs/store/store.hpp"
 
 namespace carillon::slurm {
 namespace {
@@ -45,8 +46,7 @@ int end_attempt(const std::filesystem::path& work, int exit_code) {
     const outcome::Decision decision = outcome::decide(outcome.cause, failures, outcome.is_further);
     if (decision.next == outcome::Next::failed) return kExitSystem;
     write_failures(work, decision.failures);
-    fmt::print(stderr, "carillon: {}; queued again in Slurm\n", outcome.reason);
-    std::fflush(stderr);
+    std::ofstream(work / store::kLogFile, std::ios::app) << "carillon: " << outcome.reason << "; queued again in Slurm\n";
     site.requeue(job, decision.delay_s);
   } catch (const SystemError& error) {
     fmt::print(stderr, "carillon: {}\n", error.what());

@@ -15,6 +15,8 @@ namespace carillon::slurm {
 namespace {
 
 constexpr double kPredictionPatienceS = 600.0;
+// Slurm without control groups adds up what its processes hold, and counts the libraries of each rank, and of mpirun, anew.
+constexpr double kMargin = 1.2, kProcessGb = 0.1;
 
 void predict(const store::Store& store, const registry::Job& job, const queue::Need& guess, const std::filesystem::path& program) {
   const double memory_gb = queue::calc_memory(guess, 1);
@@ -43,6 +45,7 @@ store::Resources find_resources(const store::Store& store, const registry::Job& 
     resources.ranks = static_cast<int>(std::clamp(worth, 1.0, static_cast<double>(settings.most_ranks)));
   }
   resources.memory_gb = queue::calc_memory(needs.need, resources.ranks);
+  if (needs.need.memory_gb <= 0.0) resources.memory_gb = kMargin * resources.memory_gb + kProcessGb * (resources.ranks + 1);
   return resources;
 }
 

@@ -72,8 +72,9 @@ std::string quote_word(std::string_view word) {
 }
 
 std::string make_script(const Batch& batch, const Settings& settings) {
-  std::string prologue, folders;
+  std::string prologue, folders, options;
   for (const std::string& line : settings.prologue) prologue += line + "\n";
+  for (const std::string& word : settings.mpirun_options) options += " --mpirun-option=" + quote_word(word);
   for (const std::string& folder : batch.folders) folders += (folders.empty() ? "" : " ") + quote_word(folder);
   return fill(kJobScript, {{"@PROLOGUE@\n", prologue},
                            {"@FOLDERS@", folders},
@@ -81,7 +82,8 @@ std::string make_script(const Batch& batch, const Settings& settings) {
                            {"@WORK@", quote_word((batch.root / "work").string())},
                            {"@RANKS@", std::to_string(batch.ranks)},
                            {"@MEMORY_GB@", fmt::format("{}", batch.memory_gb)},
-                           {"@LAUNCHER@", settings.launcher}});
+                           {"@LAUNCHER@", settings.launcher},
+                           {"@OPTIONS@", options}});
 }
 
 std::vector<std::string> make_sbatch(const Batch& batch, const Settings& settings) {

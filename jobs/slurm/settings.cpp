@@ -26,6 +26,7 @@ Settings read_settings(std::optional<config::Object> object) {
   settings.qos = object->string_or("qos", settings.qos);
   settings.launcher = object->choice_or("launcher", {"mpirun", "srun"}, settings.launcher);
   settings.signal_before_s = object->number_or("signal_before_s", settings.signal_before_s, {0.0, 65536.0});
+  settings.poll_s = object->number_or("poll_s", settings.poll_s, {0.0, 86400.0});
   settings.most_ranks = static_cast<int>(object->integer_if("most_ranks", 1, 1 << 20).value_or(settings.most_ranks));
   settings.most_running = static_cast<int>(object->integer_if("most_running", 0, 1 << 20).value_or(settings.most_running));
   settings.most_in_array = static_cast<int>(object->integer_if("most_in_array", 1, 1 << 20).value_or(settings.most_in_array));

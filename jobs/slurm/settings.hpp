@@ -18,7 +18,9 @@ struct Settings {
   int most_in_array = 1000;             // longer batches become several arrays; never more than the site allows
   std::vector<std::string> options;     // words for sbatch, before ours: {"--constraint=zen3"}
   std::vector<std::string> prologue;    // lines of shell at the start of every job: "module load openmpi". The profile is the user's own.
-  std::string program;                  // carillon as the nodes know it; empty: the one that submits
+  std::vector<std::string> mpirun_options;  // words for mpirun or srun, from the profile's own "mpirun_options"
+  double poll_s = 10.0;                     // Slurm is not asked more often by one command that waits
+  std::string program;                      // carillon as the nodes know it; empty: the one that submits
 };
 
 /// Throws InputError "file:line: ...". `object` may be none: all defaults.

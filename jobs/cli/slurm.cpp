@@ -1,0 +1,88 @@
+#include "jobs/cli/slurm.hpp"
+
+#include <fmt/core.h>
+#include <time.h>
+
+#include <algorithm>
+
+#include "jobs/process/process.hpp"
+#include "jobs/queue/display.hpp"
+#include "jobs/slurm/engine.hpp"
+#include "jobs/slurm/needs.hpp"
+
+namespace carillon::cli {
+namespace {
+
+using registry::Job;
+using registry::State;
+
+constexpr long kStepNs = 200'000'000;
+
+slurm::Engine& find_engine(Shared& shared) {
+  if (!shared.slurm_engine) {
+    shared.slurm_engine = std::make_shared<slurm::Engine>(shared.store(), shared.profile().slurm, find_self(), [](const std::string& line) {
+      fmt::print(stderr, "carillon: {}\n", show_message(line));
+    });
+  }
+  return *shared.slurm_engine;
+}
+
+bool is_of_slurm(const Job& job) { return job.engine == "slurm"; }
+
+std::vector<Job> list_open(Shared& shared) {
+  std::vector<Job> jobs = shared.registry().list({State::queued, State::running, State::waiting});
+  std::erase_if(jobs, [](const Job& job) { return !is_of_slurm(job); });
+  return jobs;
+}
+
+std::vector<Job> hand_over(Shared& shared) {
+  return find_engine(shared).hand_over(
+      shared.registry(), [&](const Job& job) { return slurm::find_resources(shared.store(), job, shared.profile().slurm, find_self()); });
+}
+
+}  // namespace
+
+void follow_slurm(Shared& shared) {
+  const double now_s = process::find_boot_seconds();
+  if (shared.slurm_asked_s > 0.0 && now_s - shared.slurm_asked_s < shared.profile().slurm.poll_s) return;
+  const std::vector<Job> cancelled = shared.registry().list({State::cancelled});
+  const bool is_left = std::any_of(cancelled.begin(), cancelled.end(), [](const Job& job) { return !job.slurm_job.empty(); });
+  if (!is_left && list_open(shared).empty()) return;
+  find_engine(shared).follow(shared.registry());
+  shared.slurm_asked_s = process::find_boot_seconds();
+}
+
+std::size_t hand_over_to_slurm(Shared& shared) {
+  const std::vector<Job> jobs = hand_over(shared);
+  return static_cast<std::size_t>(std::count_if(jobs.begin(), jobs.end(), [](const Job& job) { return !job.slurm_job.empty(); }));
+}
+
+queue::Said cancel_in_slurm(Shared& shared, const store::Id& id) {
+  const auto row = shared.registry().find(id);
+  if (!row) return {false, "there is no such job"};
+  if (row->state == State::done) return {false, "it is done already; its bank stays"};
+  if (row->state == State::cancelled) return {true, "it is cancelled already"};
+  if (row->state == State::failed) return queue::cancel(shared.store(), shared.registry(), id);
+  if (!find_engine(shared).cancel(shared.registry(), id)) return {true, "Slurm is asked to end it; carillon status tells when it has"};
+  const auto now = shared.registry().find(id);
+  if (now && now->state == State::done) return {false, "it was done before it could be stopped; its bank stays"};
+  return {true, "cancelled"};
+}
+
+void run_with_slurm(Shared& shared, bool keeps, bool is_quiet) {
+  queue::Display display(shared.json, is_quiet);
+  for (;;) {
+    for (const Job& job : find_engine(shared).follow(shared.registry())) display.tell(to_text(job.state), job);
+    for (const Job& job : hand_over(shared)) display.tell(job.state == State::failed ? "failed" : "queued", job);
+    const std::vector<Job> open = list_open(shared);
+    display.show(shared.store(), open);
+    if (open.empty() && !keeps) return;
+    const double until_s = process::find_boot_seconds() + shared.profile().slurm.poll_s;
+    while (process::find_boot_seconds() < until_s) {
+      const timespec time{0, kStepNs};
+      ::nanosleep(&time, nullptr);
+    }
+  }
+}
+
+}  // namespace carillon::cli
