@@ -13,7 +13,7 @@ struct Extent {
   std::int64_t surface_nodes = 0;
   bool is_quadratic = true;
   bool is_lumped = false;       // M is diagonal
-  bool is_thin = false;         // walls thinner than half a shear wave
+  bool is_thin = false;         // the lowest modes are mended: walls a hundred times as wide as thick
   bool is_read_by_all = false;  // the file is read by all ranks
   double read_seconds = 0;      // what reading or meshing took, or will
   double factor_flops = 0;      // of one factorisation

@@ -27,6 +27,7 @@ namespace carillon::io {
 namespace {
 
 constexpr double kCountSeconds = 20;  // Two factorisations that take longer are not made to count.
+constexpr double kVeryThin = 100;     // slenderness of bodies whose lowest modes are mended
 constexpr double kRoomUsed = 0.8;     // of the memory that is left, at most
 constexpr std::array<int, 3> kRanks{1, 2, 4};
 // All ranks together, over one: halos, the interface between the ranks, which is eliminated last, and what MPI holds for each.
@@ -141,7 +142,7 @@ void Validation::predict_modes() {
     const auto most = static_cast<double>(*run_.job.max_modes);
     for (double* count : {&estimate_.count, &estimate_.low, &estimate_.high}) *count = std::min(*count, most);
   }
-  extent_.is_thin = estimate_.is_thin;
+  extent_.is_thin = estimate_.slenderness > kVeryThin;
   extent_.modes = outlook_.modes.value_or(std::llround(estimate_.count));
   if (outlook_.modes) return;
   notes_.push_back(fmt::format("the modes are estimated from volume and surface (Weyl's law), between {:.0f} and {:.0f}{}", estimate_.low,

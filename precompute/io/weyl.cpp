@@ -21,6 +21,8 @@ namespace {
 // Curved walls are stiffer than flat ones and have fewer modes.
 constexpr double kSolidFactor = 1.4, kThinFactor = 1.5, kCurvedFactor = 3;
 
+constexpr double kWall = 20;  // slenderness of walls; compact bodies have 5, bars 15
+
 struct Speeds {
   double longitudinal = 0;
   double shear = 0;
@@ -61,6 +63,7 @@ ModeEstimate estimate_modes(const std::vector<spec::Material>& materials, const 
                             double low_hz, double high_hz) {
   ModeEstimate estimate;
   const double all = std::accumulate(volume_m3.begin(), volume_m3.end(), 0.0);
+  estimate.slenderness = std::sqrt(area_m2) * area_m2 / (2 * all);
   for (std::size_t i = 0; i < materials.size(); ++i) {
     const Speeds c = calc_speeds(materials[i]);
     const double area = area_m2 * volume_m3[i] / all;
@@ -68,7 +71,7 @@ ModeEstimate estimate_modes(const std::vector<spec::Material>& materials, const 
       return std::max(count_in_solid(c, volume_m3[i], area, f), count_in_wall(c, volume_m3[i], area, f));
     };
     estimate.count += std::max(count(high_hz) - count(low_hz), 0.0);
-    estimate.is_thin = estimate.is_thin || 2 * volume_m3[i] / area < c.shear / (2 * high_hz);
+    estimate.is_thin = estimate.is_thin || (estimate.slenderness > kWall && 2 * volume_m3[i] / area < c.shear / (2 * high_hz));
   }
   constexpr double kFew = 6;  // where counting by waves is no law yet
   estimate.low = std::max(estimate.count / (estimate.is_thin ? kCurvedFactor : kSolidFactor) - kFew, 0.0);

@@ -9,9 +9,10 @@ namespace carillon::io {
 
 struct ModeEstimate {
   double count = 0;
-  double low = 0;        // what it may be as well,
-  double high = 0;       // to the factor that bodies with known counts stay within
-  bool is_thin = false;  // walls thinner than half a shear wave: bending decides, and the estimate is rougher
+  double low = 0;          // what it may be as well,
+  double high = 0;         // to the factor that bodies with known counts stay within
+  double slenderness = 0;  // root of the surface over the mean thickness 2 V / S
+  bool is_thin = false;    // walls thinner than half a shear wave: bending decides, and the estimate is rougher
 };
 
 /// Modes below high_hz less those below low_hz. materials and volume_m3: what the body is made of; area_m2: of its whole surface.
