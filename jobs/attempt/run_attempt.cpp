@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <thread>
 
@@ -82,6 +83,8 @@ class Attempt {
     outcome_.host = process::find_host();
     outcome_.started = outcome::find_utc();
     options_.work = work;
+    // For what this process itself starts (the pictures of the report); its own entry in /proc stays as it is.
+    ::setenv("CARILLON_ATTEMPT", outcome_.token.c_str(), 1);
   }
 
   int run() {
@@ -176,6 +179,7 @@ class Attempt {
       outcome_.percent = 100.0;
       try {
         publish(store_, id_, outcome_);
+        process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
         store_.remove_work(id_);
         return 0;
       } catch (const SystemError& error) {

@@ -134,7 +134,7 @@ def two_runs(service):
     """Two runs on one store: every job once, and never more ranks than cores."""
     service.mesh("bar.msh", 500)
     cores = len(os.sched_getaffinity(0))
-    names = [service.write_job(f"{i}.json", "bar.msh", 20000 + i, **({"resources": {"ranks": 2}} if i % 3 == 0 else {})) for i in range(6)]
+    names = [service.write_job(f"{i}.json", "bar.msh", 20000 + i, **({"resources": {"ranks": 2}} if i % 3 == 0 else {})) for i in range(4)]
     identities = service.submit(*names)
     runs = [service.run(), service.run()]
     for run in runs:
@@ -230,7 +230,7 @@ def hang(service):
 def lost_claims(service):
     """Rows that were claimed by a process that died before it started anything, and folders whose lock outlived nobody."""
     service.mesh("bar.msh", 300)
-    identities = service.submit(*(service.write_job(f"{i}.json", "bar.msh", 20000 + i) for i in range(4)))
+    identities = service.submit(*(service.write_job(f"{i}.json", "bar.msh", 20000 + i) for i in range(2)))
     for _ in range(12):
         run = service.run()
         time.sleep(0.03 * (len(service.runs) % 8))
