@@ -1,3 +1,4 @@
+// One file from its first byte to its last, written and read: longer than most.
 // Method:     Bytes 0..255 header, then the settings that were tried, the numbers of the solve, zeros up to a multiple of 4,096, and the
 //             columns by groups of 16: of each group node after node, of each node x, y, z, of each the group's columns. SHA-256 guards all
 //             but the columns, whose records are mixed one by one and summed, so that each rank does it for its own. A new file is
