@@ -61,11 +61,15 @@ class Validation {
   std::string describe_for_people() const;
 
  private:
-  void look_ahead(Setting& setting);
+  void look_ahead(const Setting& setting);
+  double calc_matrix_bytes() const;
+  void guess();
+  bool may_count(const eigen::Outlook& outlook) const;
   void predict_modes();
   void predict_memory();
   void predict_time();
   double get_pace() const;
+  bool fits_here() const;
   std::int64_t get_most_modes() const { return outlook_.modes.value_or(std::llround(std::ceil(estimate_.high))); }
 
   Run run_;
@@ -73,11 +77,11 @@ class Validation {
   Body body_;
   SolvedBody solved_;
   eigen::Outlook outlook_;
-  bool is_analysed_ = false;
   std::int64_t held_bytes_ = 0;  // after the assembly
   std::int64_t read_bytes_ = 0;  // at the worst moment until then
   double assembled_s_ = 0;       // CPU seconds until then
-  double speed_ = 0;
+  double speed_ = 1;
+  std::int64_t left_bytes_ = 0;  // for this rank and all it holds
   ModeEstimate estimate_;
   Extent extent_;
   Costs costs_;
@@ -112,26 +116,56 @@ double Validation::get_pace() const {
   return (outlook_.factor_seconds + kTrustSeconds / speed_) / (foreseen + kTrustSeconds);
 }
 
-void Validation::look_ahead(Setting& setting) {
-  const eigen::Options options = make_options(run_, setting);
-  fem::System system = assemble_body(run_, setting, body_, solved_);
-  assembled_s_ = find_cpu_seconds();
-  held_bytes_ = find_resident_bytes();
-  read_bytes_ = find_peak_bytes();
+/// The room that K and M will take [byte].
+double Validation::calc_matrix_bytes() const {
+  const double neighbours = extent_.is_quadratic ? 28 : 15;  // nodes, itself among them, that share an element with a node
+  return 2 * 12.0 * 3 * neighbours * static_cast<double>(extent_.unknowns);
+}
+
+/// A body that is too large to be assembled here: all by powers of its unknowns.
+void Validation::guess() {
+  solved_.materials = fem::find_materials(run_.comm, body_.pieces.local, run_.job, body_.region_names);
+  solved_.volume_m3 = fem::calc_volumes(run_.comm, body_.pieces.local, solved_.materials);
+  const Extent whole = complete(extent_);
+  outlook_.entries = whole.factor_entries;
+  outlook_.flops = whole.factor_flops;
+  outlook_.factor_kept_bytes = 8 * outlook_.entries;
+  outlook_.factor_bytes = outlook_.factor_kept_bytes * 3 / 2;  // with the update matrices
+  outlook_.copies_bytes = outlook_.copies_kept_bytes = static_cast<std::int64_t>(calc_matrix_bytes());
+  held_bytes_ = find_resident_bytes() + static_cast<std::int64_t>(calc_matrix_bytes());
+  notes_.push_back(
+      "too large to be assembled in the memory that is left here: memory and time are guessed by powers of the unknowns, to a factor of "
+      "two");
+}
+
+bool Validation::may_count(const eigen::Outlook& outlook) const {
+  Extent extent = extent_;
+  extent.factor_flops = outlook.flops;
+  extent.factor_entries = outlook.entries;
+  extent.modes = 1;
+  const double factor_s = predict_costs(extent).factor / static_cast<double>(predict_factorisations(1)) / speed_;
+  return 2 * factor_s < kCountSeconds &&
+         static_cast<double>(outlook.factor_bytes) < kRoomUsed * static_cast<double>(eigen::find_memory_left());
+}
+
+void Validation::look_ahead(const Setting& setting) {
   speed_ = measure_speed();
   extent_ = find_extent(run_, setting, body_);
-  const auto may_count = [&](const eigen::Outlook& outlook) {
-    Extent extent = extent_;
-    extent.factor_flops = outlook.flops;
-    extent.factor_entries = outlook.entries;
-    extent.modes = 1;
-    const double factor_s = predict_costs(extent).factor / static_cast<double>(predict_factorisations(1)) / speed_;
-    return 2 * factor_s < kCountSeconds &&
-           static_cast<double>(outlook.factor_bytes) < kRoomUsed * static_cast<double>(eigen::find_memory_left());
-  };
-  outlook_ = name_errors(body_.source, run_, [&] {
-    return eigen::look_ahead({system.stiffness, system.mass, make_layout(body_.pieces)}, options, may_count);
-  });
+  const std::int64_t left = eigen::find_memory_left();
+  left_bytes_ = left + find_resident_bytes() - base_bytes_;
+  // K, M, and room to sort their entries.
+  if (2 * calc_matrix_bytes() > kRoomUsed * static_cast<double>(left)) {
+    guess();
+  } else {
+    const fem::System system = assemble_body(run_, setting, body_, solved_);
+    held_bytes_ = find_resident_bytes();
+    read_bytes_ = find_peak_bytes();
+    assembled_s_ = find_cpu_seconds();
+    outlook_ = name_errors(body_.source, run_, [&] {
+      return eigen::look_ahead({system.stiffness, system.mass, make_layout(body_.pieces)}, make_options(run_, setting),
+                               [&](const eigen::Outlook& outlook) { return may_count(outlook); });
+    });
+  }
   extent_.factor_flops = outlook_.flops;
   extent_.factor_entries = outlook_.entries;
 }
@@ -174,10 +208,13 @@ void Validation::predict_time() {
   for (double Costs::*phase : {&Costs::analyse, &Costs::factor, &Costs::solve, &Costs::orthogonalise, &Costs::check, &Costs::errors,
                                &Costs::collect, &Costs::write})
     costs_.*phase *= pace;
-  const double here = assembled_s_ / std::max(foreseen_here, 1e-9);
+  const double here = assembled_s_ > 0 ? assembled_s_ / std::max(foreseen_here, 1e-9) : pace;
   for (double Costs::*phase : {&Costs::read, &Costs::partition, &Costs::assemble}) costs_.*phase *= here;
   for (std::size_t i = 0; i < kRanks.size(); ++i) wall_s_[i] = calc_wall(costs_, extent_, kRanks[i]).sum();
 }
+
+/// On one rank, in the memory that is left now.
+bool Validation::fits_here() const { return bytes_[0] - base_bytes_ <= left_bytes_; }
 
 Json::Value Validation::describe() const {
   Json::Value root;
@@ -204,6 +241,7 @@ Json::Value Validation::describe() const {
     root["wall_seconds"][std::to_string(kRanks[i])] = wall_s_[i];
   }
   root["cpu_seconds"] = costs_.sum();
+  root["fits_here"] = fits_here();
   for (const std::string& note : notes_) root["notes"].append(note);
   for (const std::string& warning : run_.stations.get_warnings()) root["warnings"].append(warning);
   return root;
@@ -219,6 +257,8 @@ std::string Validation::describe_for_people() const {
     text += fmt::format("{} rank{}: at most {:.2f} GB, about {:.1f} s\n", kRanks[i], kRanks[i] == 1 ? "" : "s",
                         1e-9 * static_cast<double>(bytes_[i]), wall_s_[i]);
   text += fmt::format("{:.1f} CPU s on this machine", costs_.sum());
+  if (!fits_here())
+    text += fmt::format("\none rank does not fit the {:.2f} GB of memory that are left here", 1e-9 * static_cast<double>(left_bytes_));
   for (const std::string& note : notes_) text += "\n" + note;
   return text;
 }
