@@ -217,7 +217,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
     std::string number;
     if (handed) {
       number = numbers.try_emplace(handed->batch, read_number(store_.root(), handed->batch)).first->second;
-      if (number.empty()) number = numbers[handed->batch] = site_.find_by_title(handed->title).value_or("none");
+      if (number.empty()) number = numbers[handed->batch] = site_.find_by_title(handed->title, handed->batch).value_or("none");
       if (number != "none") write_number(store_.root(), handed->batch, number);
     }
     if (!handed && !is_claimed) continue;  // waits to be handed over

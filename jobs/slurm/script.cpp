@@ -98,7 +98,7 @@ std::vector<std::string> make_sbatch(const Batch& batch, const Settings& setting
   add("--open-mode=append");
   add(fmt::format("--signal=B:USR1@{}", calc_signal_s(batch, settings)));
   add("--job-name=" + batch.title);
-  add("--comment=" + batch.comment);
+  add("--comment=" + batch.comment + " " + batch.name);
   add("--chdir=" + batch.root.string());
   const bool is_array = batch.folders.size() > 1;
   add("--output=" + escape_pattern((batch.root / "slurm" / batch.name).string()) + (is_array ? "/%a.out" : "/0.out"));

@@ -17,7 +17,7 @@ extern const char* const kJobScript;
 struct Batch {
   std::string name;                  // 32 hex digits
   std::string title;                 // for squeue: "carillon-<12 digits>", of the id of the only job, else of `name`
-  std::string comment;               // the id of the only job, else how many there are
+  std::string comment;               // the id of the only job, else how many there are; `name` follows in Slurm
   std::filesystem::path root;        // of the store, absolute
   std::vector<std::string> folders;  // below root/work: "ab/abcdef..."
   std::filesystem::path program;     // carillon

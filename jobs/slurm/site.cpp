@@ -185,12 +185,14 @@ std::optional<Seen> Site::find_end(const std::string& job) const {
   return find_in_accounting(job);
 }
 
-std::optional<std::string> Site::find_by_title(const std::string& title) const {
-  const std::vector<std::string> words{"squeue", "--noheader", "--states=all", "--format=%F", "--name=" + title};
+std::optional<std::string> Site::find_by_title(const std::string& title, const std::string& batch) const {
+  const std::vector<std::string> words{"squeue", "--noheader", "--states=all", "--format=%F|%k", "--name=" + title};
   const Finished finished = ask(words);
   if (finished.exit_code != 0) refuse(words, finished);
-  const std::string number = strip(finished.output.substr(0, finished.output.find('\n')));
-  return number.empty() ? std::nullopt : std::optional(number);
+  for (const std::string_view line : split(finished.output, '\n')) {
+    if (line.find(batch) != std::string_view::npos) return strip(line.substr(0, line.find('|')));
+  }
+  return std::nullopt;
 }
 
 void Site::cancel(const std::vector<std::string>& jobs) const {

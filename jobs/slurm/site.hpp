@@ -45,8 +45,8 @@ class Site {
   /// The end of one job in detail (scontrol, else sacct); none when Slurm has forgotten it.
   std::optional<Seen> find_end(const std::string& job) const;
 
-  /// The number of the job of that name, if Slurm knows one.
-  std::optional<std::string> find_by_title(const std::string& title) const;
+  /// The number of the job of that name that was handed over as `batch`, if Slurm knows one.
+  std::optional<std::string> find_by_title(const std::string& title, const std::string& batch) const;
 
   /// Ends them; those that have ended already are no error.
   void cancel(const std::vector<std::string>& jobs) const;

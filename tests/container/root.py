@@ -3,6 +3,7 @@
 
 usage: root.py SOURCE_DIR SIDE FOLDER        exits 77 (skipped) without root or debootstrap
 """
+import json
 import os
 import pathlib
 import shutil
@@ -30,9 +31,12 @@ def inside(*words):
 
 
 if side == "precompute":
-    (root / "data/bar.json").write_text('{"shape": "bar"}')
-    inside("mpirun", "-np", "2", "carillon-precompute", "--shape", "bar", "-o", "bar.hdf")
+    body = {"shape": "bar", "length_m": 0.2, "width_m": 0.02, "thickness_m": 0.004, "nodes": 400}
+    material = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {}}}
+    (root / "data/bar.json").write_text(json.dumps({"body": body, "material": material, "bank": "bar.hdf"}))
+    inside("mpirun", "-np", "2", "carillon-precompute", "bar.json")
     print(inside("carillon-bank", "check", "bar.hdf"))
+    print(inside("carillon", "--store", "/data/store", "submit", "bar.json", "--run"))
 else:
     print(inside("carillon-render", "--version"))
     libraries = inside("sh", "-c", "ldd /usr/local/bin/carillon-*")

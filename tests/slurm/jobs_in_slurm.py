@@ -102,7 +102,7 @@ def submit(store):
     job = store.submit(store.write("a;b'$(touch harmed).json", QUICK), "--ranks", "2")[0]
     check(job["slurm_job"], f"not with Slurm: {job}")
     name = subprocess.run(["squeue", "--noheader", "--states=all", "--format=%j %k", f"--jobs={job['slurm_job']}"], capture_output=True, text=True).stdout.split()
-    check(name == [f"carillon-{job['id'][:12]}", job["id"]], f"Slurm calls it {name}")
+    check(name[:2] == [f"carillon-{job['id'][:12]}", job["id"]], f"Slurm calls it {name}")
     store.wait(job, "done")
     store.check_bank(job)
     check(not list(store.folder.rglob("harmed")), "a job's name was run as a command")
@@ -196,6 +196,22 @@ def killed_daemon(store):
         store.check_bank(ended)
 
 
+def lost_registry(store):
+    """The registry is gone, and so is the number that Slurm gave: the job is found by its name, nothing is submitted twice, and --wait sees its end."""
+    job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
+    numbers = list((store.folder / "store/slurm").glob("*/number"))
+    check([file.read_text().strip() for file in numbers] == [job["slurm_job"]], f"the number is not written: {numbers}")
+    for file in [*numbers, *(store.folder / "store").glob("registry.sqlite*")]:
+        file.unlink()
+    row = store.status(job)
+    check(row["slurm_job"] == job["slurm_job"], f"not found again: {row}")
+    row = store.run("submit", store.folder / "slow.json", "--wait")["jobs"][0]
+    check(row["state"] == "done", f"not done: {row}")
+    store.check_bank(job)
+    later = subprocess.run(["scontrol", "show", "job", str(int(job["slurm_job"]) + 1)], capture_output=True, text=True)
+    check(later.returncode != 0, f"submitted twice: {later.stdout}")
+
+
 def memory_limit(store):
     """More memory than asked for: failed, the reason says so and what to do, and it is not tried again and again."""
     job = store.submit(store.write("big.json", 4 * SLOW), "--ranks", "1", "--memory-gb", "0.06")[0]
@@ -212,7 +228,7 @@ def main():
         return 77
     store = Store()
     try:
-        {"submit": submit, "array": array, "cancel": cancel, "time_limit": time_limit, "killed_rank": killed_rank, "killed_daemon": killed_daemon, "memory_limit": memory_limit}[CASE](store)
+        {"submit": submit, "array": array, "cancel": cancel, "time_limit": time_limit, "killed_rank": killed_rank, "killed_daemon": killed_daemon, "lost_registry": lost_registry, "memory_limit": memory_limit}[CASE](store)
     finally:
         subprocess.run(["scancel", "--quiet", f"--user={os.getuid()}"], timeout=60)
     print(f"{CASE}: ok")
