@@ -1,6 +1,7 @@
 // Texts of strangers, numbers for people, JSON for programs.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -50,8 +51,16 @@ std::string escape(const std::string& raw, std::size_t most) {
 std::string show(const std::string& text, std::size_t most) { return escape(text, most); }
 
 std::string show_message(const std::string& text) {
-  constexpr std::size_t kMostMessage = 4000;
-  return escape(text, kMostMessage);
+  constexpr std::size_t kMostMessage = 4000, kMostWord = 600;
+  std::string shorter;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of(" \n", at), text.size());
+    shorter += end - at > kMostWord ? text.substr(at, kMostWord / 2) + "..." + text.substr(end - kMostWord / 4, kMostWord / 4)
+                                    : text.substr(at, end - at);
+    if (end < text.size()) shorter += text[end];
+    at = end + 1;
+  }
+  return escape(shorter, kMostMessage);
 }
 
 Json::Value to_json(const std::string& text) { return Json::Value(store::to_text(text)); }

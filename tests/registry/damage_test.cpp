@@ -1,0 +1,139 @@
+// A registry that is cut at every byte, or has any byte flipped, is noticed and made again from the store; nothing that the store knows is
+// lost.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "tests/registry/jobs.hpp"
+
+namespace {
+
+using namespace carillon;
+using carillon::tests::Folder;
+using carillon::tests::make_id;
+using carillon::tests::make_submission;
+using registry::Job;
+using registry::Registry;
+using registry::State;
+namespace fs = std::filesystem;
+
+/// Memory is a disk that needs no waiting.
+fs::path find_fast_disk() { return ::access("/dev/shm", W_OK) == 0 ? fs::path("/dev/shm") : fs::temp_directory_path(); }
+
+class Damage : public testing::Test {
+ protected:
+  Damage() : folder_(find_fast_disk()), store_(store::Store::open(folder_ / "store")) {
+    Registry registry = Registry::open(store_, tests::be_silent);
+    for (int n = 0; n < 6; ++n) {
+      tests::make_work(store_, make_submission(n));
+      registry.submit({make_submission(n)});
+    }
+    tests::make_bank(store_, make_submission(0));
+    store_.remove_work(make_id(0));
+    registry.update(make_id(0), [](Job& job) { return job.state = State::done, true; });
+    registry.update(make_id(1), [](Job& job) { return job.state = State::failed, job.reason = "the mesh is bad", job.failures = 1, true; });
+    registry.update(make_id(2), [](Job& job) { return job.state = State::cancelled, job.reason = "cancelled", true; });
+    wanted_ = tests::describe(registry);
+  }
+
+  fs::path file() const { return folder_ / "store/registry.sqlite"; }
+
+  void put(const std::string& bytes) const {
+    for (const auto& entry : fs::directory_iterator(folder_ / "store")) {
+      if (entry.path().filename().string().starts_with("registry.")) fs::remove(entry.path());
+    }
+    folder_.write("store/registry.sqlite", bytes);
+  }
+
+  /// Opens what is there, and says whether it was made again.
+  bool check(const std::string& what) const {
+    int said = 0;
+    const Registry registry = Registry::open(store_, [&](const std::string&) { ++said; });
+    EXPECT_EQ(tests::describe(registry), wanted_) << what;
+    EXPECT_EQ(registry.list_last_submissions().size(), 6u) << what;
+    EXPECT_LE(said, 1) << what;
+    return said == 1;
+  }
+
+  const Folder folder_;
+  const store::Store store_;
+  std::string wanted_;
+};
+
+/// The bytes of the file in shares, so that they are looked at side by side.
+constexpr std::size_t kShares = 8;
+class DamageShare : public Damage, public testing::WithParamInterface<std::size_t> {};
+INSTANTIATE_TEST_SUITE_P(Shares, DamageShare, testing::Range<std::size_t>(0, kShares));
+
+TEST_P(DamageShare, cut_at_every_byte) {
+  const std::string whole = tests::read_all(file());
+  ASSERT_GT(whole.size(), 8000u);
+  for (std::size_t length = GetParam(); length < whole.size(); length += kShares) {
+    put(whole.substr(0, length));
+    ASSERT_TRUE(check("cut at " + std::to_string(length))) << length;
+    if (HasFailure()) return;
+  }
+  put(whole);
+  EXPECT_FALSE(check("whole"));
+}
+
+TEST_P(DamageShare, any_byte_flipped) {
+  const std::string whole = tests::read_all(file());
+  int made_again = 0;
+  for (std::size_t at = GetParam(); at < whole.size(); at += whole[at] != '\0' ? kShares : 5 * kShares) {  // of empty space, every fifth
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ (1 << (at / kShares % 8)));
+    put(bytes);
+    made_again += check("flipped at " + std::to_string(at)) ? 1 : 0;
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(made_again, 100);
+}
+
+TEST_F(Damage, a_log_of_writes_cut_or_flipped_anywhere_costs_nothing) {
+  // A copy made while the registry is in use has all of the latest changes in its write-ahead log.
+  Registry registry = Registry::open(store_, tests::be_silent);
+  tests::make_work(store_, make_submission(6));
+  registry.submit({make_submission(6)});
+  const std::string whole = tests::read_all(file()), log = tests::read_all(file().string() + "-wal");
+  ASSERT_GT(log.size(), 4000u);
+  const std::string wanted = tests::describe(registry);
+  const Folder other(find_fast_disk());
+  fs::copy(folder_ / "store", other / "store", fs::copy_options::recursive);
+  const store::Store store = store::Store::open(other / "store");
+  for (std::size_t at = 0; at < log.size(); at += 97) {
+    for (const bool is_cut : {true, false}) {
+      for (const auto& entry : fs::directory_iterator(other / "store")) {
+        if (entry.path().filename().string().starts_with("registry.")) fs::remove(entry.path());
+      }
+      std::string bytes = is_cut ? log.substr(0, at) : log;
+      if (!is_cut) bytes[at] = static_cast<char>(bytes[at] ^ 0x55);
+      other.write("store/registry.sqlite", whole);
+      other.write("store/registry.sqlite-wal", bytes);
+      ASSERT_EQ(tests::describe(Registry::open(store, tests::be_silent)), wanted) << (is_cut ? "cut at " : "flipped at ") << at;
+    }
+  }
+}
+
+TEST_F(Damage, what_is_damaged_is_kept_beside_the_new_one) {
+  put("this is no database, but it is long enough to be taken for one, if nobody looks at its first bytes: " + std::string(5000, 'x'));
+  EXPECT_TRUE(check("text"));
+  EXPECT_TRUE(fs::exists(folder_ / "store/registry.damaged-1.sqlite"));
+  EXPECT_FALSE(check("the new one"));
+}
+
+TEST_F(Damage, a_registry_in_use_that_is_taken_away_is_made_again_under_the_hands_of_its_user) {
+  Registry registry = Registry::open(store_, tests::be_silent);
+  fs::remove(file());
+  EXPECT_EQ(tests::describe(registry), wanted_);
+  EXPECT_TRUE(registry.update(make_id(3), [](Job& job) { return job.state = State::failed, job.reason = "x", true; }));
+  EXPECT_EQ(Registry::open(store_, tests::be_silent).find(make_id(3))->state, State::failed);
+}
+
+TEST_F(Damage, a_pipe_or_a_folder_in_its_place_is_one_clear_error) {
+  put("");
+  fs::remove(file());
+  fs::create_directory(file());
+  EXPECT_THROW(Registry::open(store_, tests::be_silent), InputError);
+}
+
+}  // namespace

@@ -1,0 +1,165 @@
+#include "jobs/store/store.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "tests/store/folder.hpp"
+
+namespace {
+
+using namespace carillon;
+using carillon::tests::Folder;
+namespace fs = std::filesystem;
+
+const store::Id kId = *store::parse_id(std::string(64, 'a'));
+
+void write_bank(const fs::path& folder, const std::string& text) { std::ofstream(folder / store::kBankFile) << text; }
+
+unsigned mode_of(const fs::path& path) {
+  struct stat info {};
+  return ::stat(path.c_str(), &info) == 0 ? info.st_mode & 07777U : 0;
+}
+
+TEST(Store, a_bank_is_published_whole_and_read_only) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  const fs::path made = store.make_temporary();
+  write_bank(made, "bank");
+  fs::create_directory(made / "pictures");
+  std::ofstream(made / "pictures/a.png") << "png";
+  EXPECT_FALSE(store.has_bank(kId));
+  EXPECT_TRUE(store.publish(kId, made));
+  EXPECT_TRUE(store.has_bank(kId));
+  EXPECT_EQ(store.list_banks(), std::vector<store::Id>{kId});
+  EXPECT_EQ(mode_of(store.bank_folder(kId)) & 0222U, 0u);
+  EXPECT_EQ(mode_of(store.bank_folder(kId) / store::kBankFile), 0444u);
+  EXPECT_EQ(mode_of(store.bank_folder(kId) / "pictures") & 0222U, 0u);
+  store.remove_bank(kId);
+  EXPECT_FALSE(store.has_bank(kId));
+  EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
+}
+
+TEST(Store, the_second_of_two_publications_is_no_error_and_changes_nothing) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  for (const char* text : {"first", "second"}) {
+    const fs::path made = store.make_temporary();
+    write_bank(made, text);
+    EXPECT_EQ(store.publish(kId, made), std::string(text) == "first");
+    EXPECT_FALSE(fs::exists(made));
+  }
+  EXPECT_EQ(tests::read_all(store.bank_folder(kId) / store::kBankFile), "first");
+}
+
+TEST(Store, of_eight_processes_that_publish_at_once_one_wins_and_nothing_is_left) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  std::vector<pid_t> children;
+  for (int n = 0; n < 8; ++n) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      int won = 0;
+      for (int round = 0; round < 20; ++round) {
+        const fs::path made = store.make_temporary();
+        write_bank(made, std::string(1000, static_cast<char>('a' + n)));
+        won += store.publish(*store::parse_id(std::string(62, 'c') + (round < 10 ? "0" : "1") + std::to_string(round % 10)), made) ? 1 : 0;
+      }
+      ::_exit(won);
+    }
+    children.push_back(child);
+  }
+  int won = 0;
+  for (const pid_t child : children) {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status));
+    won += WEXITSTATUS(status);
+  }
+  EXPECT_EQ(won, 20);
+  EXPECT_EQ(store.list_banks().size(), 20u);
+  for (const store::Id& id : store.list_banks()) {
+    const std::string bank = tests::read_all(store.bank_folder(id) / store::kBankFile);
+    EXPECT_EQ(bank, std::string(1000, bank.at(0)));
+  }
+  EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
+}
+
+TEST(Store, a_file_with_another_name_elsewhere_stays_writable_there) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  const fs::path made = store.make_temporary();
+  folder.write("log", "text");
+  fs::create_hard_link(folder / "log", made / "log");
+  EXPECT_TRUE(store.publish(kId, made));
+  EXPECT_NE(mode_of(folder / "log") & 0200U, 0u);
+  EXPECT_EQ(tests::read_all(store.bank_folder(kId) / "log"), "text");
+}
+
+TEST(Store, another_folder_is_not_taken_for_a_store) {
+  const Folder folder;
+  folder.write("home/letter.txt", "dear");
+  EXPECT_THROW(store::Store::open(folder / "home"), InputError);
+  EXPECT_FALSE(fs::exists(folder / "home/banks"));
+  folder.write("file", "");
+  EXPECT_THROW(store::Store::open(folder / "file"), InputError);
+  EXPECT_THROW(store::Store::open(""), InputError);
+  store::Store::open(folder / "store");
+  folder.write("store/VERSION", "carillon store 2\n");
+  try {
+    store::Store::open(folder / "store");
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("carillon store 2"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Store, what_is_no_id_in_its_folders_is_passed_over) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  fs::create_directories(folder / "store/banks/aa/not-an-id");
+  fs::create_directories(folder / ("store/banks/bb/" + kId.text()));  // in the wrong place
+  EXPECT_TRUE(store.list_banks().empty());
+}
+
+TEST(Store, a_store_of_a_group_is_writable_by_it_whatever_the_umask) {
+  const Folder folder;
+  fs::create_directory(folder / "store");
+  ::chmod((folder / "store").c_str(), 02775);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::umask(077);
+    const store::Store store = store::Store::open(folder / "store");
+    const bool is_good = (mode_of(folder / "store/work") & 070U) == 070U && (mode_of(store.make_temporary()) & 070U) == 070U;
+    ::_exit(is_good ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+}
+
+TEST(Store, another_user_without_rights_hears_whose_it_is) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root becomes another user";
+  const Folder folder;
+  ::chmod(folder.path().c_str(), 0755);
+  store::Store::open(folder / "store");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::setgid(65534) != 0 || ::setuid(65534) != 0) ::_exit(9);
+    try {
+      store::Store::open(folder / "store");
+    } catch (const InputError& error) {
+      const std::string what = error.what();
+      ::_exit(what.find("may not write") != std::string::npos && what.find("install -d -m 2775") != std::string::npos ? 0 : 2);
+    }
+    ::_exit(1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+}
+
+}  // namespace
