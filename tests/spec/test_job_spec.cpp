@@ -30,6 +30,23 @@ TEST(JobSpec, defaults_are_T10_consistent_20_Hz_to_20_kHz) {
   EXPECT_EQ(job.bank, "/jobs/out/b.bank");
 }
 
+TEST(JobSpec, resources_are_read_and_are_no_part_of_the_resolved_job) {
+  const JobSpec job = parse_job(job_with(R"(, "resources": {"ranks": 3, "memory_gb": 1.5, "time_limit_s": 60})"), "/jobs/job.json");
+  EXPECT_EQ(job.resources.ranks, 3);
+  EXPECT_EQ(job.resources.memory_gb, 1.5);
+  EXPECT_EQ(job.resources.time_limit_s, 60.0);
+  EXPECT_EQ(resolved_json(job, "/jobs", ""), resolved_json(parse_job(job_with(""), "/jobs/job.json"), "/jobs", ""));
+  for (const char* bad : {"{\"ranks\": 0}", "{\"ranks\": 1.5}", "{\"memory_gb\": -1}", "{\"time_limit_s\": 0}", "{\"rank\": 1}", "7"})
+    EXPECT_THROW(parse_job(job_with(std::string(", \"resources\": ") + bad), "/jobs/job.json"), InputError) << bad;
+}
+
+TEST(JobSpec, a_bank_may_be_left_out_only_where_a_store_keeps_it) {
+  const std::string text = "{\"mesh\": \"m.msh\", " + kMaterial + "}";
+  EXPECT_TRUE(parse_job(text, "/jobs/job.json", BankKey::optional).bank.empty());
+  EXPECT_EQ(resolved_json(parse_job(text, "/jobs/job.json", BankKey::optional), "/jobs", "").find("bank"), std::string::npos);
+  EXPECT_THROW(parse_job(text, "/jobs/job.json"), InputError);
+}
+
 TEST(JobSpec, lame_constants_become_the_table_s_engineering_constants) {
   // references: lambda 3.99e9, mu 2.05e9 is E = 5.454 GPa, nu = 0.3303.
   const JobSpec job = parse_job(job_with(""), "/jobs/job.json");
