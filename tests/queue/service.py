@@ -78,7 +78,9 @@ class Service:
     def events(self):
         found = []
         for run in self.runs:
-            for line in run.log.read_text().splitlines():
+            for line in run.log.read_text().splitlines(keepends=True):
+                if not line.endswith("\n"):  # being written, or its writer was killed
+                    continue
                 try:
                     found.append(json.loads(line))
                 except ValueError:
