@@ -54,7 +54,7 @@ void apply(Job& row, const outcome::Outcome& outcome, bool has_asked_memory) {
     row.reason = outcome.reason + "; ask for more by \"resources\": {\"memory_gb\": ...} in the job";
     return;
   }
-  const double given_gb = row.resources.memory_gb;
+  const double given_gb = row.given.memory_gb;
   queue::apply(row, outcome);
   if (outcome.cause == outcome::Cause::memory) row.resources.memory_gb = std::max(row.resources.memory_gb, kMemoryGrowth * given_gb);
 }
@@ -104,8 +104,8 @@ std::vector<Job> Engine::hand_over(registry::Registry& registry, const FindNeeds
     return changed;
   }
   for (Job& job : registry.claim("slurm", process::find_self(), choose, static_cast<std::size_t>(-1))) {
-    job.resources = find_needs(job);
-    alike[{job.resources.ranks, job.resources.memory_gb, job.resources.time_limit_s}].push_back(job);
+    job.given = find_needs(job);
+    alike[{job.given.ranks, job.given.memory_gb, job.given.time_limit_s}].push_back(job);
   }
   for (const auto& [needs, jobs] : alike) {
     for (std::size_t at = 0; at < jobs.size(); at += most) {
@@ -163,7 +163,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
       change(jobs[i], [&](Job& row) {
         row.state = State::queued;
         row.slurm_job = jobs.size() > 1 ? fmt::format("{}_{}", number, i) : number;
-        row.resources = jobs[i].resources;
+        row.given = jobs[i].given;
         row.reason = "handed to Slurm";
       });
     }
