@@ -137,8 +137,8 @@ Json::Value describe(Shared& shared, const registry::Job& job) {
   root["reason"] = to_json(find_reason(shared, job));
   root["attempts"] = job.attempts;
   root["failures"] = job.failures;
-  root["ranks"] = job.resources.ranks;
-  root["memory_gb"] = job.resources.memory_gb;
+  root["ranks"] = job.given.ranks > 0 ? job.given.ranks : job.resources.ranks;  // as chosen, once it was
+  root["memory_gb"] = job.given.ranks > 0 ? job.given.memory_gb : job.resources.memory_gb;
   root["time_limit_s"] = job.resources.time_limit_s;
   root["slurm_job"] = job.slurm_job.empty() ? Json::Value() : to_json(job.slurm_job);
   root["submitted"] = to_json_time(job.submitted_unix_s);
