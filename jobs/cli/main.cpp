@@ -58,6 +58,8 @@ int run(int argc, char** argv) {
   // What follows "study" belongs to another program.
   const bool wants_json = std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
   try {
+    if (argc > 1 && std::string_view(argv[1]) == "study")
+      become(find_program("carillon-study"), {argv + 2, argv + argc});  // its own --help
     app.parse(argc, argv);
     return command();
   } catch (const CLI::ParseError& error) {

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 constexpr std::uint64_t kMaxJobBytes = 16 << 20;
 
 /// Rank 0 reads the text; all ranks parse it, so that all fail alike.
-spec::JobSpec read_shared_job(const Run& run, const fs::path& file) {
+spec::JobSpec read_shared_job(const Run& run, const fs::path& file, spec::BankKey bank) {
   std::string text;
   petsc::run_agreed(run.comm, [&] {
     if (run.rank == 0) text = config::read_file(file, "job file", kMaxJobBytes);
@@ -27,7 +27,7 @@ spec::JobSpec read_shared_job(const Run& run, const fs::path& file) {
   text.resize(static_cast<std::size_t>(size));
   MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, 0, run.comm);
   spec::JobSpec job;
-  petsc::run_agreed(run.comm, [&] { job = spec::parse_job(text, fs::absolute(file)); });
+  petsc::run_agreed(run.comm, [&] { job = spec::parse_job(text, fs::absolute(file), bank); });
   return job;
 }
 
@@ -39,7 +39,7 @@ void check_job(const Run& run) {
           fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
                       run.job.file.string(), run.ranks));
     }
-    if (run.rank != 0) return;
+    if (run.rank != 0 || run.job.bank.empty()) return;
     config::check_writable(run.job.bank, "bank");
     config::check_writable(spec::find_resolved_path(run.job.bank), "resolved job");
   });
@@ -47,8 +47,8 @@ void check_job(const Run& run) {
 
 }  // namespace
 
-void open_job(Run& run, const fs::path& file) {
-  run.job = read_shared_job(run, file);
+void open_job(Run& run, const fs::path& file, spec::BankKey bank) {
+  run.job = read_shared_job(run, file, bank);
   check_job(run);
 }
 

@@ -8,7 +8,7 @@
 namespace carillon::io {
 
 /// Reads the job on rank 0 into run.job on every rank, and checks what needs no mesh: the solver's options, and that the outputs can be
-/// written. Collective. Throws InputError on every rank.
-void open_job(Run& run, const std::filesystem::path& file);
+/// written where there are to be any. Collective. Throws InputError on every rank.
+void open_job(Run& run, const std::filesystem::path& file, spec::BankKey bank = spec::BankKey::required);
 
 }  // namespace carillon::io

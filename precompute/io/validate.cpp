@@ -92,7 +92,7 @@ class Validation {
 
 void Validation::look(const std::filesystem::path& job_file) {
   if (run_.ranks > 1) throw InputError("--validate works on one rank: start carillon-precompute without mpirun");
-  open_job(run_, job_file);
+  open_job(run_, job_file, spec::BankKey::optional);
   Setting setting = get_setting(run_.job);
   if (run_.job.accuracy_cents) {
     setting = find_first_setting(run_);

@@ -88,6 +88,12 @@ class Path(Bench):
         self.assertIn("failed", self.run_it("get", file, code=1).stderr)
         self.run_it("submit", file, code=3)
 
+    def test_validate_needs_neither_a_bank_nor_a_solve(self):
+        said = json.loads(self.run_it("validate", self.write("bar.json", make_job()), "--json").stdout)
+        self.assertTrue(said)
+        self.assertFalse(self.store.exists() and any(self.store.glob("banks/*/*")))
+        self.run_it("validate", self.write("bad.json", make_job(band_hz=[5, 1])), code=2)
+
     def test_cancel_and_retry(self):
         file = self.write("bar.json", make_job())
         self.ask("submit", file)
