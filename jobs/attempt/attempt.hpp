@@ -20,6 +20,7 @@ struct Options {
   std::string token;          // 32 hex digits; empty: made here
   Launcher launcher = Launcher::automatic;
   std::vector<std::string> mpirun_options;  // words for mpirun or srun, before ours: which hosts, by which network
+  bool has_pictures = true;                 // in the report of the bank, where carillon-draw is installed
   bool is_prediction = false;               // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
   double grace_s = 60.0;                    // from "save and stop" to the kill
   double hang_s = 600.0;                    // without progress, while a rank does not work

@@ -35,10 +35,12 @@ void link_or_copy(const fs::path& from, const fs::path& to) {
 }
 
 /// A page about the bank. A bank is no worse without.
-void write_report(const fs::path& folder) {
+void write_report(const fs::path& folder, bool has_pictures) {
   try {
     report::Options options;
     options.draw_limit_s = kMostDrawSeconds;
+    if (!has_pictures) options.drawn_modes = 0;
+    if (const std::optional<store::Request> request = store::read_request(folder)) options.title = store::find_input_name(*request);
     report::write_report(folder / store::kBankFile, folder / store::kJobFile, folder, options);
   } catch (const std::exception& error) {
     fmt::print(stderr, "carillon attempt: no report was made: {}\n", error.what());
@@ -60,7 +62,7 @@ std::optional<std::string> find_bank_fault(const fs::path& work, bool& has_bank)
   }
 }
 
-void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome) {
+void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, bool has_pictures) {
   const fs::path work = store.work_folder(id);
   const fs::path folder = store.make_temporary();
   try {
@@ -71,7 +73,7 @@ void publish(const store::Store& store, const store::Id& id, const outcome::Outc
     link_or_copy(fs::exists(resolved, error) ? resolved : work / store::kJobFile, folder / store::kJobFile);
     link_or_copy(work / "request.json", folder / "request.json");
     link_or_copy(work / store::kLogFile, folder / store::kLogFile);
-    write_report(folder);
+    write_report(folder, has_pictures);
     outcome::write_outcome(folder, outcome);
     store.publish(id, folder);
   } catch (...) {

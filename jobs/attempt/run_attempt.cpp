@@ -178,7 +178,7 @@ class Attempt {
     if (outcome_.cause == Cause::done) {
       outcome_.percent = 100.0;
       try {
-        publish(store_, id_, outcome_);
+        publish(store_, id_, outcome_, options_.has_pictures);
         process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
         store_.remove_work(id_);
         return 0;
@@ -233,6 +233,7 @@ std::vector<std::string> make_arguments(const fs::path& program, const Options& 
   if (options.time_limit_s > 0.0) add("--time-limit-s", fmt::format("{}", options.time_limit_s));
   if (options.is_prediction) arguments.emplace_back("--predict");
   for (const std::string& word : options.mpirun_options) arguments.push_back("--mpirun-option=" + word);
+  if (!options.has_pictures) arguments.emplace_back("--no-pictures");
   if (!options.token.empty()) add("--token", options.token);
   if (options.launcher == Launcher::alone) add("--launcher", "alone");
   if (options.launcher == Launcher::mpirun) add("--launcher", "mpirun");

@@ -133,4 +133,14 @@ Source gather_one(const std::string& word, const std::string& solver) {
   return source;
 }
 
+std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word) {
+  std::error_code error;
+  if (!store::parse_id(word) && (fs::exists(word, error) || word.ends_with(".json"))) {
+    const store::Id id = store::require_id(gather_one(word, read_solver_version()).request.id, word);
+    return {id, shared.registry().find(id)};
+  }
+  registry::Job job = find_job(shared, word);
+  return {job.id, job};
+}
+
 }  // namespace carillon::cli

@@ -1,9 +1,12 @@
 // The jobs that a command line names: files, folders, manifests.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "jobs/cli/shared.hpp"
 #include "jobs/spec/job_spec.hpp"
 #include "jobs/store/identity.hpp"
 
@@ -24,5 +27,8 @@ std::vector<Source> gather(const std::vector<std::string>& words, const std::str
 
 /// One job file. Throws what is wrong with it.
 Source gather_one(const std::string& word, const std::string& solver);
+
+/// The id that a word means by its content, and its row if there is one: the job file of now, not of its last submission.
+std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word);
 
 }  // namespace carillon::cli

@@ -1,4 +1,4 @@
-// carillon get and carillon report: what the store has of a job.
+// carillon get: the bank of a job.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
@@ -46,17 +46,6 @@ void copy_to(const fs::path& from, const fs::path& wanted) {
   if (error) refuse(error.value());
 }
 
-/// The id that a word means by its content, and its row if there is one: the job file of now, not of its last submission.
-std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word) {
-  std::error_code error;
-  if (!store::parse_id(word) && (fs::exists(word, error) || word.ends_with(".json"))) {
-    const store::Id id = store::require_id(gather_one(word, read_solver_version()).request.id, word);
-    return {id, shared.registry().find(id)};
-  }
-  registry::Job job = find_job(shared, word);
-  return {job.id, job};
-}
-
 int run_get(Shared& shared, const Options& options) {
   shared.settle();
   const auto [id, job] = find_by_content(shared, options.word);
@@ -82,27 +71,6 @@ int run_get(Shared& shared, const Options& options) {
   return is_done ? 0 : kExitNotYet;
 }
 
-int run_report(Shared& shared, const std::string& word) {
-  shared.settle();
-  const auto [id, job] = find_by_content(shared, word);
-  const fs::path report = shared.store().bank_folder(id) / store::kReportFile;
-  std::error_code error;
-  const bool is_there = fs::exists(report, error);
-  const std::string state = shared.store().has_bank(id) ? "done" : job ? to_text(job->state) : "new";
-  if (shared.json) {
-    Json::Value root;
-    root["id"] = id.text();
-    root["state"] = state;
-    root["report"] = is_there ? to_json(report.string()) : Json::Value();
-    print_json(root);
-  } else if (is_there) {
-    fmt::print("{}\n", report.string());
-  } else {
-    fmt::print(stderr, "carillon: no report yet: {} is {}\n", id.short_text(), state);
-  }
-  return is_there ? 0 : kExitNotYet;
-}
-
 }  // namespace
 
 void add_get(CLI::App& app, Shared& shared, Run& run) {
@@ -112,14 +80,6 @@ void add_get(CLI::App& app, Shared& shared, Run& run) {
   command->add_option("JOB", options->word, "Job file (what it holds now), or an id or its beginning")->required();
   command->add_option("--to", options->to, "Copy the bank to this file or into this folder");
   command->callback([&shared, &run, options] { run = [&shared, options] { return run_get(shared, *options); }; });
-}
-
-void add_report(CLI::App& app, Shared& shared, Run& run) {
-  auto word = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand(
-      "report", "Prints the path of a bank's report (HTML): mesh, modes and proof, error bars, time and memory, pictures.");
-  command->add_option("JOB", *word, "Job file (what it holds now), or an id or its beginning")->required();
-  command->callback([&shared, &run, word] { run = [&shared, word] { return run_report(shared, *word); }; });
 }
 
 }  // namespace carillon::cli

@@ -51,6 +51,7 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
   command->add_option("--cores", options->cores, "Use at most so many")->check(CLI::Range(1, 1'000'000));
   command->add_option("--memory-gb", options->memory_gb, "Use at most so much")->check(CLI::Range(1e-3, 1e9));
   command->add_flag("-q,--quiet", options->quiet, "Print nothing");
+  command->add_flag("!--no-pictures", options->has_pictures, "Make reports of banks without pictures of their first modes");
   auto engine = std::make_shared<std::string>("local");
   command->add_option("--on", *engine, "local: the queue of this machine; slurm: hand over to Slurm and follow, until all have ended")
       ->check(CLI::IsMember({"local", "slurm"}));
@@ -83,6 +84,7 @@ void add_attempt(CLI::App& app, Run& run) {
   command->add_option("--engine", *engine)->check(CLI::IsMember({"local", "slurm"}));
   command->add_option("--launcher", *launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
   command->add_flag("--predict", options->is_prediction);
+  command->add_flag("!--no-pictures", options->has_pictures);
   command->add_option("--grace-s", options->grace_s);
   command->add_option("--hang-s", options->hang_s);
   command->callback([&run, options, launcher, engine] {

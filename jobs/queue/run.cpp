@@ -318,6 +318,7 @@ class Runner {
     attempt.token = job.token;
     attempt.is_prediction = needs.wants_prediction;
     attempt.mpirun_options = options_.mpirun_options;
+    attempt.has_pictures = options_.has_pictures;
     blocked_since_.erase(job.id.text());
     asked_s_.erase(job.id.text());
     const pid_t pid = spawn(attempt::make_arguments(options_.program, attempt), attempt.work / store::kLogFile);

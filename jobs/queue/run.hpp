@@ -14,6 +14,7 @@ struct RunOptions {
   bool keep = false;                        // stay and wait for more when the queue is empty
   bool json = false;                        // JSON lines, on a terminal too
   bool quiet = false;                       // neither bar nor lines
+  bool has_pictures = true;                 // in the reports of banks
   std::vector<std::string> mpirun_options;  // words for mpirun: which hosts, by which network
   int cores = 0;                            // at most so many; 0: all that this process may use
   double memory_gb = 0.0;                   // at most so much; 0: what the machine has

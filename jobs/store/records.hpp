@@ -66,4 +66,7 @@ void write_standing(const std::filesystem::path& folder, const Standing& standin
 std::string to_text(const std::filesystem::path& path);
 std::filesystem::path from_text(const std::string& text);
 
+/// The file name of a request's mesh or surface as it was named; empty for a shape.
+std::string find_input_name(const Request& request);
+
 }  // namespace carillon::store

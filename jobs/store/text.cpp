@@ -64,4 +64,6 @@ std::filesystem::path from_text(const std::string& text) {
   return bytes;
 }
 
+std::string find_input_name(const Request& request) { return from_text(request.input_file).filename().string(); }
+
 }  // namespace carillon::store

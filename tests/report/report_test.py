@@ -478,6 +478,37 @@ class Reports(unittest.TestCase):
         self.assertEqual(words[:3] + words[4:], ["modes", str(self.bank), "-o", "--modes", "1,2,3,4,5,6,7,8,9,10,11,12"])
         self.assertTrue(words[3].startswith(str(self.root / "with-asked")) and words[3].endswith("/report-modes.png"), words[3])
 
+    def test_the_store_keeps_a_report_beside_each_bank(self):
+        def carillon(*words, code=0):
+            run = subprocess.run([BIN / "carillon", "--store", self.root / "store", *words], capture_output=True, text=True, timeout=250)
+            self.assertEqual(run.returncode, code, run.stderr)
+            return run.stdout + run.stderr if code else run.stdout
+        job = self.root / "kept.json"
+        job.write_text(json.dumps({**self.job, "element": "T4", "max_modes": 3}))
+        self.assertIn("no report yet", carillon("report", job, code=1))
+        carillon("submit", job)
+        carillon("run", "-q", "--no-pictures")
+        file = pathlib.Path(carillon("report", job).strip())
+        self.assertEqual(json.loads(carillon("--json", "report", job)), {"id": file.parent.name, "state": "done", "report": str(file)})
+        bank = pathlib.Path(carillon("get", job).strip())
+        self.assertEqual(file, bank.parent / "report.html")
+        self.assertEqual(stat.S_IMODE(file.stat().st_mode), 0o444)
+        page = Page(file)
+        self.assert_whole(page)
+        # The name that the user knows, not that of the snapshot; and all of the record.
+        self.assertEqual(page.title, "chime.msh")
+        self.assertEqual([name for name, is_missing in page.missing.items() if is_missing], ["pictures"])
+        self.assertEqual(len(page.rows("modes", 8)), 4)
+        carillon("report", job, "-o", self.root / "made", "--no-pictures")
+        self.assertEqual((self.root / "made/report.html").read_bytes(), page.source)
+        # Of any bank, with its record beside it.
+        said = carillon("report", self.bank, "-o", self.root / "of file", "--no-pictures")
+        self.assertEqual(said.strip(), str(self.root / "of file/report.html"))
+        self.assertFalse(Page(said.strip()).missing["time"])
+        self.assertIn("-o", carillon("report", self.bank, code=2))
+        self.assertIn("not a Carillon bank", carillon("report", self.root / "chime.msh", "-o", self.root / "none", code=2))
+        self.assertFalse((self.root / "none").exists())
+
     def test_no_pictures_when_none_are_asked_for(self):
         page = write_report(self.bank, self.resolved, self.root / "unasked", "", 0)
         self.assertIn("no pictures were asked for", page.text["pictures"])

@@ -1,0 +1,102 @@
+// carillon report: the page about a bank, of the store or of any file.
+#include "jobs/report/report.hpp"
+
+#include <fmt/core.h>
+
+#include <cstdio>
+
+#include "jobs/cli/gather.hpp"
+#include "jobs/cli/shared.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string word;
+  fs::path folder;  // empty: the report of the store
+  bool no_pictures = false;
+};
+
+fs::path write(const Options& options, const fs::path& bank, const fs::path& resolved_job, const std::string& title) {
+  report::Options wanted;
+  wanted.title = title;
+  if (options.no_pictures) wanted.drawn_modes = 0;
+  report::write_report(bank, resolved_job, options.folder, wanted);
+  return options.folder / report::kPageFile;
+}
+
+void print(Shared& shared, Json::Value root, const fs::path& page) {
+  if (shared.json) {
+    root["report"] = page.empty() ? Json::Value() : to_json(page.string());
+    print_json(root);
+  } else if (!page.empty()) {
+    fmt::print("{}\n", page.string());
+  }
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+}
+
+/// Of a file, which is no matter of the store.
+int report_file(Shared& shared, const Options& options) {
+  const fs::path bank = options.word;
+  if (options.folder.empty()) throw InputError(fmt::format("{}: say with -o into which folder the report of a bank goes", bank.string()));
+  std::error_code error;
+  fs::path record = bank.string() + ".resolved.json";
+  if (!fs::exists(record, error)) record = bank.parent_path() / store::kJobFile;
+  if (!fs::exists(record, error)) record.clear();
+  Json::Value root;
+  root["bank"] = to_json(bank.string());
+  print(shared, root, write(options, bank, record, ""));
+  return 0;
+}
+
+int report_job(Shared& shared, const Options& options) {
+  shared.settle();
+  const auto [id, job] = find_by_content(shared, options.word);
+  const fs::path folder = shared.store().bank_folder(id);
+  const bool is_done = shared.store().has_bank(id);
+  Json::Value root;
+  root["id"] = id.text();
+  root["state"] = is_done ? "done" : job ? to_text(job->state) : "new";
+  fs::path page;
+  std::error_code error;
+  if (is_done && !options.folder.empty()) {
+    const std::optional<store::Request> request = store::read_request(folder);
+    const std::string title = request ? store::find_input_name(*request) : std::string();
+    page = write(options, folder / store::kBankFile, folder / store::kJobFile, title);
+  } else if (is_done && fs::exists(folder / store::kReportFile, error)) {
+    page = folder / store::kReportFile;
+  }
+  print(shared, root, page);
+  if (!page.empty()) return 0;
+  if (!shared.json)
+    fmt::print(stderr, "carillon: no report{}: {} is {}{}\n", is_done ? "" : " yet", id.short_text(), root["state"].asString(),
+               is_done ? ", but its report could not be made then; carillon report -o FOLDER makes one" : "");
+  return kExitNotYet;
+}
+
+}  // namespace
+
+void add_report(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("report",
+                                         "Prints the path of a bank's report (HTML): mesh, modes and proof, error bars, time and memory, "
+                                         "pictures. With -o, writes it anew: of "
+                                         "a job that is done, or of any bank.\nExit code 1: not there yet.");
+  command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
+      ->required();
+  command->add_option("-o,--output", options->folder, "Write report.html and its pictures into this folder");
+  command->add_flag("--no-pictures", options->no_pictures, "With -o: without pictures of the first modes");
+  command->callback([&shared, &run, options] {
+    run = [&shared, options] {
+      std::error_code error;
+      const bool is_file =
+          !store::parse_id(options->word) && !options->word.ends_with(".json") && fs::is_regular_file(options->word, error);
+      return is_file ? report_file(shared, *options) : report_job(shared, *options);
+    };
+  });
+}
+
+}  // namespace carillon::cli
