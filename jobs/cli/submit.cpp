@@ -51,12 +51,13 @@ std::vector<Answer> enter(Shared& shared, const Options& options, const std::vec
   shared.registry();  // brought up to date before there are new folders
   const store::Lock lock = shared.store().lock_shared();
   std::vector<registry::Submission> submissions;
-  std::vector<bool> was_made;
+  std::vector<store::Work> works;
   for (const Source& source : sources) {
     if (!source.error.empty()) continue;
-    was_made.push_back(store::prepare_work(shared.store(), source.job, source.request));
+    works.push_back({&source.job, &source.request});
     submissions.push_back({source.job_file, source.request});
   }
+  const std::vector<bool> was_made = store::prepare_work(shared.store(), works);
   const std::vector<bool> was_inserted = shared.registry().submit(submissions);
   std::vector<Answer> answers;
   std::size_t at = 0;

@@ -15,6 +15,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <sstream>
 
 #include "jobs/store/files.hpp"
@@ -138,6 +139,29 @@ void take_snapshot(const Store& store, const spec::JobSpec& job, const Request& 
   fs::remove_all(temporary, none);
 }
 
+/// What is not synced yet: publish_work() does that.
+void write_unsynced(const fs::path& file, const std::string& text) {
+  std::ofstream stream(file, std::ios::binary);
+  errno = 0;
+  stream << text;
+  stream.close();
+  if (!stream) throw_errno(file, "write", errno != 0 ? errno : EIO);
+}
+
+/// Writes the files of a job into its folder, which is to become work/ab/<id>.
+void fill_work(const Store& store, const spec::JobSpec& job, const Request& request, const Store::Work& place) {
+  spec::JobSpec inner = job;
+  const fs::path work = store.work_folder(place.id);
+  if (request.input_kind != "shape") {
+    const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
+    (job.body ? inner.body->surface : inner.mesh) = input;
+  }
+  inner.bank = work / kBankFile;
+  write_unsynced(place.folder / kJobFile, spec::resolved_json(inner, work, ""));
+  write_unsynced(place.folder / kRequestFile, format_request(request));
+  write_unsynced(place.folder / kStandingFile, format_standing({}));
+}
+
 }  // namespace
 
 std::string make_canonical_job(const spec::JobSpec& job) {
@@ -198,25 +222,29 @@ Request RequestMaker::make(const spec::JobSpec& job) {
 }
 
 bool prepare_work(const Store& store, const spec::JobSpec& job, const Request& request) {
-  const Id id = require_id(request.id, "the request");
-  if (store.has_bank(id) || store.has_work(id)) return false;
-  take_snapshot(store, job, request);
-  spec::JobSpec inner = job;
-  const fs::path work = store.work_folder(id);
-  if (request.input_kind != "shape") {
-    const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
-    (job.body ? inner.body->surface : inner.mesh) = input;
-  }
-  inner.bank = work / kBankFile;
-  const fs::path temporary = store.make_temporary();
+  return prepare_work(store, std::vector<Work>{{&job, &request}})[0];
+}
+
+std::vector<bool> prepare_work(const Store& store, const std::vector<Work>& works) {
+  std::vector<bool> was_made(works.size(), false);
+  std::vector<std::size_t> index;  // of what lies in `folders`
+  std::vector<Store::Work> folders;
   try {
-    config::write_file(temporary / kJobFile, spec::resolved_json(inner, work, ""));
-    write_request(temporary, request);
-    write_standing(temporary, {});
-    return store.publish_work(id, temporary);
+    for (std::size_t i = 0; i < works.size(); ++i) {
+      const Id id = require_id(works[i].request->id, "the request");
+      if (store.has_bank(id) || store.has_work(id)) continue;
+      take_snapshot(store, *works[i].job, *works[i].request);
+      folders.push_back({id, store.make_temporary()});
+      index.push_back(i);
+      fill_work(store, *works[i].job, *works[i].request, folders.back());
+    }
+    if (folders.empty()) return was_made;
+    const std::vector<bool> was_published = store.publish_work(folders);
+    for (std::size_t i = 0; i < index.size(); ++i) was_made[index[i]] = was_published[i];
+    return was_made;
   } catch (...) {
     std::error_code none;
-    fs::remove_all(temporary, none);
+    for (const Store::Work& work : folders) fs::remove_all(work.folder, none);
     throw;
   }
 }

@@ -40,4 +40,11 @@ class RequestMaker {
 /// this call made it. Throws InputError when the input is no longer what was hashed, SystemError when the disk refuses.
 bool prepare_work(const Store& store, const spec::JobSpec& job, const Request& request);
 
+/// The same for many, with one sync for all of them. Per job: true when this call made it.
+struct Work {
+  const spec::JobSpec* job = nullptr;
+  const Request* request = nullptr;
+};
+std::vector<bool> prepare_work(const Store& store, const std::vector<Work>& works);
+
 }  // namespace carillon::store

@@ -9,6 +9,7 @@
 
 #include <sstream>
 
+#include "jobs/store/store.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/file.hpp"
 
@@ -120,15 +121,15 @@ Request parse_request(std::string_view text, const fs::path& name) {
 }
 
 std::optional<Request> read_request(const fs::path& folder) {
-  auto root = read_root(folder / "request.json");
+  auto root = read_root(folder / kRequestFile);
   if (!root) return std::nullopt;
-  return read_request_root(*root, (folder / "request.json").string());
+  return read_request_root(*root, (folder / kRequestFile).string());
 }
 
-void write_request(const fs::path& folder, const Request& request) { config::write_file(folder / "request.json", format_request(request)); }
+void write_request(const fs::path& folder, const Request& request) { config::write_file(folder / kRequestFile, format_request(request)); }
 
 std::optional<Standing> read_standing(const fs::path& folder) {
-  auto root = read_root(folder / "state.json");
+  auto root = read_root(folder / kStandingFile);
   if (!root) return std::nullopt;
   Standing standing;
   standing.state = root->choice("state", {"queued", "waiting", "failed", "cancelled"});
@@ -148,7 +149,7 @@ std::string format_standing(const Standing& standing) {
 }
 
 void write_standing(const fs::path& folder, const Standing& standing) {
-  config::write_file(folder / "state.json", format_standing(standing));
+  config::write_file(folder / kStandingFile, format_standing(standing));
 }
 
 std::optional<Progress> read_progress(const fs::path& folder) {

@@ -30,6 +30,7 @@ constexpr const char* kVersionText = "carillon store 1\n";
 constexpr std::uint64_t kMostVersionBytes = 1000;
 constexpr off_t kMostCopiedBytes = 16 << 20;
 constexpr std::size_t kMostHostLength = 64;
+constexpr std::size_t kFewWorks = 8;  // are synced one by one; of more, the whole file system once
 const std::set<std::string> kFolders{"banks", "inputs", "work", "tmp"};
 
 /// Throws unless the folder holds nothing, or what a store that is being made holds.
@@ -151,8 +152,6 @@ void sync_tree(const fs::path& folder, bool seal) {
 
 /// False when there is a folder of that name already.
 bool rename_into(const fs::path& from, const fs::path& to) {
-  make_folder(to.parent_path());
-  sync_folder(to.parent_path().parent_path());
   if (::rename(from.c_str(), to.c_str()) == 0) return true;
   if (errno == EEXIST || errno == ENOTEMPTY) return false;
   throw_errno(to, "rename", errno);
@@ -212,7 +211,11 @@ fs::path Store::make_temporary() const {
 bool Store::publish(const Id& id, const fs::path& folder) const {
   const fs::path target = bank_folder(id);
   const bool is_known = has_bank(id);
-  if (!is_known) sync_tree(folder, true);
+  if (!is_known) {
+    sync_tree(folder, true);
+    make_folder(target.parent_path());
+    sync_folder(target.parent_path().parent_path());
+  }
   if (is_known || !rename_into(folder, target)) {
     remove_tree(folder);
     return false;
@@ -223,14 +226,26 @@ bool Store::publish(const Id& id, const fs::path& folder) const {
   return true;
 }
 
-bool Store::publish_work(const Id& id, const fs::path& folder) const {
-  const fs::path target = work_folder(id);
-  if (!rename_into(folder, target)) {
-    remove_tree(folder);
-    return false;
+bool Store::publish_work(const Id& id, const fs::path& folder) const { return publish_work({{id, folder}})[0]; }
+
+std::vector<bool> Store::publish_work(const std::vector<Work>& works) const {
+  if (works.size() > kFewWorks) {
+    sync_file_system(root_ / "tmp");
+  } else {
+    for (const Work& work : works) sync_tree(work.folder, false);
   }
-  sync_folder(target.parent_path());
-  return true;
+  std::vector<bool> was_made;
+  std::set<fs::path> parents;
+  for (const Work& work : works) {
+    const fs::path target = work_folder(work.id);
+    make_folder(target.parent_path());
+    parents.insert(target.parent_path());
+    was_made.push_back(rename_into(work.folder, target));
+    if (!was_made.back()) remove_tree(work.folder);
+  }
+  for (const fs::path& parent : parents) sync_folder(parent);
+  sync_folder(root_ / "work");
+  return was_made;
 }
 
 void Store::remove_folder(const fs::path& folder) const {

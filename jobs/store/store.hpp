@@ -28,6 +28,8 @@ namespace carillon::store {
 inline constexpr const char* kBankFile = "bank.hdf";
 inline constexpr const char* kJobFile = "job.json";
 inline constexpr const char* kLogFile = "log";
+inline constexpr const char* kRequestFile = "request.json";
+inline constexpr const char* kStandingFile = "state.json";
 inline constexpr const char* kProgressFile = "progress.jsonl";
 inline constexpr const char* kCheckpointFile = "checkpoint.hdf";
 inline constexpr const char* kReportFile = "report.html";
@@ -76,6 +78,12 @@ class Store {
   bool publish(const Id& id, const std::filesystem::path& folder) const;
   /// The same into work/ (nothing made read-only).
   bool publish_work(const Id& id, const std::filesystem::path& folder) const;
+  /// The same for many at once, with one sync for all. Per folder: true when it got its name.
+  struct Work {
+    Id id;
+    std::filesystem::path folder;
+  };
+  std::vector<bool> publish_work(const std::vector<Work>& works) const;
 
   /// Removes work/ab/<id> or banks/ab/<id>: renamed into tmp/ first, so that it is there whole or not at all.
   void remove_work(const Id& id) const;
