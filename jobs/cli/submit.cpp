@@ -32,10 +32,11 @@ struct Answer {
 };
 
 /// A row that was there: cancelled ones are wanted again, and what was asked for explicitly counts from now on.
-void renew(Shared& shared, const Options& options, const Source& source) {
+void renew(Shared& shared, const Options& options, const Source& source, bool was_made) {
   shared.registry().update(store::require_id(source.request.id, "request"), [&](registry::Job& job) {
     if (job.state == registry::State::running || job.state == registry::State::done) return false;
-    const bool is_lost = job.state == registry::State::failed && job.attempts == 0;  // its folder was gone, and is there again
+    const bool is_lost =
+        job.state == registry::State::failed && (was_made || job.attempts == 0);  // its folder was gone, and is there again
     const bool is_wanted = job.state == registry::State::cancelled || is_lost;
     if (is_wanted) {
       job.state = registry::State::queued;
@@ -66,7 +67,7 @@ std::vector<Answer> enter(Shared& shared, const Options& options, const std::vec
     answer.source = &source;
     if (!source.error.empty()) continue;
     const std::size_t index = at++;
-    if (!was_inserted[index]) renew(shared, options, source);
+    if (!was_inserted[index]) renew(shared, options, source, was_made[index]);
     answer.is_new = was_made[index];
     answer.job = shared.registry().find(store::require_id(source.request.id, "request"));
   }
