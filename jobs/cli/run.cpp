@@ -58,7 +58,7 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
   command->callback([&shared, &run, options, engine] {
     run = [&shared, options, engine] {
       if (*engine == "slurm") {
-        run_with_slurm(shared, options->keep, options->quiet);
+        run_with_slurm(shared, *options);
         return 0;
       }
       options->mpirun_options = shared.profile().mpirun_options;

@@ -47,6 +47,7 @@ class Shared {
   void settle();
 
   bool hands_over = false;                      // settle() hands over to Slurm too: for a command that waits for its jobs
+  bool has_pictures = true;                     // in the reports of what is handed over to Slurm, where the profile does not say no
   std::shared_ptr<slurm::Engine> slurm_engine;  // made when first needed
   double slurm_asked_s = 0.0;                   // boot time
 

@@ -20,9 +20,10 @@ constexpr long kStepNs = 200'000'000;
 
 slurm::Engine& find_engine(Shared& shared) {
   if (!shared.slurm_engine) {
-    shared.slurm_engine = std::make_shared<slurm::Engine>(shared.store(), shared.profile().slurm, find_self(), [](const std::string& line) {
-      fmt::print(stderr, "carillon: {}\n", show_message(line));
-    });
+    slurm::Settings settings = shared.profile().slurm;
+    settings.has_pictures = settings.has_pictures && shared.has_pictures;
+    shared.slurm_engine = std::make_shared<slurm::Engine>(
+        shared.store(), settings, find_self(), [](const std::string& line) { fmt::print(stderr, "carillon: {}\n", show_message(line)); });
   }
   return *shared.slurm_engine;
 }
@@ -69,14 +70,15 @@ queue::Said cancel_in_slurm(Shared& shared, const store::Id& id) {
   return {true, "cancelled"};
 }
 
-void run_with_slurm(Shared& shared, bool keeps, bool is_quiet) {
-  queue::Display display(shared.json, is_quiet);
+void run_with_slurm(Shared& shared, const queue::RunOptions& options) {
+  shared.has_pictures = options.has_pictures;
+  queue::Display display(shared.json, options.quiet);
   for (;;) {
     for (const Job& job : find_engine(shared).follow(shared.registry())) display.tell(to_text(job.state), job);
     for (const Job& job : hand_over(shared)) display.tell(job.state == State::failed ? "failed" : "queued", job);
     const std::vector<Job> open = list_open(shared);
     display.show(shared.store(), open);
-    if (open.empty() && !keeps) return;
+    if (open.empty() && !options.keep) return;
     const double until_s = process::find_boot_seconds() + shared.profile().slurm.poll_s;
     while (process::find_boot_seconds() < until_s) {
       const timespec time{0, kStepNs};

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "jobs/cli/shared.hpp"
+#include "jobs/queue/run.hpp"
 #include "jobs/queue/settle.hpp"
 
 namespace carillon::cli {
@@ -17,9 +18,9 @@ std::size_t hand_over_to_slurm(Shared& shared);
 /// As queue::cancel, for a job of the engine "slurm".
 queue::Said cancel_in_slurm(Shared& shared, const store::Id& id);
 
-/// carillon run --on slurm: hands over, follows, and hands over again what can be tried again, until no job of Slurm's is open (`keeps`:
-/// for ever).
-void run_with_slurm(Shared& shared, bool keeps, bool is_quiet);
+/// carillon run --on slurm: hands over, follows, and hands over again what can be tried again, until no job of Slurm's is open (`keep`: for
+/// ever). Of the options those count that are no matter of this machine: keep, quiet, has_pictures.
+void run_with_slurm(Shared& shared, const queue::RunOptions& options);
 
 /// /proc/self/exe.
 std::filesystem::path find_self();

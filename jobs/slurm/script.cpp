@@ -75,6 +75,7 @@ std::string make_script(const Batch& batch, const Settings& settings) {
   std::string prologue, folders, options;
   for (const std::string& line : settings.prologue) prologue += line + "\n";
   for (const std::string& word : settings.mpirun_options) options += " --mpirun-option=" + quote_word(word);
+  if (!settings.has_pictures) options += " --no-pictures";
   for (const std::string& folder : batch.folders) folders += (folders.empty() ? "" : " ") + quote_word(folder);
   return fill(kJobScript, {{"@PROLOGUE@\n", prologue},
                            {"@FOLDERS@", folders},

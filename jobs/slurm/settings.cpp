@@ -30,6 +30,7 @@ Settings read_settings(std::optional<config::Object> object) {
   settings.most_ranks = static_cast<int>(object->integer_if("most_ranks", 1, 1 << 20).value_or(settings.most_ranks));
   settings.most_running = static_cast<int>(object->integer_if("most_running", 0, 1 << 20).value_or(settings.most_running));
   settings.most_in_array = static_cast<int>(object->integer_if("most_in_array", 1, 1 << 20).value_or(settings.most_in_array));
+  settings.has_pictures = object->boolean_or("pictures", settings.has_pictures);
   settings.options = read_texts(*object, "options");
   settings.prologue = read_texts(*object, "prologue");
   settings.program = object->string_or("program", settings.program);

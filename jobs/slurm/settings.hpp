@@ -19,6 +19,7 @@ struct Settings {
   std::vector<std::string> options;     // words for sbatch, before ours: {"--constraint=zen3"}
   std::vector<std::string> prologue;    // lines of shell at the start of every job: "module load openmpi". The profile is the user's own.
   std::vector<std::string> mpirun_options;  // words for mpirun or srun, from the profile's own "mpirun_options"
+  bool has_pictures = true;                 // in the reports of banks
   double poll_s = 10.0;                     // Slurm is not asked more often by one command that waits
   std::string program;                      // carillon as the nodes know it; empty: the one that submits
 };
