@@ -146,6 +146,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
     }
     remove_batch_folder(batch.root, batch.name);
   };
+  std::string number;
   try {
     const std::string script = make_script(batch, site_.settings());
     std::vector<store::Id> ids;
@@ -157,23 +158,24 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
       write_handed(work, {batch.name, batch.title, jobs.size() > 1 ? static_cast<int>(i) : -1, before ? before->token : ""});
     }
     make_batch_folder(store_, batch.name, script, ids);
-    const std::string number = site_.submit(batch);
-    write_number(batch.root, batch.name, number);
-    for (std::size_t i = 0; i < jobs.size(); ++i) {
-      change(jobs[i], [&](Job& row) {
-        row.state = State::queued;
-        row.slurm_job = jobs.size() > 1 ? fmt::format("{}_{}", number, i) : number;
-        row.given = jobs[i].given;
-        row.reason = "handed to Slurm";
-      });
-    }
+    number = site_.submit(batch);
   } catch (const Unreachable& error) {
     // It may have taken the batch and not told: then it is there by its name, and adopt() finds it.
-    tell_unreachable(error);
+    return tell_unreachable(error);
   } catch (const SystemError& error) {
-    give_up(State::failed, error.what());
+    return give_up(State::failed, error.what());
   } catch (const InputError& error) {
-    give_up(State::failed, error.what());
+    return give_up(State::failed, error.what());
+  }
+  // Slurm has it. Where this cannot be written any more (a full disk) adopt() finds it later, as after a kill.
+  write_number(batch.root, batch.name, number);
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    change(jobs[i], [&](Job& row) {
+      row.state = State::queued;
+      row.slurm_job = jobs.size() > 1 ? fmt::format("{}_{}", number, i) : number;
+      row.given = jobs[i].given;
+      row.reason = "handed to Slurm";
+    });
   }
 }
 
@@ -252,6 +254,9 @@ void Engine::look_at(registry::Registry& registry, const Job& job, const Seen& s
 
 void Engine::settle(registry::Registry& registry, const Job& job, const std::optional<Seen>& seen, Rows& changed) {
   if (seen && seen->phase != Phase::ended) return look_at(registry, job, *seen, changed);
+  // Another command may have settled it while Slurm was asked, and handed it over again.
+  const std::optional<Job> now = registry.find(job.id);
+  if (!now || now->slurm_job != job.slurm_job || !is_open(*now)) return;
   const fs::path work = store_.work_folder(job.id);
   const Handed handed = read_handed(work).value_or(Handed{});
   const bool is_done = store_.has_bank(job.id);
@@ -264,9 +269,9 @@ void Engine::settle(registry::Registry& registry, const Job& job, const std::opt
     append_output(store_.root(), work, handed);
     has_asked_memory = find_asked(work).memory_gb > 0.0;
   }
-  remove_handed(work);
   registry.update(job.id, [&](Job& row) {
     if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
+    remove_handed(work);
     row.slurm_job.clear();
     row.attempts += seen ? seen->restarts : 0;
     row.ended_unix_s = registry::find_unix_seconds();
