@@ -143,7 +143,9 @@ class Runner {
       const std::optional<Job> row = registry_.find(job.id);
       if (!row || row->state != State::running || row->token != job.token || code == attempt::kExitBusy || store_.has_bank(job.id))
         continue;
-      if (find_standing(store_, *row) != Standing::unbegun) continue;
+      // Starting: its row still names us, where it could not be told who was started.
+      const Standing standing = find_standing(store_, *row);
+      if (standing != Standing::unbegun && standing != Standing::starting) continue;
       settle_unbegun(store_, registry_, *row, code);
       if (const std::optional<Job> now = registry_.find(job.id)) tell_end(*now);
     }
@@ -246,11 +248,22 @@ class Runner {
     });
   }
 
+  /// Claimed by this process, neither started nor waiting to be: its end could not be written (a full disk).
+  bool is_forgotten(const Job& job) const {
+    const process::Identity self = process::find_self();
+    const bool is_ours = job.worker.pid == self.pid && job.worker.start_ticks == self.start_ticks && job.worker.boot == self.boot;
+    const auto is_same = [&](const Job& other) { return other.id == job.id; };
+    return is_ours && std::none_of(claimed_.begin(), claimed_.end(), is_same) &&
+           std::none_of(children_.begin(), children_.end(), [&](const auto& child) { return is_same(child.second); });
+  }
+
   /// Rows that were claimed in another container or under another name of this machine, and that nobody began to work on.
   void release_lost(const std::vector<Job>& jobs) {
     const double now_s = process::find_boot_seconds();
     for (const Job& job : jobs) {
-      if (job.state != State::running || find_standing(store_, job) != Standing::elsewhere) {
+      const Standing standing = job.state == State::running ? find_standing(store_, job) : Standing::ended;
+      if (standing == Standing::starting && is_forgotten(job)) give_back(job);
+      if (standing != Standing::elsewhere) {
         lost_since_.erase(job.id.text());
       } else if (now_s - lost_since_.try_emplace(job.id.text(), now_s).first->second > kLostPatienceS) {
         give_back(job);
