@@ -1,3 +1,4 @@
+// One search from its first trial to what is told of it: longer than most files.
 // Method:     A coarse solve gives every mode's error bar in parts whose rates of convergence are known. They say how much finer the mesh
 //             must be; its cost follows from the nodes by measured exponents. What is predicted is then solved and its own error bars
 //             decide; where they fall short the rate that was measured between two trials slows a known one that is faster.

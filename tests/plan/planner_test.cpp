@@ -1,3 +1,4 @@
+// A rule of the planner a test, on the same few scenes: longer than most files.
 #include "runtime/plan/planner.hpp"
 
 #include <gtest/gtest.h>

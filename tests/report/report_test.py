@@ -1,4 +1,5 @@
-"""The report of a bank as a browser reads it, held against the bank and the record as h5py and Python read them.
+"""The report of a bank as a browser reads it, held against the bank and the record as h5py and Python read them:
+a test for every section, hence longer than most files.
 
 Finds the programs in $CARILLON_BIN_DIR. The library is called by write_report.
 """
