@@ -33,7 +33,7 @@ TEST(Foresight, never_falls_and_ends_at_100_whatever_happens) {
       ASSERT_GE(percent, before) << "seed " << seed;
       ASSERT_LT(percent, 100) << "seed " << seed;
       const auto left = foresight.calc_seconds_left(seconds);
-      if (left) ASSERT_GE(*left, 0) << "seed " << seed;
+      ASSERT_GE(left.value_or(0), 0) << "seed " << seed;
       before = percent;
       seconds += draw(20);
     };
