@@ -20,12 +20,16 @@ struct Options {
   std::string token;          // 32 hex digits; empty: made here
   Launcher launcher = Launcher::automatic;
   std::vector<std::string> mpirun_options;  // words for mpirun or srun, before ours: which hosts, by which network
-  bool has_pictures = true;                 // in the report of the bank, where carillon-draw is installed
+  bool has_pictures = true;                 // in the report of the bank, where carillon-draw is installed and memory_gb has room for it
   bool is_prediction = false;               // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
   double grace_s = 60.0;                    // from "save and stop" to the kill
   double hang_s = 600.0;                    // without progress, while a rank does not work
   double silence_s = 24 * 3600.0;           // without progress, whatever the ranks do
 };
+
+/// What carillon-draw and its X server take for the pictures of a report [GB]: 0.54 measured, for small bodies and large ones. It draws
+/// when the solver has ended, so a job needs the larger of the two.
+inline constexpr double kDrawGb = 0.8;
 
 /// Nobody's error: another attempt works in this folder, and this one did nothing (EX_TEMPFAIL).
 inline constexpr int kExitBusy = 75;

@@ -16,7 +16,8 @@ std::optional<std::string> find_bank_fault(const std::filesystem::path& work, bo
 
 /// Puts bank, resolved job, request, log, outcome and a report, with pictures or without, into one folder and publishes it as the bank of
 /// `id`; nothing is taken from the folder of work before that. SystemError when the disk refuses: nothing is published then.
-void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, bool has_pictures = true);
+void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, bool has_pictures = true,
+             double memory_gb = 0.0);
 
 /// A file that keeps some room on the disk, so that the end of an attempt can be written when the disk is full. Without effect where there
 /// is no room already.

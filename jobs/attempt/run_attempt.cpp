@@ -178,7 +178,7 @@ class Attempt {
     if (outcome_.cause == Cause::done) {
       outcome_.percent = 100.0;
       try {
-        publish(store_, id_, outcome_, options_.has_pictures);
+        publish(store_, id_, outcome_, options_.has_pictures, options_.memory_gb);
         process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
         store_.remove_work(id_);
         return 0;

@@ -53,14 +53,14 @@ int choose_ranks(const Host& host, const Need& need, std::size_t competitors) {
 
 double calc_memory(const Need& need, int ranks) {
   if (need.memory_gb > 0.0) return need.memory_gb;
-  if (need.predicted_gb.empty()) return kUnknownGb;
+  if (need.predicted_gb.empty()) return std::max(kUnknownGb, need.least_gb);
   // Between the powers of two that were predicted the larger of both; beyond them the last.
   const auto place = static_cast<std::size_t>(std::max(0.0, std::log2(std::max(1, ranks))));
   const std::size_t last = need.predicted_gb.size() - 1;
   const bool is_power = (ranks & (ranks - 1)) == 0;
   const double predicted_gb =
       std::max(need.predicted_gb[std::min(place, last)], need.predicted_gb[std::min(place + (is_power ? 0 : 1), last)]);
-  return predicted_gb;
+  return std::max(predicted_gb, need.least_gb);
 }
 
 std::vector<Ruling> choose(const Host& host, const std::vector<Admitted>& running, const std::vector<Candidate>& candidates) {

@@ -25,6 +25,7 @@ struct Need {
   double memory_gb = 0.0;                 // asked for, or more after an attempt that ran out of it; 0: as predicted
   double seconds = 0.0;                   // on one rank, predicted; 0: not known, and small
   std::vector<double> predicted_gb = {};  // on 1, 2, 4, 8 ... ranks; empty: not known
+  double least_gb = 0.0;                  // whatever is predicted, so much is given: for what follows the solve
 };
 
 /// Memory of a job on so many ranks [GB].

@@ -36,6 +36,7 @@ using registry::Job;
 using registry::State;
 
 constexpr std::size_t kMostCandidates = 256;
+constexpr double kDrawingHosts = 4;  // Smaller machines than so many drawings take give no job memory for them.
 constexpr double kAskAgainS = 5.0, kDiskPatienceS = 2.0, kLostPatienceS = 60.0;
 
 sigset_t make_signals() {
@@ -207,6 +208,7 @@ class Runner {
     const auto known = needs_.find(job.id.text());
     if (known != needs_.end()) return known->second;
     JobNeeds needs = find_needs(store_, job);
+    if (options_.has_pictures && find_host().total_gb > kDrawingHosts * attempt::kDrawGb) needs.need.least_gb = attempt::kDrawGb;
     if (needs.wants_prediction && !can_predict_) can_predict_ = attempt::can_predict();
     if (needs.wants_prediction) needs.wants_prediction = *can_predict_;
     return needs_.emplace(job.id.text(), needs).first->second;

@@ -47,7 +47,9 @@ Html make_picture_section(const Subject& subject, const fs::path& folder, const 
   if (modes < 1) {
     fs::remove(folder / kPictureFile, error);
     return leave_out("pictures", kHeading,
-                     subject.bank.mode_count() == 0 ? "the bank has no modes to draw." : "no pictures were asked for.");
+                     subject.bank.mode_count() == 0   ? "the bank has no modes to draw."
+                     : options.undrawn_reason.empty() ? "no pictures were asked for."
+                                                      : options.undrawn_reason + ".");
   }
   const Drawing drawing = draw_modes(options.draw_program, subject.file, modes, folder / kPictureFile, options.draw_limit_s);
   if (!drawing.fault.empty()) return leave_out("pictures", kHeading, drawing.fault + ".");

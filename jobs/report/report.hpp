@@ -14,6 +14,7 @@ inline constexpr const char* kPictureFile = "report-modes.png";
 struct Options {
   std::string title;                   // of the page; empty: the mesh, surface or shape of the job
   int drawn_modes = 6;                 // pictures of so many first modes, at most 12; 0: none
+  std::string undrawn_reason;          // why there are none, for the page; empty: none were asked for
   std::filesystem::path draw_program;  // empty: carillon-draw beside this program, else in PATH
   double draw_limit_s = 120.0;         // it is ended when it takes longer, and the report goes without pictures
 };

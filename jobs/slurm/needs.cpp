@@ -36,6 +36,7 @@ store::Resources find_resources(const store::Store& store, const registry::Job& 
     predict(store, job, needs.need, program);
     needs = queue::find_needs(store, job);
   }
+  if (settings.has_pictures) needs.need.least_gb = attempt::kDrawGb;
   store::Resources resources;
   resources.time_limit_s = needs.time_limit_s;
   resources.ranks = needs.need.ranks;
