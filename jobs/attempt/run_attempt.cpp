@@ -100,6 +100,8 @@ class Attempt {
       set(Cause::bad_input, error.what());
     } catch (const std::bad_alloc&) {
       set(Cause::memory, "out of memory while the bank was verified");
+    } catch (const std::exception& error) {
+      set(is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
     }
     outcome_.seconds = find_seconds() - start_s;
     outcome_.percent = std::max(outcome_.percent, before ? before->percent : 0.0);
@@ -182,7 +184,7 @@ class Attempt {
         process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
         store_.remove_work(id_);
         return 0;
-      } catch (const SystemError& error) {
+      } catch (const std::exception& error) {
         if (store_.has_bank(id_)) return 0;  // only the work could not be removed
         set(is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
       }

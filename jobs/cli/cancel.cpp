@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
@@ -57,11 +58,13 @@ int run_retry(Shared& shared, const Options& options) {
   if (options.all_failed) {
     for (registry::Job& job : shared.registry().list({registry::State::failed})) jobs.push_back(std::move(job));
   }
+  std::optional<store::Lock> lock = shared.store().lock_shared();  // gc waits
   const int code = do_to_all(shared, jobs, [&](const registry::Job& job) {
     const queue::Said said = queue::retry(shared.store(), shared.registry(), job.id);
     if (said.is_done) shared.registry().update(job.id, [&](registry::Job& row) { return options.resources.apply(row); });
     return said;
   });
+  lock.reset();
   const auto is_for_slurm = [&](const registry::Job& job) {
     const auto row = shared.registry().find(job.id);
     return row && row->engine == "slurm";

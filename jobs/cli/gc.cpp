@@ -115,15 +115,18 @@ bool is_owner_gone(const std::string& name) {
   return process::find_life(owner) == process::Life::gone;
 }
 
-void add_jobs(Shared& shared, const References& references, std::vector<Item>& items, std::set<fs::path>& used_inputs) {
+/// False: a record could not be read, so that nobody knows which inputs are used.
+bool add_jobs(Shared& shared, const References& references, std::vector<Item>& items, std::set<fs::path>& used_inputs) {
   const store::Store& store = shared.store();
+  bool is_known = true;
   const auto use_input = [&](const fs::path& folder) {
     try {
       const auto request = store::read_request(folder);
       if (request && request->input_kind != "shape")
         used_inputs.insert(
             store.input_file(store::require_id(request->input_sha256, "request"), request->input_format).replace_extension());
-    } catch (const InputError&) {  // a damaged record keeps nothing alive
+    } catch (const InputError&) {
+      is_known = false;
     }
   };
   for (const store::Id& id : store.list_banks()) {
@@ -143,14 +146,19 @@ void add_jobs(Shared& shared, const References& references, std::vector<Item>& i
     else
       use_input(folder);
   }
+  return is_known;
 }
 
-void add_files(const store::Store& store, const std::set<fs::path>& used_inputs, std::vector<Item>& items) {
+void add_inputs(const store::Store& store, const std::set<fs::path>& used_inputs, std::vector<Item>& items) {
   std::error_code error;
   for (fs::recursive_directory_iterator it(store.root() / "inputs", error), end; !error && it != end; it.increment(error)) {
     if (it->is_directory() || used_inputs.count(fs::path(it->path()).replace_extension()) > 0) continue;
     items.push_back({"input", it->path(), "no bank and no job is made of it", calc_bytes(it->path())});
   }
+}
+
+void add_files(const store::Store& store, std::vector<Item>& items) {
+  std::error_code error;
   for (fs::directory_iterator it(store.root() / "tmp", error), end; !error && it != end; it.increment(error)) {
     if (is_owner_gone(it->path().filename().string()))
       items.push_back({"temporary", it->path(), "the process that made it is gone", calc_bytes(it->path())});
@@ -187,8 +195,8 @@ int run_gc(Shared& shared, bool is_deleting) {
   {
     const store::Lock lock = is_deleting ? shared.store().lock_exclusive() : shared.store().lock_shared();
     const References references = find_references(shared);
-    add_jobs(shared, references, items, used_inputs);
-    add_files(shared.store(), used_inputs, items);
+    if (add_jobs(shared, references, items, used_inputs)) add_inputs(shared.store(), used_inputs, items);
+    add_files(shared.store(), items);
     if (is_deleting) remove_items(shared, references, items);
   }
   double bytes = 0.0;

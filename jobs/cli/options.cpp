@@ -51,7 +51,7 @@ bool ResourceOptions::apply(registry::Job& job) const {
   request.resources = job.resources;
   apply(request);
   job.resources = request.resources;
-  if (!engine.empty()) job.engine = engine;
+  if (!engine.empty() && job.slurm_job.empty()) job.engine = engine;  // What Slurm has is Slurm's until it is cancelled.
   return ranks > 0 || memory_gb > 0 || !time_limit.empty() || !engine.empty();
 }
 

@@ -88,10 +88,15 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job) {
   needs.need = guess_need(size.nodes);
   const bool has_prediction = read_prediction(folder, needs.need);
   needs.wants_prediction = !has_prediction && job.resources.memory_gb <= 0.0 && (!size.is_known || size.nodes > kLargeNodes);
+  set_asked(needs, job);
+  return needs;
+}
+
+void set_asked(JobNeeds& needs, const registry::Job& job) {
   needs.need.ranks = job.resources.ranks;
   needs.need.memory_gb = job.resources.memory_gb;
   needs.time_limit_s = job.resources.time_limit_s;
-  return needs;
+  if (job.resources.memory_gb > 0.0) needs.wants_prediction = false;
 }
 
 }  // namespace carillon::queue

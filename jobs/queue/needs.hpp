@@ -16,6 +16,9 @@ struct JobNeeds {
 /// Reads request.json and prediction.json of the job's folder. A damaged one is as none.
 JobNeeds find_needs(const store::Store& store, const registry::Job& job);
 
+/// What the row asks for, which may have changed since the needs were found.
+void set_asked(JobNeeds& needs, const registry::Job& job);
+
 /// A guess by the number of nodes of the volume mesh as solved: upper bounds for compact bodies in the whole band.
 Need guess_need(double nodes);
 

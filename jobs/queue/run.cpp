@@ -67,6 +67,7 @@ class Runner {
         if (!attempt::is_disk_full(store_.root()) && !attempt::is_disk_full(store_.registry_folder())) throw;
         if (!is_disk_told_) display_.say(fmt::format("the disk is full ({}); this goes on when there is room", error.what()));
         is_disk_told_ = true;
+        if (stops_ > 0 && list_attempts().empty()) return exit_code_;
         pause(kDiskPatienceS);
         continue;
       }
@@ -140,6 +141,7 @@ class Runner {
       if (child == children_.end()) continue;
       const Job job = child->second;
       children_.erase(child);
+      needs_.erase(job.id.text());
       const int code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
       const std::optional<Job> row = registry_.find(job.id);
       if (!row || row->state != State::running || row->token != job.token || code == attempt::kExitBusy || store_.has_bank(job.id))
@@ -206,7 +208,10 @@ class Runner {
 
   const JobNeeds& find_job_needs(const Job& job) {
     const auto known = needs_.find(job.id.text());
-    if (known != needs_.end()) return known->second;
+    if (known != needs_.end()) {
+      set_asked(known->second, job);
+      return known->second;
+    }
     JobNeeds needs = find_needs(store_, job);
     if (options_.has_pictures && find_host().total_gb > kDrawingHosts * attempt::kDrawGb) needs.need.least_gb = attempt::kDrawGb;
     if (needs.wants_prediction && !can_predict_) can_predict_ = attempt::can_predict();

@@ -259,7 +259,7 @@ void Registry::remove(const std::vector<store::Id>& ids) {
   data_->guard([&](Database& database) {
     Transaction transaction(database);
     for (const store::Id& id : ids) {
-      Statement row(database, "delete from jobs where id = ?");
+      Statement row(database, "delete from jobs where id = ? and state in ('failed', 'cancelled', 'done')");
       row.bind(id.text()).step();
     }
     transaction.commit();

@@ -82,7 +82,7 @@ class Registry {
   /// or `change` returns false (it found the row not as expected, e.g. another token).
   bool update(const store::Id& id, const std::function<bool(Job&)>& change);
 
-  /// Forgets rows (gc).
+  /// Forgets rows that have ended (gc); others stay.
   void remove(const std::vector<store::Id>& ids);
   /// Forgets all submissions but these (gc); the caller holds store::Store::lock_exclusive().
   void keep_submissions(const std::vector<Submission>& submissions);

@@ -214,8 +214,12 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
   for (Job& job : jobs) {
     if (!job.slurm_job.empty()) continue;
     const bool is_claimed = job.state == State::running;
-    if (is_claimed && process::find_life(job.worker) != process::Life::gone && job.worker.pid != process::find_self().pid) continue;
     const std::optional<Handed> handed = read_handed(store_.work_folder(job.id));
+    // A registry that was made again names the attempt itself, wherever it runs; else whoever claimed the job may be about to hand it over.
+    const auto attempt = outcome::read_attempt(store_.work_folder(job.id));
+    const bool is_attempt = handed && attempt && attempt->token == job.token;
+    if (is_claimed && !is_attempt && process::find_life(job.worker) != process::Life::gone && job.worker.pid != process::find_self().pid)
+      continue;
     std::string number;
     if (handed) {
       number = numbers.try_emplace(handed->batch, read_number(store_.root(), handed->batch)).first->second;

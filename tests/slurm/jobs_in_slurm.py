@@ -175,11 +175,22 @@ def killed_rank(store):
     store.check_bank(job)
 
 
+def wait_until_saved(number):
+    """slurmctld writes its jobs some seconds after a change; killed before that it forgets them, and gives their numbers away again."""
+    saved = pathlib.Path(os.environ["SLURM_CONF"]).parent / "state/job_state"
+    since = time.time()
+    subprocess.run(["scontrol", "update", f"JobId={number}", "TimeLimit+=1"], check=True)
+    deadline = time.monotonic() + 30
+    while not saved.exists() or saved.stat().st_mtime < since:
+        check(time.monotonic() < deadline, "slurmctld does not write its state")
+        time.sleep(0.2)
+
+
 def killed_daemon(store):
     """kill -9 of the node's daemon and of the controller: the job goes on, its state stays while nobody answers, and is right afterwards."""
     job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
     store.wait_for_solver(job, 2)
-    store.wait(job, "running", 20)
+    wait_until_saved(store.wait(job, "running", 20)["slurm_job"])
     cluster("kill", "slurmd")
     cluster("kill", "slurmctld")
     check(store.status(job)["state"] == "running", f"a controller that does not answer changed the state: {store.status(job)}")
