@@ -7,6 +7,7 @@
 #include <exception>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "jobs/cli/shared.hpp"
 #include "runtime/config/error.hpp"
@@ -40,6 +41,25 @@ int fail(bool json, const std::string& what, int code) {
   return code;
 }
 
+/// What follows "study" belongs to another program, its own --help too; of what stands before it, only --json does.
+void hand_over_study(int argc, char** argv) {
+  std::vector<std::string> json;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "study") {
+      std::vector<std::string> rest(argv + i + 1, argv + argc);
+      rest.insert(rest.end(), json.begin(), json.end());
+      become(find_program("carillon-study"), rest);
+    }
+    if (word == "--json")
+      json = {"--json"};
+    else if (word == "--store" || word == "--profile")
+      ++i;
+    else
+      return;
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app(kAbout, "carillon");
   app.footer(kFooter);
@@ -55,11 +75,9 @@ int run(int argc, char** argv) {
        {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_validate, add_study, add_report})
     add(app, shared, command);
   add_attempt(app, command);
-  // What follows "study" belongs to another program.
   const bool wants_json = std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
   try {
-    if (argc > 1 && std::string_view(argv[1]) == "study")
-      become(find_program("carillon-study"), {argv + 2, argv + argc});  // its own --help
+    hand_over_study(argc, argv);
     app.parse(argc, argv);
     return command();
   } catch (const CLI::ParseError& error) {

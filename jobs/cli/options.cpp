@@ -32,10 +32,19 @@ double parse_seconds(const std::string& text) {
   return value * unit;
 }
 
+CLI::Validator make_gb_check(double least) {
+  return {[least](const std::string& text) {
+            double value = 0.0;
+            const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
+            if (end.ec == std::errc() && end.ptr == text.data() + text.size() && value >= least && value <= kMostGb) return std::string();
+            return fmt::format("{}: give gigabytes, from {} to {}", show(text), least, kMostGb);
+          },
+          fmt::format("FLOAT in [{} - {}]", least, kMostGb)};
+}
+
 void ResourceOptions::add(CLI::App& command) {
   command.add_option("--ranks", ranks, "MPI ranks of each job; without it, predicted from the mesh")->check(CLI::Range(1, kMostRanks));
-  command.add_option("--memory-gb", memory_gb, "Memory of each job, all ranks together; without it, predicted")
-      ->check(CLI::Range(1e-6, kMostGb));
+  command.add_option("--memory-gb", memory_gb, "Memory of each job, all ranks together; without it, predicted")->check(make_gb_check(1e-6));
   command.add_option("--time-limit", time_limit, "Of one attempt: seconds, or 15m, 2h; what is saved by then goes on in the next");
   command.add_option("--on", engine, "Where they run: local (this machine) or slurm")->check(CLI::IsMember({"local", "slurm"}));
 }

@@ -23,6 +23,9 @@ struct ResourceOptions {
   bool apply(registry::Job& job) const;
 };
 
+/// Gigabytes of memory, `least` or more. Not-a-number lies outside, which CLI::Range does not see.
+CLI::Validator make_gb_check(double least);
+
 /// Seconds of "90", "90s", "15m", "2h" or "1d". InputError for anything else.
 double parse_seconds(const std::string& text);
 

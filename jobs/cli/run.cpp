@@ -5,6 +5,7 @@
 
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/cli/follow.hpp"
+#include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
 #include "jobs/cli/slurm.hpp"
 #include "jobs/queue/settle.hpp"
@@ -49,7 +50,7 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
                                          "queue is empty, whatever became of single jobs.");
   command->add_flag("--keep", options->keep, "Stay and wait for more jobs when the queue is empty");
   command->add_option("--cores", options->cores, "Use at most so many")->check(CLI::Range(1, 1'000'000));
-  command->add_option("--memory-gb", options->memory_gb, "Use at most so much")->check(CLI::Range(1e-3, 1e9));
+  command->add_option("--memory-gb", options->memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
   command->add_flag("-q,--quiet", options->quiet, "Print nothing");
   command->add_flag("!--no-pictures", options->has_pictures, "Make reports of banks without pictures of their first modes");
   auto engine = std::make_shared<std::string>("local");

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdio>
 #include <optional>
+#include <string>
 
 #include "jobs/process/process.hpp"
 #include "jobs/store/records.hpp"
@@ -106,9 +107,10 @@ void Display::show(const store::Store& store, const std::vector<registry::Job>& 
       told = progress->percent;
       print(fmt::format(
           "{{\"event\": \"progress\", \"id\": \"{}\", \"phase\": {}, \"percent\": {:.1f}, \"modes_done\": {}, \"modes_wanted\": {}, "
-          "\"seconds_left\": {:.1f}}}",
-          job.id.text(), config::quote(progress->phase), progress->percent, progress->modes_done, progress->modes_wanted,
-          progress->seconds_left));
+          "\"seconds_left\": {}}}",
+          job.id.text(), config::quote(progress->phase), progress->percent, progress->modes_done,
+          progress->modes_wanted >= 0 ? std::to_string(progress->modes_wanted) : "null",
+          progress->seconds_left >= 0 ? fmt::format("{:.1f}", progress->seconds_left) : "null"));
     } else if (first.empty()) {
       const int filled = static_cast<int>(std::clamp(progress->percent / 100.0, 0.0, 1.0) * kBarWidth);
       first = fmt::format("  [{:#>{}}{:.>{}}] {:3.0f} % {} {}{}", "", filled, "", kBarWidth - filled, progress->percent, clean(job.name),

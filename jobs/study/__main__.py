@@ -6,6 +6,8 @@
 Exit codes: 0 done, 2 the input cannot be used, 3 the work has grown, 4 the machine refused.
 """
 import argparse
+import contextlib
+import json
 import os
 import pathlib
 import shutil
@@ -72,11 +74,22 @@ def make_parser():
     one.add_argument("--check", metavar="FILE", help="compare the work per phase with this file's, and fail where it has grown by more than 5 %%")
     one.add_argument("--timeout", type=float, default=3600, help="seconds that one run may take (default: 3600)")
     one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: beside this program)")
+    one.add_argument("--json", action="store_true", help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error")
     return parser
 
 
 def run(arguments):
     options = make_parser().parse_args(arguments)
+    if not options.json:
+        run_study(options)
+        return 0
+    with contextlib.redirect_stdout(sys.stderr):
+        study = run_study(options)
+    print(json.dumps({"report": str((study.out / "report.md").resolve()), "cases": work.collect(study)}, indent=2))
+    return 0
+
+
+def run_study(options):
     if options.record and options.check:
         raise scaling.InputError("--record and --check exclude each other: one writes what the other reads")
     recorded = work.read(options.check) if options.check else None
@@ -89,7 +102,7 @@ def run(arguments):
         print(f"{options.record}: the work of {len(study.cases)} cases", flush=True)
     if recorded is not None:
         work.check(recorded, study, options)
-    return 0
+    return study
 
 
 def main():
@@ -106,6 +119,8 @@ def main():
         code, text = 4, error
     except KeyboardInterrupt:
         return 130
+    if "--json" in sys.argv[1:]:
+        print(json.dumps({"error": str(text), "exit_code": code}, indent=2))
     print(f"carillon-study: error: {text}", file=sys.stderr)
     return code
 

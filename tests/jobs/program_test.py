@@ -94,6 +94,17 @@ class Path(Bench):
         self.assertFalse(self.store.exists() and any(self.store.glob("banks/*/*")))
         self.run_it("validate", self.write("bad.json", make_job(band_hz=[5, 1])), code=2)
 
+    def test_memory_that_is_no_number_is_refused(self):
+        file = self.write("bar.json", make_job())
+        for word in ("nan", "inf", "-1", "0", "1e400", "2x", ""):
+            self.refuse("submit", file, f"--memory-gb={word}", says="--memory-gb")
+        self.refuse("run", "--memory-gb=nan", says="--memory-gb")
+
+    def test_study_speaks_json_too(self):
+        for words in (["study", "scaling", "none.json", "--json"], ["--json", "study", "scaling", "none.json"]):
+            done = subprocess.run([BIN / "carillon", *words], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            self.assertEqual((done.returncode, json.loads(done.stdout)["exit_code"]), (2, 2))
+
     def test_cancel_and_retry(self):
         file = self.write("bar.json", make_job())
         self.ask("submit", file)
