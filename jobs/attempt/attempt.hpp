@@ -13,7 +13,7 @@ namespace carillon::attempt {
 enum class Launcher { automatic, alone, mpirun, srun };  // automatic: alone for one rank outside Slurm, else mpirun
 
 struct Options {
-  std::filesystem::path work;  // STORE/work/ab/<id>
+  std::filesystem::path work;  // work/ab/<id> of a store
   int ranks = 1;
   double memory_gb = 0.0;     // admitted, for the record; 0: not known
   double time_limit_s = 0.0;  // of this attempt; 0: none

@@ -32,11 +32,11 @@ using outcome::Cause;
 constexpr std::uintmax_t kMostLog = 1 << 16;  // what is read of it
 
 fs::path find_root(const fs::path& work) {
-  // STORE/work/ab/<id>
+  // work/ab/<id> of a store
   const fs::path root = work.parent_path().parent_path().parent_path();
   std::error_code error;
   if (!fs::is_regular_file(root / "VERSION", error) || work.parent_path().parent_path().filename() != "work")
-    throw InputError(fmt::format("{}: this is no folder of work of a store; name STORE/work/ab/ID", work.string()));
+    throw InputError(fmt::format("{}: this is no folder of work of a store; name work/ab/ID of a store", work.string()));
   return root;
 }
 

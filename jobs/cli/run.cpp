@@ -75,7 +75,7 @@ void add_attempt(CLI::App& app, Run& run) {
   auto launcher = std::make_shared<std::string>();
   CLI::App* command =
       app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and the scripts of Slurm")->group("");
-  command->add_option("WORK", options->work, "STORE/work/ab/ID")->required();
+  command->add_option("WORK", options->work, "work/ab/ID of a store")->required();
   command->add_option("--ranks", options->ranks)->check(CLI::Range(1, 1'000'000));
   command->add_option("--memory-gb", options->memory_gb);
   command->add_option("--time-limit-s", options->time_limit_s);

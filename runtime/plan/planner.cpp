@@ -1,4 +1,4 @@
-// All rules read and write the same state of a body; longer than most files, half of it reasons in words.
+// All rules read and write the same state of a body; longer than most files.
 // Method:     every event says what it calls for, and until when: a strike, for as long as its modes and its click are heard; a motion,
 //             when a way to a microphone has changed by more than can be told; a lasting contact, while it slides, rolls or takes energy.
 //             Events wait until the decisions reach the time before which their effects must be on; on a grid of time each body then has
