@@ -4,7 +4,7 @@ import math
 import measuring
 
 PALETTE = {"read": "#9aa5b1", "partition": "#c9b458", "assemble": "#8fb98b", "factor": "#c8553d", "solve": "#2f6690", "orthogonalise": "#7b5ea7", "errors": "#e09f3e",
-           "write": "#588157", "other": "#bdbdbd", "in all": "#1a1a1a"}
+           "error bars": "#e09f3e", "write": "#588157", "other": "#bdbdbd", "in all": "#1a1a1a"}
 HATCH = "#f4f4f4"
 
 
@@ -80,8 +80,9 @@ def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), das
 
 
 def draw_bars(bars, title, subtitle, unit="s"):
-    """bars: [(label, [(name, computing, inside MPI)])]: parts in the colours of their phases, the pale end of each what was spent inside MPI."""
-    left, width, height, top = 190, 560, 26, 104
+    """bars: [(label, [(name, value, paler value)])]: parts in the colours of their names; the pale end of each is what was spent inside MPI (0: not asked)."""
+    width, height, top = 560, 26, 104
+    left = max(190, 40 + round(7.2 * max(len(label) for label, _ in bars)))
     longest = max(sum(a + b for _, a, b in parts) for _, parts in bars) or 1.0
     names = [name for name in PALETTE if any(part[0] == name and part[1] + part[2] > 0.002 * longest for _, parts in bars for part in parts)]
     full = top + len(bars) * (height + 12) + 20
@@ -95,10 +96,10 @@ def draw_bars(bars, title, subtitle, unit="s"):
         out.append(f'<text x="{left - 10}" y="{y + 18}" text-anchor="end">{measuring.escape(label)}</text>')
         x = float(left)
         for name, computing, inside in parts:
-            for value, opacity, what in ((computing, 1.0, "computing"), (inside, 0.35, "inside MPI")):
+            for value, opacity, what in ((computing, 1.0, ", computing" if inside else ""), (inside, 0.35, ", inside MPI")):
                 length = value / longest * width
                 if length > 0.05:
-                    out.append(f'<rect x="{x:.2f}" y="{y}" width="{length:.2f}" height="{height}" fill="{PALETTE[name]}" fill-opacity="{opacity}"><title>{name}, {what}: {value:.3g} {unit}</title></rect>')
+                    out.append(f'<rect x="{x:.2f}" y="{y}" width="{length:.2f}" height="{height}" fill="{PALETTE[name]}" fill-opacity="{opacity}"><title>{name}{what}: {value:.3g} {unit}</title></rect>')
                 x += max(length, 0)
         out.append(f'<text x="{x + 8:.1f}" y="{y + 18}">{sum(a + b for _, a, b in parts):.3g} {unit}</text>')
     return "\n".join(out) + "\n</svg>\n"

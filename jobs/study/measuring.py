@@ -1,4 +1,4 @@
-"""Running programs and judging what comes out: CPU seconds, medians, tables, ratios, the picture of the time by phase."""
+"""Running programs and judging what comes out: CPU seconds, medians, tables, ratios."""
 import dataclasses
 import functools
 import json
@@ -11,7 +11,6 @@ import tempfile
 import time
 
 PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "error bars", "write", "other")
-COLOURS = ("#9aa5b1", "#c9b458", "#8fb98b", "#c8553d", "#2f6690", "#7b5ea7", "#e09f3e", "#588157", "#d9d9d9")
 
 
 @dataclasses.dataclass
@@ -172,34 +171,6 @@ def make_rows(results, ours):
                      f"{find_median(result['wall_s']):.1f}", f"{result['peak_bytes'] / 1e9:.2f}", result["modes"], f"{result['residual']:.1e}",
                      f"{result['frequency_error']:.0e}"))
     return rows
-
-
-def draw_phases(bars, title, note=""):
-    """bars: [(label, {phase: seconds})] -> SVG text: one bar per program, cut by phase, CPU seconds to the right."""
-    left, width, height, top = 250, 560, 26, 84
-    longest = max(sum(parts.values()) for _, parts in bars)
-    full_height = top + len(bars) * (height + 12) + 46
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{left + width + 90}" height="{full_height}" '
-           f'viewBox="0 0 {left + width + 90} {full_height}" font-family="sans-serif" font-size="13">',
-           '<rect width="100%" height="100%" fill="white"/>', f'<text x="16" y="26" font-size="16" font-weight="bold">{escape(title)}</text>']
-    used = [phase for phase in PHASES if any(parts.get(phase, 0) > 0 for _, parts in bars)]
-    x = 16
-    for phase in used:
-        out.append(f'<rect x="{x}" y="44" width="13" height="13" fill="{COLOURS[PHASES.index(phase)]}"/><text x="{x + 18}" y="55">{phase}</text>')
-        x += 34 + 7.2 * len(phase)
-    for index, (label, parts) in enumerate(bars):
-        y = top + index * (height + 12)
-        out.append(f'<text x="{left - 10}" y="{y + 18}" text-anchor="end">{escape(label)}</text>')
-        x = float(left)
-        for phase in PHASES:
-            length = parts.get(phase, 0.0) / longest * width
-            if length > 0:
-                out.append(f'<rect x="{x:.2f}" y="{y}" width="{length:.2f}" height="{height}" fill="{COLOURS[PHASES.index(phase)]}">'
-                           f'<title>{phase}: {parts[phase]:.2f} s</title></rect>')
-            x += length
-        out.append(f'<text x="{x + 8:.1f}" y="{y + 18}">{sum(parts.values()):.1f} s</text>')
-    out.append(f'<text x="16" y="{full_height - 14}" fill="#555">{escape(note)}</text></svg>')
-    return "\n".join(out) + "\n"
 
 
 def escape(text):

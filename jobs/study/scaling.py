@@ -11,7 +11,7 @@ import stat
 import measuring
 
 PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "errors", "write", "other")
-MOST_JOB_BYTES = 16 << 20
+MOST_BYTES = 16 << 20
 QUICK_NODES = [600, 1200]
 
 
@@ -27,21 +27,33 @@ class RunError(Exception):
         self.code = code
 
 
-def read_job(path):
-    """The job's object; comments and all errors are carillon-precompute's own business, which says them better."""
+def read_text(path, what, mend):
+    """The text of a regular file of modest size. InputError says what cannot be read, and the mend."""
     try:
         status = os.stat(path)
         if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{path}: this is no regular file; give a job of carillon-precompute")
-        if status.st_size > MOST_JOB_BYTES:
-            raise InputError(f"{path}: a job of {status.st_size} bytes; at most {MOST_JOB_BYTES} are read")
-        text = pathlib.Path(path).read_text()
+            raise InputError(f"{path}: this is no regular file; {mend}")
+        if status.st_size > MOST_BYTES:
+            raise InputError(f"{path}: a {what} of {status.st_size} bytes; at most {MOST_BYTES} are read")
+        return pathlib.Path(path).read_text()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: the job cannot be read: {error}") from None
+        raise InputError(f"{path}: the {what} cannot be read: {error}; {mend}") from None
+
+
+def parse(text, path, mend):
+    """The JSON value of a text. InputError names the line."""
     try:
-        job = json.loads(strip_comments(text))
+        return json.loads(text)
     except json.JSONDecodeError as error:
-        raise InputError(f"{path}:{error.lineno}: this is no JSON: {error.msg}") from None
+        raise InputError(f"{path}:{error.lineno}: this is no JSON: {error.msg}; {mend}") from None
+    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, thousands of brackets
+        raise InputError(f"{path}: this is no JSON that can be read: {error}; {mend}") from None
+
+
+def read_job(path):
+    """The job's object; comments and all errors are carillon-precompute's own business, which says them better."""
+    mend = "give a job of carillon-precompute"
+    job = parse(strip_comments(read_text(path, "job", mend)), path, mend)
     if not isinstance(job, dict):
         raise InputError(f"{path}: a job is a JSON object")
     return job

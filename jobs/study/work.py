@@ -33,15 +33,34 @@ def write(path, study):
 
 
 def read(path):
-    try:
-        record = json.loads(pathlib.Path(path).read_text())
-    except (OSError, UnicodeDecodeError) as error:
-        raise scaling.InputError(f"{path}: the record cannot be read: {error}; make one with --record {path}") from None
-    except json.JSONDecodeError as error:
-        raise scaling.InputError(f"{path}:{error.lineno}: the record is no JSON: {error.msg}; make it anew with --record {path}") from None
-    if not isinstance(record, dict) or record.get("format") != FORMAT or not isinstance(record.get("cases"), list):
-        raise scaling.InputError(f"{path}: this is no record of a study; make one with --record {path}")
+    """A record as write() made it. InputError names what is missing in it."""
+    mend = f"make it anew with --record {path}"
+    record = scaling.parse(scaling.read_text(path, "record", mend), path, mend)
+    if not isinstance(record, dict) or record.get("format") != FORMAT or not isinstance(record.get("job"), dict) or not isinstance(record.get("cases"), list):
+        raise scaling.InputError(f"{path}: this is no record of a study; {mend}")
+    for number, case in enumerate(record["cases"], 1):
+        if fault := find_fault(case):
+            raise scaling.InputError(f"{path}: case {number} of the record {fault}; {mend}")
     return record
+
+
+def find_fault(case):
+    """What a case of a record lacks, in words; None when it is whole."""
+    if not isinstance(case, dict):
+        return "is no object"
+    for key in ("nodes", "ranks"):
+        if type(case.get(key)) is not int:
+            return f'has no whole number "{key}"'
+    if not isinstance(case.get("work"), dict):
+        return 'has no object "work"'
+    for phase, work in case["work"].items():
+        if not isinstance(work, dict):
+            return f'has no object "{phase}" in "work"'
+        for quantity in QUANTITIES:
+            value = work.get(quantity)
+            if type(value) not in (int, float) or not 0 <= value < float("inf"):
+                return f'has no number "{quantity}" in "work", "{phase}"'
+    return None
 
 
 def compare(recorded, cases):

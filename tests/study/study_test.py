@@ -114,9 +114,41 @@ class Program(unittest.TestCase):
             self.assertEqual(len(result.stderr.strip().splitlines()), 1, result.stderr)
             self.assertIn(expected, result.stderr, words)
             self.assertNotIn("CPU s", result.stdout)
+        os.mkfifo(self.folder / "pipe_record.json")
+        (self.folder / "deep.json").write_text("[" * 100000)
+        (self.folder / "digits.json").write_text('{"format": ' + "1" * 5000 + "}")
+        for record, expected in (("pipe_record.json", "regular file"), ("deep.json", "no JSON"), ("digits.json", "no JSON")):
+            result = call(self.folder, "scaling", JOB, "-o", "bad", "--check", record)
+            self.assertEqual((result.returncode, len(result.stderr.strip().splitlines())), (2, 1), result.stderr)
+            self.assertIn(expected, result.stderr)
         result = call(self.folder, "scaling", JOB, "--quick", "--ranks", "1", "--nodes", "600", "-o", "bad", "--check", "other_record.json")
         self.assertEqual(result.returncode, 2)
         self.assertIn("another job", result.stderr)
+
+    def test_record_that_lacks_something_is_one_clear_error_before_any_run(self):
+        def drop(record, *keys):
+            for key in keys[:-1]:
+                record = record[key]
+            del record[keys[-1]]
+
+        def put(record, value, *keys):
+            for key in keys[:-1]:
+                record = record[key]
+            record[keys[-1]] = value
+
+        changes = {"no record": lambda record: drop(record, "job"), '"nodes"': lambda record: drop(record, "cases", 1, "nodes"), '"ranks"': lambda record: put(record, "2", "cases", 1, "ranks"),
+                   "no object": lambda record: put(record, 7, "cases", 1), '"work"': lambda record: drop(record, "cases", 1, "work"),
+                   '"solve"': lambda record: put(record, None, "cases", 1, "work", "solve"), '"flops"': lambda record: drop(record, "cases", 1, "work", "factor", "flops"),
+                   '"bytes"': lambda record: put(record, float("nan"), "cases", 1, "work", "factor", "bytes")}
+        for expected, change in changes.items():
+            record = json.loads((self.folder / "work.json").read_text())
+            change(record)
+            (self.folder / "lacking.json").write_text(json.dumps(record))
+            result = call(self.folder, "scaling", JOB, "--quick", "-o", "bad", "--check", "lacking.json")
+            self.assertEqual((result.returncode, len(result.stderr.strip().splitlines())), (2, 1), expected + result.stderr)
+            self.assertIn(expected, result.stderr)
+            self.assertIn("--record lacking.json", result.stderr)
+            self.assertNotIn("CPU s", result.stdout)
 
     def test_error_of_a_run_is_passed_on_with_its_code(self):
         job = json.loads(scaling.strip_comments(JOB.read_text()))

@@ -10,6 +10,7 @@ import xml.dom.minidom
 import numpy
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(__file__).resolve().parents[3] / "jobs/study")]
+import charts
 import measuring
 import system
 
@@ -82,10 +83,10 @@ class Measuring(unittest.TestCase):
         self.assertIn("| theirs | 13.0 |", measuring.format_table(rows, True))
 
     def test_the_picture_is_well_formed_and_to_scale(self):
-        picture = measuring.draw_phases([("a & b", {"read": 1.0, "solve": 3.0}), ("half", {"solve": 2.0})], "t", "n")
+        picture = charts.draw_bars([("a & b", [("read", 1.0, 0.0), ("solve", 2.0, 1.0)]), ("half", [("solve", 2.0, 0.0)])], "t", "n")
         bars = [r for r in xml.dom.minidom.parseString(picture).getElementsByTagName("rect") if r.getElementsByTagName("title")]
         lengths = [float(bar.getAttribute("width")) for bar in bars]
-        self.assertEqual([round(length / lengths[0], 3) for length in lengths], [1.0, 3.0, 2.0])
+        self.assertEqual([round(length / lengths[0], 3) for length in lengths], [1.0, 2.0, 1.0, 2.0])
 
     def test_a_page_without_the_place_is_refused(self):
         self.assertEqual(measuring.replace_between("x\n<!-- t -->\nold\n<!-- /t -->\n", "t", "new"), "x\n<!-- t -->\nnew\n<!-- /t -->\n")
