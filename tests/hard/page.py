@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""The tables of docs/stability.md against the cases (cases/*.json), the tests (CTest's label hard) and the figures of the last run.
+
+usage: page.py BUILD_DIR            exit 1 and one line a fault: a case that is missing somewhere, one that is there twice, a bound that is not the one held
+       page.py BUILD_DIR --update   runs the cases (ctest -L hard), then writes the tables
+       page.py --self-test          proves that faults are found
+
+Figures are lines {"case", "part", "value", "bound", "ranks"} in BUILD_DIR/hard-figures/<case>.jsonl, as figure.hpp and figure.py write them.
+"""
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+PAGE = HERE.parents[1] / "docs/stability.md"
+GROUPS = ["meshes", "materials", "spectra", "time", "cross"]
+KEYS = {"id", "title", "risk", "method", "figure"}
+HEAD = "| case | what could go wrong | what we do | figure | measured | bound |\n|---|---|---|---|---|---|\n"
+
+
+def read_cases(folder=HERE / "cases"):
+    """{group: [case, ...]} of the groups that there are."""
+    return {group: json.loads((folder / f"{group}.json").read_text()) for group in GROUPS if (folder / f"{group}.json").exists()}
+
+
+def read_figures(folder):
+    """{case: [figure, ...]}"""
+    figures = {}
+    for path in sorted(pathlib.Path(folder).glob("*.jsonl")):
+        for line in path.read_text().splitlines():
+            figure = json.loads(line)
+            figures.setdefault(figure["case"], []).append(figure)
+    return figures
+
+
+def read_tests(build):
+    """The names of the tests with label hard."""
+    listed = subprocess.run(["ctest", "--test-dir", build, "-L", "hard", "-FA", "hard_figures", "--show-only=json-v1"], capture_output=True, text=True, check=True)
+    return [test["name"] for test in json.loads(listed.stdout)["tests"]]
+
+
+def read_rows(page):
+    """[(group, id, bound), ...] as they stand between the markers of the page."""
+    rows = []
+    for group, table in re.findall(r"<!-- begin (\w+) -->\n(.*?)<!-- end \1 -->", page, re.S):
+        for line in table.splitlines()[2:]:
+            cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+            rows.append((group, re.search(r"`(\w+)`", cells[0]).group(1), cells[-1]))
+    return rows
+
+
+def show(value):
+    if value is None:
+        return "not finite"
+    return value if isinstance(value, str) else f"{value:.3g}"
+
+
+def find_worst(figures):
+    """The figure that comes nearest to its bound; those that are only refused last."""
+    def nearness(figure):
+        if figure["value"] is None:
+            return math.inf
+        if isinstance(figure["value"], str):
+            return -math.inf
+        if figure["bound"] == 0:
+            return math.inf if figure["value"] > 0 else 0
+        return figure["value"] / figure["bound"] if figure["bound"] > 0 else figure["value"] - figure["bound"]
+    return max(figures, key=nearness)
+
+
+def describe(figures):
+    """(measured, bound) of a case as the page shows them."""
+    worst = find_worst(figures)
+    measured, bound = show(worst["value"]), show(worst["bound"])
+    if worst["part"] and not isinstance(worst["value"], str):
+        measured += f" ({worst['part']})"
+    if not isinstance(worst["value"], str) and any(isinstance(figure["value"], str) for figure in figures):
+        measured += ", others refused"
+    return measured, bound
+
+
+def make_table(cases, figures):
+    rows = []
+    for case in cases:
+        measured, bound = describe(figures[case["id"]]) if case["id"] in figures else ("-", "-")
+        cells = [f"{case['title']} `{case['id']}`", case["risk"], case["method"], case["figure"], measured, bound]
+        rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return HEAD + "\n".join(rows) + "\n"
+
+
+def find_faults(cases, tests, rows, figures):
+    """What does not agree, one sentence each."""
+    faults = []
+    known = [(group, case["id"]) for group in cases for case in cases[group]]
+    shown = [(group, id) for group, id, _ in rows]
+    tested = {tuple(name.split(".")[1:3]) for name in tests if not name.startswith("hard.page")}
+    for group in cases:
+        for case in cases[group]:
+            if set(case) != KEYS:
+                faults.append(f"cases/{group}.json: {case.get('id', '?')} has not exactly the keys {', '.join(sorted(KEYS))}")
+    for pair in sorted(set(known)):
+        name = ".".join(pair)
+        if [id for _, id in known].count(pair[1]) > 1:
+            faults.append(f"{name} is there twice in cases/*.json")
+        if pair not in tested:
+            faults.append(f"{name} has no test hard.{name}")
+        if shown.count(pair) != 1:
+            faults.append(f"{name} stands {shown.count(pair)} times in docs/stability.md")
+    faults += [f"hard.{'.'.join(pair)} is a test without a case in cases/{pair[0]}.json" for pair in sorted(tested - set(known))]
+    faults += [f"{'.'.join(pair)} stands in docs/stability.md and is no case" for pair in sorted(set(shown) - set(known))]
+    faults += [f"a figure is recorded for {id}, which is no case" for id in sorted(set(figures) - {id for _, id in known})]
+    for group, id, bound in rows:
+        held = {show(figure["bound"]) for figure in figures.get(id, [])}
+        if held and bound not in held:
+            faults.append(f"{group}.{id}: docs/stability.md has the bound {bound}, held was {', '.join(sorted(held))}")
+        elif bound == "-":
+            faults.append(f"{group}.{id}: docs/stability.md has no figure")
+    return faults
+
+
+def update(build):
+    subprocess.run(["ctest", "--test-dir", build, "-L", "hard", "-E", "^hard.page", "-FC", "hard_figures", "--output-on-failure", "-j2"], check=True)
+    figures, page = read_figures(pathlib.Path(build) / "hard-figures"), PAGE.read_text()
+    for group, cases in read_cases().items():
+        marked = re.compile(rf"(<!-- begin {group} -->\n).*?(<!-- end {group} -->)", re.S)
+        if not marked.search(page):
+            sys.exit(f"{PAGE}: no line <!-- begin {group} -->")
+        page = marked.sub(lambda found: found[1] + make_table(cases, figures) + found[2], page)
+    PAGE.write_text(page)
+
+
+def self_test():
+    case = {"id": "a", "title": "A", "risk": "r | s", "method": "m", "figure": "f"}
+    figures = {"a": [{"case": "a", "part": "T4", "value": 2e-3, "bound": 1e-2, "ranks": 1}, {"case": "a", "part": "", "value": "refused", "bound": "refused", "ranks": 1}]}
+    cases, tests = {"time": [case]}, ["hard.time.a.np2", "hard.page"]
+    page = "<!-- begin time -->\n" + make_table([case], figures) + "<!-- end time -->\n"
+    assert find_faults(cases, tests, read_rows(page), figures) == [], find_faults(cases, tests, read_rows(page), figures)
+    assert "0.002 (T4), others refused" in page
+    spoilt = [({"time": [case, case]}, tests, page, figures, "twice"),
+              (cases, ["hard.page"], page, figures, "no test"),
+              (cases, tests + ["hard.time.b"], page, figures, "without a case"),
+              (cases, tests, "", figures, "stands 0 times"),
+              (cases, tests, page + page, figures, "stands 2 times"),
+              (cases, tests, page.replace("`a`", "`c`"), figures, "is no case"),
+              (cases, tests, page.replace("| 0.01 |", "| 0.02 |"), figures, "has the bound 0.02"),
+              (cases, tests, page.replace("| 0.01 |", "| - |"), {}, "no figure"),
+              (cases, tests, page, {"b": figures["a"]}, "figure is recorded"),
+              ({"time": [{"id": "a"}]}, tests, page, figures, "keys")]
+    for cases, tests, page, figures, word in spoilt:
+        found = find_faults(cases, tests, read_rows(page), figures)
+        assert any(word in fault for fault in found), (word, found)
+    assert show(None) == "not finite" and find_worst([{"value": 1, "bound": 2}, {"value": None, "bound": 2}])["value"] is None
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--self-test"]:
+        self_test()
+    else:
+        if sys.argv[2:] == ["--update"]:
+            update(sys.argv[1])
+        faults = find_faults(read_cases(), read_tests(sys.argv[1]), read_rows(PAGE.read_text()), read_figures(pathlib.Path(sys.argv[1]) / "hard-figures"))
+        print("\n".join(faults) or "cases, tests and page agree")
+        sys.exit(bool(faults))
