@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <string_view>
+#include <utility>
 
 #include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/petsc/handle.hpp"
@@ -23,6 +25,9 @@ constexpr int kJobEnd = -2;
 constexpr int kJobAnalyse = 1;
 constexpr int kJobFactorise = 2;
 constexpr int kJobSolve = 3;
+
+// MUMPS' ICNTL(7) by the names of "-mumps_ordering". Debian's MUMPS has neither METIS, whose order is handed in, nor SCOTCH.
+constexpr std::array<std::pair<std::string_view, int>, 4> kOwnOrderings{{{"amd", 0}, {"amf", 2}, {"pord", 4}, {"qamd", 6}}};
 
 using petsc::check;
 
@@ -76,6 +81,18 @@ const char* find_ordering_name(int infog7) {
     default:
       return "unknown";
   }
+}
+
+/// What "-mumps_ordering" asks for as MUMPS' ICNTL(7); -1 when it is not given: the order of the caller. Not collective.
+int find_own_ordering() {
+  std::string name(64, '\0');
+  PetscBool is_given = PETSC_FALSE;
+  check(PetscOptionsGetString(nullptr, nullptr, "-mumps_ordering", name.data(), name.size(), &is_given));
+  if (is_given == PETSC_FALSE) return -1;
+  name.resize(name.find('\0'));
+  for (const auto& [own, icntl7] : kOwnOrderings)
+    if (name == own) return icntl7;
+  throw InputError(fmt::format("\"-mumps_ordering {}\": take one of amd, amf, pord, qamd", name));
 }
 
 class MumpsFactor final : public ShiftedFactor {
@@ -151,6 +168,7 @@ void MumpsFactor::State::set_controls() {
 
 MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position)
     : state_(std::make_unique<State>()) {
+  const int own_ordering = find_own_ordering();
   State& s = *state_;
   s.stiffness = stiffness;
   s.mass = mass;
@@ -178,9 +196,10 @@ MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t
   s.mumps.jcn_loc = s.columns.data();
   s.mumps.a_loc = s.values.data();
 
-  int is_given = elimination_position.empty() ? 0 : 1;
+  int is_given = elimination_position.empty() || own_ordering >= 0 ? 0 : 1;
   MPI_Bcast(&is_given, 1, MPI_INT, 0, s.comm);
-  s.icntl(7) = is_given == 1 ? 1 : 7;
+  constexpr int kOrderGiven = 1, kOrderChosen = 7;
+  s.icntl(7) = is_given == 1 ? kOrderGiven : own_ordering >= 0 ? own_ordering : kOrderChosen;
   if (is_given == 1 && s.rank == 0) {
     s.permutation.resize(static_cast<std::size_t>(n));
     for (std::size_t node = 0; node < elimination_position.size(); ++node) {

@@ -39,10 +39,10 @@ REFUSED = [("-eps_type nonsense", ["-eps_type nonsense", "no such type", "blockl
 
 
 class Folder:
-    def __init__(self):
+    def __init__(self, **more):
         self.path = tempfile.TemporaryDirectory()
         self.file = pathlib.Path(self.path.name)
-        (self.file / "job.json").write_text(json.dumps(JOB))
+        (self.file / "job.json").write_text(json.dumps(JOB | more))
 
     def __del__(self):
         self.path.cleanup()
@@ -96,6 +96,22 @@ class SolverOptions(unittest.TestCase):
             done = Folder().run(options, 2)
             self.assertEqual(done.stderr.count("carillon-precompute: error:"), 1, done.stderr)
             self.assertEqual(done.returncode, 2, done.stderr)
+
+    def test_orderings_of_mumps_give_the_same_bank(self):
+        entries = {}
+        for name in ("amd", "amf", "pord", "qamd"):
+            folder = Folder(solver={"factorisation": "mumps"})
+            done = folder.run(f"-mumps_ordering {name}")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            numpy.testing.assert_allclose(folder.frequencies(), self.wanted, rtol=1e-8)
+            self.assertEqual(folder.solver()["ordering"], name.upper())
+            entries[name] = folder.solver()["factor_entries"]
+        self.assertNotEqual(entries["amd"], entries["pord"])
+        for ranks in (1, 2):
+            done = Folder(solver={"factorisation": "mumps"}).run("-mumps_ordering metis", ranks)
+            self.assertEqual((done.returncode, done.stderr.count("carillon-precompute: error:")), (2, 1), done.stderr)
+            self.assertIn("take one of amd, amf, pord, qamd", done.stderr)
+        self.assertIn("not used", Folder().run("-mumps_ordering amd").stderr)
 
     def test_what_shows_shows(self):
         view = Folder().run("-eps_type krylovschur -eps_view -eps_ncv 44").stdout
