@@ -1,36 +1,23 @@
-"""carillon-study: how a job's cost grows with its mesh and falls with the ranks.
+"""carillon-study: how a job's cost grows with its mesh and falls with the ranks, and what accuracy costs.
 
     carillon-study scaling JOB.json [-o FOLDER] [--ranks 1,2,4] [--nodes 2500,5000,10000] [--repeats 3]
     carillon-study scaling JOB.json --quick --record FILE | --check FILE
+    carillon-study accuracy [--quick] [--on BODY...] [--only SECTION...] -o REPORT
 
 Exit codes: 0 done, 2 the input cannot be used, 3 the work has grown, 4 the machine refused.
 """
 import argparse
 import contextlib
 import json
-import os
-import pathlib
-import shutil
 import signal
 import sys
 
+import programs
 import report
 import scaling
 import work
-
-
-def find_program(given):
-    """carillon-precompute: given, beside this program, or on the way of commands."""
-    if given:
-        candidates = [pathlib.Path(given) / "carillon-precompute"]
-    else:
-        beside = pathlib.Path(sys.argv[0]).resolve().parent / "carillon-precompute"
-        found = shutil.which("carillon-precompute")
-        candidates = [beside] + ([pathlib.Path(found)] if found else [])
-    for candidate in candidates:
-        if os.access(candidate, os.X_OK) and candidate.is_file():
-            return candidate.resolve()
-    raise scaling.InputError(f"carillon-precompute is not at {candidates[0]}; give its folder with --bin")
+from accuracy import study
+from errors import InputError, RunError
 
 
 def read_numbers(name, least):
@@ -54,7 +41,7 @@ def read_count(text):
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        raise scaling.InputError(message + "; carillon-study scaling --help says what there is")
+        raise InputError(message + "; carillon-study scaling --help says what there is")
 
 
 def make_parser():
@@ -75,45 +62,50 @@ def make_parser():
     one.add_argument("--timeout", type=float, default=3600, help="seconds that one run may take (default: 3600)")
     one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: beside this program)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error")
+    study.add_command(commands, read_count)
     return parser
 
 
 def run(arguments):
     options = make_parser().parse_args(arguments)
+    if options.command == "accuracy":
+        made = study.run(options)
+        print(json.dumps(made, indent=2) if options.json else made["report"], flush=True)
+        return 0
     if not options.json:
         run_study(options)
         return 0
     with contextlib.redirect_stdout(sys.stderr):
-        study = run_study(options)
-    print(json.dumps({"report": str((study.out / "report.md").resolve()), "cases": work.collect(study)}, indent=2))
+        made = run_study(options)
+    print(json.dumps({"report": str((made.out / "report.md").resolve()), "cases": work.collect(made)}, indent=2))
     return 0
 
 
 def run_study(options):
     if options.record and options.check:
-        raise scaling.InputError("--record and --check exclude each other: one writes what the other reads")
+        raise InputError("--record and --check exclude each other: one writes what the other reads")
     recorded = work.read(options.check) if options.check else None
-    study = scaling.Study(options, find_program(options.bin))
-    study.run()
-    report.write(study)
-    print(f"{study.out / 'report.md'}", flush=True)
+    made = scaling.Study(options, programs.find_program(options.bin))
+    made.run()
+    report.write(made)
+    print(f"{made.out / 'report.md'}", flush=True)
     if options.record:
-        work.write(options.record, study)
-        print(f"{options.record}: the work of {len(study.cases)} cases", flush=True)
+        work.write(options.record, made)
+        print(f"{options.record}: the work of {len(made.cases)} cases", flush=True)
     if recorded is not None:
-        work.check(recorded, study, options)
-    return study
+        work.check(recorded, made, options)
+    return made
 
 
 def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
         return run(sys.argv[1:])
-    except scaling.InputError as error:
+    except InputError as error:
         code, text = 2, error
     except work.HasGrown as error:
         code, text = 3, error
-    except scaling.RunError as error:
+    except RunError as error:
         code, text = error.code, error
     except OSError as error:
         code, text = 4, error

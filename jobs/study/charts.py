@@ -32,6 +32,53 @@ def find_ticks(low, high):
     return [tick for tick in (factor * 10.0**power for power in range(first, last + 1) for factor in factors) if low * 0.999 <= tick <= high * 1.001]
 
 
+class Axes:
+    """A frame on a picture and the way from values to places in it. Ranges are (low, high); logarithmic unless said otherwise."""
+
+    def __init__(self, left, top, width, height, x_range, y_range, x_log=True, y_log=True, margin=0):
+        self.left, self.top, self.width, self.height, self.margin = left, top, width, height, margin
+        self.x_range, self.y_range, self.x_log, self.y_log = x_range, y_range, x_log, y_log
+
+    @staticmethod
+    def find_share(value, ends, is_log):
+        low, high = ends
+        if is_log:
+            return math.log(value / low) / (math.log(high / low) or 1.0)
+        return (value - low) / ((high - low) or 1.0)
+
+    def place_x(self, x):
+        return self.left + self.margin + (self.width - 2 * self.margin) * self.find_share(x, self.x_range, self.x_log)
+
+    def place_y(self, y):
+        return self.top + self.height * (1 - self.find_share(y, self.y_range, self.y_log))
+
+    def draw_frame(self, x_label, y_label, x_ticks, y_ticks, marks=()):
+        """Grid, ticks and labels as lines of SVG. marks: ticks of x that get a star."""
+        out = []
+        for tick in y_ticks:
+            y = self.place_y(tick)
+            out.append(f'<line x1="{self.left}" x2="{self.left + self.width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#e3e3e3"/>'
+                       f'<text x="{self.left - 8}" y="{y + 4:.1f}" text-anchor="end">{describe_number(tick)}</text>')
+        for tick in x_ticks:
+            x = self.place_x(tick)
+            out.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{self.top}" y2="{self.top + self.height}" stroke="#eeeeee"/>'
+                       f'<text x="{x:.1f}" y="{self.top + self.height + 20}" text-anchor="middle">{describe_number(tick)}{"*" if tick in marks else ""}</text>')
+        out.append(f'<rect x="{self.left}" y="{self.top}" width="{self.width}" height="{self.height}" fill="none" stroke="#999"/>')
+        out.append(f'<text x="{self.left + self.width / 2}" y="{self.top + self.height + 44}" text-anchor="middle">{measuring.escape(x_label)}</text>')
+        middle, side = self.top + self.height / 2, self.left - 64
+        out.append(f'<text x="{side}" y="{middle}" text-anchor="middle" transform="rotate(-90 {side} {middle})">{measuring.escape(y_label)}</text>')
+        return out
+
+    def draw_curve(self, points, colour, width=2.0, is_dashed=False):
+        path = " ".join(f"{self.place_x(x):.1f},{self.place_y(y):.1f}" for x, y in points)
+        dashes = ' stroke-dasharray="6 5"' if is_dashed else ""
+        return f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{width:g}"{dashes}/>'
+
+    def draw_point(self, x, y, colour, text, fill=None, radius=4):
+        return (f'<circle cx="{self.place_x(x):.1f}" cy="{self.place_y(y):.1f}" r="{radius:g}" fill="{fill or colour}" stroke="{colour}" stroke-width="2">'
+                f"<title>{measuring.escape(text)}</title></circle>")
+
+
 def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), dashed=()):
     """curves: {name: [(x, y)]}, logarithmic axes. marks: x whose points are hollow. dashed: names of guides."""
     left, top, width, height = 84, 70, 520, 380
@@ -39,31 +86,16 @@ def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), das
     curves = {name: points for name, points in curves.items() if points}
     values = [y for points in curves.values() for _, y in points]
     low, high = min(values) / 1.3, max(values) * 1.3
-    x_low, x_high = min(x_ticks), max(x_ticks)
-    span = math.log(x_high / x_low) or 1.0
-    place_x = lambda x: left + 24 + (width - 48) * math.log(x / x_low) / span
-    place_y = lambda y: top + height * math.log(high / y) / math.log(high / low)
+    axes = Axes(left, top, width, height, (min(x_ticks), max(x_ticks)), (low, high), margin=24)
     out = start(left + width + 170, top + height + 66, title, subtitle)
-    for tick in find_ticks(low, high):
-        y = place_y(tick)
-        out.append(f'<line x1="{left}" x2="{left + width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#e3e3e3"/><text x="{left - 8}" y="{y + 4:.1f}" text-anchor="end">{describe_number(tick)}</text>')
-    for tick in x_ticks:
-        x = place_x(tick)
-        out.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{top}" y2="{top + height}" stroke="#eeeeee"/>'
-                   f'<text x="{x:.1f}" y="{top + height + 20}" text-anchor="middle">{describe_number(tick)}{"*" if tick in marks else ""}</text>')
-    out.append(f'<rect x="{left}" y="{top}" width="{width}" height="{height}" fill="none" stroke="#999"/>')
-    out.append(f'<text x="{left + width / 2}" y="{top + height + 44}" text-anchor="middle">{measuring.escape(x_label)}</text>')
-    out.append(f'<text x="20" y="{top + height / 2}" text-anchor="middle" transform="rotate(-90 20 {top + height / 2})">{measuring.escape(y_label)}</text>')
+    out += axes.draw_frame(x_label, y_label, x_ticks, find_ticks(low, high), marks)
     labels = []
     for name, points in curves.items():
         colour = PALETTE.get(name, "#888888")
-        path = " ".join(f"{place_x(x):.1f},{place_y(y):.1f}" for x, y in points)
-        style = ' stroke-dasharray="6 5" stroke-width="1.5"' if name in dashed else f' stroke-width="{3.2 if name == "in all" else 2}"'
-        out.append(f'<polyline points="{path}" fill="none" stroke="{colour}"{style}/>')
+        out.append(axes.draw_curve(points, colour, 1.5 if name in dashed else 3.2 if name == "in all" else 2, name in dashed))
         for x, y in points if name not in dashed else []:
-            fill = "white" if x in marks else colour
-            out.append(f'<circle cx="{place_x(x):.1f}" cy="{place_y(y):.1f}" r="4" fill="{fill}" stroke="{colour}" stroke-width="2"><title>{measuring.escape(name)}: {y:.3g}</title></circle>')
-        labels.append([place_y(points[-1][1]), name, colour])
+            out.append(axes.draw_point(x, y, colour, f"{name}: {y:.3g}", "white" if x in marks else None))
+        labels.append([axes.place_y(points[-1][1]), name, colour])
     labels.sort()
     for before, label in zip(labels, labels[1:]):
         label[0] = max(label[0], before[0] + 16)

@@ -9,22 +9,11 @@ import statistics
 import stat
 
 import measuring
+from errors import InputError, RunError
 
 PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "errors", "write", "other")
 MOST_BYTES = 16 << 20
 QUICK_NODES = [600, 1200]
-
-
-class InputError(Exception):
-    """What the user can mend."""
-
-
-class RunError(Exception):
-    """A run that failed, with its exit code."""
-
-    def __init__(self, code, text):
-        super().__init__(text)
-        self.code = code
 
 
 def read_text(path, what, mend):

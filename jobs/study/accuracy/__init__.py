@@ -1,0 +1,1 @@
+"""What accuracy costs in time: the sections of `carillon-study accuracy`."""

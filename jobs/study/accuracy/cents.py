@@ -1,0 +1,123 @@
+"""Errors of frequencies in cents, the truth that they are held against, rates, and what so many cents cost."""
+import dataclasses
+import math
+import statistics
+
+import scaling
+from accuracy.known import Truth
+
+
+def to_cents(freq_hz, true_hz):
+    return 1200 * math.log2(freq_hz / true_hz)
+
+
+@dataclasses.dataclass
+class Point:
+    """One mesh of one kind: what it cost and how far its frequencies are from the truth. Cents: one for each mode, sorted lists held against
+    each other with their multiplicities."""
+    kind: str
+    nodes: int
+    unknowns: int
+    elements: int
+    cpu_s: float
+    spread: float
+    cents: list
+
+    @property
+    def first(self):
+        return abs(self.cents[0])
+
+    @property
+    def median(self):
+        return statistics.median(map(abs, self.cents))
+
+    @property
+    def worst(self):
+        return max(map(abs, self.cents))
+
+    @property
+    def edge(self):
+        """Mean edge length in units of the body's size: the cube root of one over the number of elements."""
+        return self.elements ** (-1 / 3)
+
+
+def make_point(kind, solve, truth):
+    """None when the mesh is so coarse that it has fewer modes than are known."""
+    if len(solve.freq_hz) < len(truth.freq_hz):
+        return None
+    return Point(kind, solve.nodes, solve.unknowns, solve.elements, solve.cpu, solve.spread, [to_cents(f, true) for f, true in zip(solve.freq_hz, truth.freq_hz)])
+
+
+def extrapolate(edges, freq_hz):
+    """(truth, order): the limit of three meshes, coarse to fine, edges: their mean edge lengths, freq_hz: [mesh][mode].
+
+    f(h) = f0 + c h^p with one p for all modes (their median), kept between 2 and 4; the uncertainty of a mode is the distance to what p - 1
+    and p + 1 would give, and at least a quarter of the step from the finest mesh to the limit. Richardson 1911."""
+    powers = [power for modes in zip(*freq_hz) if (power := find_power(edges, modes)) is not None]
+    power = min(max(statistics.median(powers) if powers else 2.0, 2.0), 4.0)
+
+    def find_limit(modes, p):
+        return modes[2] - (modes[1] - modes[2]) * edges[2] ** p / (edges[1] ** p - edges[2] ** p)
+
+    limits, doubts = [], []
+    for modes in zip(*freq_hz):
+        limit = find_limit(modes, power)
+        doubt = max(abs(find_limit(modes, power - 1) - limit), abs(find_limit(modes, power + 1) - limit), abs(modes[2] - limit) / 4)
+        limits.append(limit)
+        doubts.append(doubt / limit)
+    return Truth(tuple(limits), tuple(doubts), "extrapolated"), power
+
+
+def find_power(edges, values):
+    """p of v(h) = v0 + c h^p through three meshes; None where the values do not come in steps of one direction that get smaller."""
+    first, second = values[0] - values[1], values[1] - values[2]
+    if second == 0 or first / second <= 0:
+        return None
+    ratio = first / second
+    find_ratio = lambda p: (edges[0] ** p - edges[1] ** p) / (edges[1] ** p - edges[2] ** p)
+    low, high = 0.2, 8.0
+    if not find_ratio(low) < ratio < find_ratio(high):
+        return None
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if find_ratio(middle) < ratio else (low, middle)
+    return (low + high) / 2
+
+
+def find_rate(points, truth, find_error=lambda point: point.median):
+    """The power of the edge length with which the error falls over the three finest meshes whose error is clear of the truth's own; None with fewer than two."""
+    doubt = to_cents(1 + statistics.median(truth.uncertainty), 1)
+    clear = [point for point in sorted(points, key=lambda point: point.elements) if find_error(point) > 4 * doubt][-3:]
+    fit = scaling.fit_power([point.edge for point in clear], [find_error(point) for point in clear])
+    return fit[0] if fit else None
+
+
+@dataclasses.dataclass
+class Cost:
+    """CPU seconds for so many cents. how: "measured" (between two meshes), "at most" (the coarsest mesh is better), "extrapolated" (the finest is worse)."""
+    cpu_s: float
+    how: str
+
+    def __str__(self):
+        sign = {"measured": "", "at most": "≤ ", "extrapolated": "~ "}[self.how]
+        return f"{sign}{self.cpu_s:.2g}" if self.cpu_s < 100 else f"{sign}{self.cpu_s:.0f}"
+
+
+def find_cost(points, cents, find_error=lambda point: point.worst):
+    """What one kind of element costs for an error of no more than `cents`; None where it cannot be told: its errors do not fall, or the last meshes are too far away."""
+    curve = []
+    for point in sorted(points, key=lambda point: point.cpu_s):
+        if not curve or find_error(point) < curve[-1][1]:
+            curve.append((point.cpu_s, find_error(point)))
+    if not curve:
+        return None
+    if curve[0][1] <= cents:
+        return Cost(curve[0][0], "at most")
+    for (cheap, bad), (dear, good) in zip(curve, curve[1:]):
+        if good <= cents:
+            share = math.log(bad / cents) / math.log(bad / good)
+            return Cost(cheap * (dear / cheap) ** share, "measured")
+    if len(curve) < 3 or curve[-1][1] > 30 * cents:
+        return None
+    (cheap, bad), (dear, good) = curve[-2:]
+    return Cost(dear * (dear / cheap) ** (math.log(good / cents) / math.log(bad / good)), "extrapolated")

@@ -1,0 +1,173 @@
+"""Which element at which size: errors of frequencies against CPU seconds, rates of convergence, and what one cent costs."""
+import collections
+import statistics
+
+from accuracy import cents, plots
+from accuracy.bodies import KINDS, find_kind
+from accuracy.section import Section
+
+PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
+LEVELS = ((1, "one cent"), (10, "ten cents"), (100, "a semitone"))
+DEAR_NODES = 30000  # beyond, one repeat is enough to tell
+
+
+def measure(lab, bodies):
+    """{body: [(kind, Solve)]}, meshes from coarse to fine; two sizes that give the same mesh count once."""
+    cases, order = {}, collections.defaultdict(list)
+    for body in bodies:
+        lab.say(f"meshing: {body.name}")
+        for kind in body.get_kinds():
+            seen = set()
+            for nodes in body.get_sizes(lab):
+                case = body.make_case(lab, kind, nodes)
+                if case.job["mesh"] not in seen:
+                    seen.add(case.job["mesh"])
+                    cases[case.name] = (case, nodes)
+                    order[body.name].append((kind, case.name))
+    solves = lab.measure([case for case, nodes in cases.values() if nodes < DEAR_NODES])
+    solves |= lab.measure([case for case, nodes in cases.values() if nodes >= DEAR_NODES], repeats=1)
+    return {name: [(kind, solves[case]) for kind, case in entries] for name, entries in order.items()}
+
+
+def find_truth(body, solves):
+    """(Truth, sentence or ""): the known one, or the limit of the three finest curved T10, on which the sentence says more."""
+    if body.truth:
+        return body.truth, ""
+    finest = sorted((solve for kind, solve in solves if kind.curved), key=lambda solve: solve.elements)[-3:]
+    count = min(len(solve.freq_hz) for solve in finest)
+    truth, power = cents.extrapolate([solve.elements ** (-1 / 3) for solve in finest], [solve.freq_hz[:count] for solve in finest])
+    doubts = [cents.to_cents(1 + doubt, 1) for doubt in truth.uncertainty]
+    steps = [abs(cents.to_cents(f, limit)) for f, limit in zip(finest[-1].freq_hz, truth.freq_hz)]
+    return truth, (f"Nobody knows the frequencies of the {body.name}. Its truth here is the limit of its three finest curved T10 ({', '.join(f'{solve.nodes:,}' for solve in finest)} nodes; order {power:.1f}), "
+                   f"{statistics.median(steps):.1f} cents (median; {max(steps):.1f} at most) below the finest; it is itself uncertain by {statistics.median(doubts):.1f} cents (median; {max(doubts):.1f} at most). "
+                   "Errors near that are no errors.")
+
+
+def make_points(body, solves, truth):
+    points = [cents.make_point(kind.name, solve, truth) for kind, solve in solves]
+    return [point for point in points if point]
+
+
+def draw(section, body, points, command):
+    curves = lambda find_x, find_y: {kind.name: [(find_x(point), find_y(point)) for point in points if point.kind == kind.name] for kind in body.get_kinds()}
+    panels = []
+    cpu = lambda point: point.cpu_s
+    levels = [(level, text) for level, text in LEVELS]
+    for title, find in (("mode 1", lambda point: point.first), ("median of the band", lambda point: point.median), ("worst of the band", lambda point: point.worst)):
+        front = [pair for pair in plots.find_front([(cpu(point), find(point)) for point in points])]
+        panels.append(plots.Panel(title, "CPU seconds", "error, cents", curves(cpu, find), front=front, levels=levels))
+    rates = curves(lambda point: point.edge, lambda point: point.median)
+    guides = {f"slope {power}": plots.draw_slope(rates.get(name, []), power, 0.6) for name, power in (("T4 consistent", 2), ("T10 curved" if body.round else "T10 straight", 4))}
+    panels.append(plots.Panel("median against edge length", "edge length (elements to the power -1/3)", "error, cents", rates, guides=guides))
+    rows = [("body", "element", "nodes", "unknowns", "elements", "cpu_s", "cpu_spread", "error_mode_1_cents", "error_median_cents", "error_worst_cents")]
+    rows += [(body.name, point.kind, point.nodes, point.unknowns, point.elements, point.cpu_s, point.spread, point.cents[0], point.median, point.worst) for point in points]
+    section.add_chart(body.name, plots.draw_panels(panels, f"{body.name}: {body.summary}", f"error of the frequencies of {body.modes} modes against CPU seconds"),
+                      f"{body.name[0].upper()}{body.name[1:]}, {body.summary}: errors against CPU seconds, and against the edge length.", rows, command)
+
+
+def add_table(section, body, points, command):
+    rows = [("element", "nodes", "unknowns", "CPU s", "spread", "mode 1, cents", "median", "worst")]
+    for point in points:
+        rows.append((point.kind, f"{point.nodes:,}", f"{point.unknowns:,}", f"{point.cpu_s:.2f}", f"{100 * point.spread:.0f} %", f"{point.cents[0]:+.3g}", f"{point.median:.3g}", f"{point.worst:.3g}"))
+    data = [("element", "nodes", "unknowns", "cpu_s", "mode", "error_cents")]
+    data += [(point.kind, point.nodes, point.unknowns, point.cpu_s, index + 1, value) for point in points for index, value in enumerate(point.cents)]
+    section.add_table(f"{body.name}-modes", rows, f"The same as numbers; the CSV has every mode.", data, command)
+
+
+def expect_rate(body, kind):
+    """The order of theory: 2p for elements of degree p, 2 where straight sides make another body."""
+    if kind.element == "T4":
+        return 2
+    return 4 if kind.curved or not body.round else 2
+
+
+def describe_cost(points, kinds):
+    """The cheapest element for each level, as a sentence; "" without one."""
+    parts = []
+    for level, text in reversed(LEVELS):
+        costs = {kind.name: cents.find_cost([point for point in points if point.kind == kind.name], level) for kind in kinds}
+        costs = {name: cost for name, cost in costs.items() if cost}
+        if costs:
+            name = min(costs, key=lambda name: costs[name].cpu_s)
+            parts.append(f"{text} {costs[name]} CPU s ({name})")
+    return "; ".join(parts)
+
+
+def study_body(section, lab, body, solves):
+    """Chart, table and sentences of one body; returns (points, truth)."""
+    truth, remark = find_truth(body, solves)
+    points = make_points(body, solves, truth)
+    command = lab.make_command("elements", "--on", body.name)
+    if remark:
+        section.say(remark)
+    draw(section, body, points, command)
+    add_table(section, body, points, command)
+    cost = describe_cost(points, body.get_kinds())
+    if cost:
+        section.say(f"{body.name[0].upper()}{body.name[1:]}: the worst of {len(points[0].cents)} modes within {cost}. (≤: its coarsest mesh is better than that; ~: its finest is worse, by its trend.)")
+    return points, truth
+
+
+def add_rates(section, lab, results):
+    """The measured rate of every kind on every body against theory."""
+    rows = [("body", *(f"{kind.name}: measured (theory)" for kind in KINDS))]
+    data = [("body", "element", "rate_measured", "rate_theory")]
+    gaps = collections.defaultdict(list)
+    for body, points, truth in results:
+        cells = []
+        for kind in KINDS:
+            own = [point for point in points if point.kind == kind.name]
+            rate = cents.find_rate(own, truth) if own else None
+            cells.append("-" if rate is None else f"{rate:.1f} ({expect_rate(body, kind)})")
+            if rate is not None:
+                data.append((body.name, kind.name, rate, expect_rate(body, kind)))
+                gaps[kind.name].append(rate - expect_rate(body, kind))
+        rows.append((body.name, *cells))
+    section.add_table("rates", rows, "Rates of convergence: the power of the edge length with which the median error falls over the three finest meshes. On bodies with flat faces straight and curved T10 are "
+                      "the same mesh. Theory holds where the solution is smooth and meshes are similar; bodies with thin walls reach it late.", data, lab.make_command("elements"))
+    for name, values in gaps.items():
+        section.say(f"{name}: rates {min(values):+.1f} to {max(values):+.1f} beside theory, median {statistics.median(values):+.1f}.")
+
+
+def add_costs(section, lab, results):
+    """What one cent, ten cents and a semitone cost, for every body and element, and the sentences of the summary."""
+    rows = [("body", "element", *(f"{text}: CPU s" for _, text in LEVELS))]
+    data = [("body", "element", "cents", "cpu_s", "how")]
+    cheapest = {level: collections.Counter() for level, _ in LEVELS}
+    table = {}
+    for body, points, _ in results:
+        best = {}
+        for kind in body.get_kinds():
+            costs = [cents.find_cost([point for point in points if point.kind == kind.name], level) for level, _ in LEVELS]
+            rows.append((body.name, kind.name, *(str(cost) if cost else "out of reach" for cost in costs)))
+            for (level, _), cost in zip(LEVELS, costs):
+                if cost:
+                    data.append((body.name, kind.name, level, cost.cpu_s, cost.how))
+                    table[body.name, kind.name, level] = cost.cpu_s
+                    if level not in best or cost.cpu_s < best[level][0]:
+                        best[level] = (cost.cpu_s, kind.name)
+        for level, (_, name) in best.items():
+            cheapest[level][name] += 1
+    section.add_table("costs", rows, "CPU seconds for the worst mode of the band to be as near as that (≤: the coarsest mesh is better; ~: the finest is worse, by its trend; out of reach: more than thirty times "
+                      "as wrong, or errors that do not fall).", data, lab.make_command("elements"))
+    names = [body.name for body, _, _ in results]
+    for level, text in LEVELS:
+        least = [min(values) for name in names if (values := [table[key] for key in table if key[0] == name and key[2] == level])]
+        if least:
+            order = ", ".join(f"{kind} on {count}" for kind, count in cheapest[level].most_common())
+            section.conclude(f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {min(least):.2g} to {max(least):.2g} CPU s (median {statistics.median(least):.2g} s over {len(least)} "
+                             f"bod{'ies' if len(least) > 1 else 'y'}); cheapest is {order}.")
+
+
+def study(lab, bodies):
+    section = Section("elements", "Element and mesh", lab.make_command("elements", *(["--on", *(body.name for body in bodies)] if len(bodies) < 9 else [])))
+    measured = measure(lab, bodies)
+    section.say(f"Frequencies of {len(bodies)} bod{'ies' if len(bodies) > 1 else 'y'} on meshes of several sizes, one rank, tolerance and method by default; CPU seconds of `carillon-precompute`, which reads the mesh and writes "
+                "the bank with its proof and error bars. Truth: no finite element gave it (Ritz, Lamb, Fourier-Ritz; `known.csv` names the source), but for the bunny. Meshing is not in the CPU seconds.")
+    results = []
+    for body in bodies:
+        points, truth = study_body(section, lab, body, measured[body.name])
+        results.append((body, points, truth))
+    add_rates(section, lab, results)
+    add_costs(section, lab, results)
+    return section

@@ -1,0 +1,242 @@
+"""Where a study is done: makes meshes, runs jobs in turn, measures CPU seconds, and keeps what was measured in OUT/work, so that a study that
+was interrupted goes on where it was. What is kept is found by the hash of the job, the bytes of its mesh, ranks, options and the program."""
+import dataclasses
+import functools
+import hashlib
+import json
+import os
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+import time
+
+import measuring
+from errors import InputError, RunError
+
+
+@dataclasses.dataclass(frozen=True)
+class Mesh:
+    path: pathlib.Path
+    nodes: int
+    elements: int
+    cpu_s: float  # that meshing took
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """One job to measure. job: as carillon-precompute takes it, without "bank"; "mesh" and "surface" are absolute paths.
+    options: what follows "--" on the command line of the solver; environment: pairs (name, value)."""
+    name: str
+    job: dict = dataclasses.field(hash=False)
+    ranks: int = 1
+    options: tuple = ()
+    environment: tuple = ()
+
+
+@dataclasses.dataclass
+class Solve:
+    """What one case gave; one entry of cpu_s and wall_s for each repeat. Cents and residuals: one for each mode, as the bank has them."""
+    cpu_s: list
+    wall_s: list
+    freq_hz: list
+    algebraic_cents: list
+    discretisation_cents: list
+    residual: list
+    nodes: int
+    unknowns: int
+    elements: int
+    bank: pathlib.Path
+    record: dict  # "run" of the resolved job: stations, solver, memory
+    error: str = ""  # of a case that may fail, and did; the lists above are empty then
+
+    @property
+    def cpu(self):
+        """Median CPU seconds."""
+        return measuring.find_median(self.cpu_s)
+
+    @property
+    def spread(self):
+        return measuring.find_spread(self.cpu_s)
+
+
+@functools.cache
+def calc_digest(path):
+    """SHA-256 of a file's bytes; read once in a run."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as stream:
+        while piece := stream.read(1 << 20):
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+def calc_key(value):
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:24]
+
+
+def write_whole(path, text):
+    """A file that is there as a whole or not at all."""
+    part = path.with_name(path.name + f".{os.getpid()}.part")
+    part.write_text(text)
+    os.replace(part, path)
+
+
+def read_kept(path):
+    """What an earlier run kept; None when there is nothing that can be used."""
+    try:
+        value = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return None
+    return value if isinstance(value, dict) else None
+
+
+class Lab:
+    def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600):
+        """out: the report's folder. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 when quick, else 2."""
+        self.out, self.programs, self.quick = pathlib.Path(out).resolve(), programs, quick
+        self.repeats = repeats or (1 if quick else 2)
+        self.surface, self.timeout_s = surface, timeout_s
+        self.meshes, self.runs = self.out / "work/meshes", self.out / "work/runs"
+        try:
+            for folder in (self.meshes, self.runs):
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{out}: the folder cannot be made: {error.strerror}; give another one with -o") from None
+        self.start, self.load_start = time.monotonic(), os.getloadavg()[0]
+        self.measured_s = 0.0  # CPU seconds of this call
+
+    def say(self, text):
+        print(text, file=sys.stderr, flush=True)
+
+    def make_command(self, section, *words):
+        """The line that makes a section or a part of it again."""
+        parts = ["carillon", "study", "accuracy", "--only", section, *words, *(["--quick"] if self.quick else []), "-o", "REPORT"]
+        return shlex.join(parts)
+
+    def find_program(self, name):
+        if name not in self.programs:
+            raise InputError(f"{name} is not beside carillon-study; give its folder with --bin")
+        return self.programs[name]
+
+    # --- meshes
+
+    def make_mesh(self, words, change=None, name="", inputs=()):
+        """carillon-mesh with these words, kept by their hash. change(path): alters the file afterwards, `name` says how; inputs: files that the words name."""
+        program = self.find_program("carillon-mesh")
+        words = [str(word) for word in words]
+        key = calc_key([calc_digest(program), words, name, [calc_digest(path) for path in inputs]])
+        mesh, note = self.meshes / f"{key}.msh", self.meshes / f"{key}.json"
+        kept = read_kept(note)
+        if not (kept and mesh.is_file()):
+            part = self.meshes / f"{key}.{os.getpid()}.part.msh"
+            try:
+                cost = self.call([program, *words, "--quiet", "--json", part.with_suffix(".json"), "-o", part], "carillon-mesh")
+                made = json.loads(part.with_suffix(".json").read_text())
+                if change:
+                    change(part)
+                os.replace(part, mesh)
+            finally:
+                part.unlink(missing_ok=True)
+                part.with_suffix(".json").unlink(missing_ok=True)
+            kept = {"words": words, "change": name, "nodes": made["nodes"], "elements": made["tets"], "cpu_s": cost.cpu_s}
+            write_whole(note, json.dumps(kept, indent=1) + "\n")
+        return Mesh(mesh, kept["nodes"], kept["elements"], kept["cpu_s"])
+
+    def call(self, command, what, environment=None, cwd=None):
+        """One measured run. RunError carries the program's exit code and its own error line."""
+        try:
+            return measuring.run_measured(command, cwd or self.out, environment=environment, timeout_s=self.timeout_s)
+        except RuntimeError as error:
+            code = re.search(r"exit code (-?\d+)", str(error))
+            number = int(code.group(1)) if code else 4
+            said = [line.strip() for line in str(error).splitlines() if line.strip()]
+            lines = [line for line in said[1:] if "error" in line] or said[-1:]
+            raise RunError(number if number in (2, 3) else 4, f"{what}: {lines[0]}") from None
+
+    # --- solves
+
+    def measure(self, cases, repeats=None, may_fail=False):
+        """{name: Solve}: every case `repeats` times, all cases in turn and every other time backwards, so that what the machine does besides falls on all of them."""
+        repeats = repeats or self.repeats
+        keys = {case.name: self.find_key(case) for case in cases}
+        if len(keys) != len(cases):
+            raise ValueError("two cases have one name")
+        kept = {case.name: read_kept(self.runs / keys[case.name] / "kept.json") or {"cpu_s": [], "wall_s": []} for case in cases}
+        rounds = [[case for case in cases if len(kept[case.name]["cpu_s"]) <= repeat and not kept[case.name].get("error")] for repeat in range(repeats)]
+        todo = sum(map(len, rounds))
+        if todo < repeats * len(cases) and todo:
+            self.say(f"{repeats * len(cases) - todo} of {repeats * len(cases)} solves are kept from before ({self.runs}); going on")
+        weights = {case.name: self.find_weight(case) for case in cases}
+        left, spent, done = sum(weights[case.name] for cases_now in rounds for case in cases_now), 0.0, 0
+        all_weight, begin = left, time.monotonic()
+        for number, cases_now in enumerate(rounds):
+            for case in cases_now if number % 2 == 0 else reversed(cases_now):
+                if kept[case.name].get("error"):
+                    continue
+                self.run_case(case, keys[case.name], kept[case.name], may_fail)
+                done, left = done + 1, left - weights[case.name]
+                spent = time.monotonic() - begin
+                seconds = kept[case.name]["cpu_s"][-1:] or [0.0]
+                minutes = spent / max(all_weight - left, 1e-9) * left / 60
+                self.say(f"{done}/{todo} {case.name}: {seconds[0]:.2f} CPU s; about {minutes:.1f} min left of these")
+        return {case.name: self.make_solve(kept[case.name], keys[case.name], repeats) for case in cases}
+
+    def find_key(self, case):
+        job = dict(case.job)
+        files = []
+        if "mesh" in job:
+            files.append(calc_digest(job.pop("mesh")))
+        surface = job.get("body", {}).get("surface")
+        if surface:
+            files.append(calc_digest(surface))
+        return calc_key([calc_digest(self.find_program("carillon-precompute")), job, files, case.ranks, case.options, case.environment])
+
+    def find_weight(self, case):
+        """Something that grows with what a case costs."""
+        mesh = case.job.get("mesh")
+        return (os.path.getsize(mesh) if mesh else case.job.get("body", {}).get("nodes", 5000) * 100) ** 1.2
+
+    def run_case(self, case, key, kept, may_fail):
+        folder = self.runs / key
+        folder.mkdir(exist_ok=True)
+        bank = folder / "bank.hdf"
+        write_whole(folder / "job.json", json.dumps(case.job | {"bank": "bank.hdf"}, indent=1) + "\n")
+        program = [self.find_program("carillon-precompute"), "-q", "job.json", *(["--", *case.options] if case.options else [])]
+        try:
+            cost = self.call(["mpirun", "-np", case.ranks, *program] if case.ranks > 1 else program, case.name, dict(case.environment), folder)
+        except RunError as error:
+            if not may_fail or error.code not in (2, 3):
+                raise
+            kept["error"] = str(error)
+        else:
+            if "modes" not in kept:
+                kept |= self.read_bank(bank)
+            kept["cpu_s"].append(cost.cpu_s)
+            kept["wall_s"].append(cost.wall_s)
+            self.measured_s += cost.cpu_s
+        write_whole(folder / "kept.json", json.dumps(kept) + "\n")
+
+    def read_bank(self, bank):
+        """{"modes", "record", ...} of a fresh bank."""
+        child = subprocess.run([str(self.find_program("carillon-bank")), "info", "--json", str(bank)], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        if child.returncode != 0:
+            raise RunError(4, f"{bank}: {child.stderr.strip()}")
+        content = json.loads(child.stdout)
+        record = json.loads(pathlib.Path(f"{bank}.resolved.json").read_text())["run"]
+        columns = ("frequency_hz", "algebraic_error_cents", "discretisation_error_cents", "residual")
+        return {"modes": [[mode[column] for column in columns] for mode in content["modes"]], "record": record, "nodes": content["counts"]["nodes"], "elements": content["counts"]["tets"]}
+
+    def make_solve(self, kept, key, repeats):
+        if kept.get("error"):
+            return Solve([], [], [], [], [], [], 0, 0, 0, self.runs / key / "bank.hdf", {}, kept["error"])
+        columns = list(map(list, zip(*kept["modes"]))) or [[], [], [], []]
+        return Solve(kept["cpu_s"][:repeats], kept["wall_s"][:repeats], *columns, kept["nodes"], 3 * kept["record"]["mesh"]["free_nodes"], kept["elements"], self.runs / key / "bank.hdf", kept["record"])
+
+    def describe_machine(self):
+        processors = [line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")][:1]
+        cores = len(os.sched_getaffinity(0))
+        others = max(self.load_start, 0.0)
+        return (f"{processors[0] if processors else 'A processor without a name'}, {cores} core{'s' if cores > 1 else ''}; load of the machine when the study began {others:.1f}, at its end "
+                f"{os.getloadavg()[0]:.1f}. This call ran solves of {self.measured_s:.0f} CPU s in {(time.monotonic() - self.start) / 60:.1f} minutes; "
+                f"{self.repeats} repeat{'s' if self.repeats > 1 else ''} of every case, all cases in turn, medians of CPU seconds (user and system, all processes).")

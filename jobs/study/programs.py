@@ -1,0 +1,25 @@
+"""The programs that a study starts: given, beside this program, or on the way of commands."""
+import os
+import pathlib
+import shutil
+import sys
+
+from errors import InputError
+
+
+def find_program(given, name="carillon-precompute"):
+    if given:
+        candidates = [pathlib.Path(given) / name]
+    else:
+        beside = pathlib.Path(sys.argv[0]).resolve().parent / name
+        found = shutil.which(name)
+        candidates = [beside] + ([pathlib.Path(found)] if found else [])
+    for candidate in candidates:
+        if os.access(candidate, os.X_OK) and candidate.is_file():
+            return candidate.resolve()
+    raise InputError(f"{name} is not at {candidates[0]}; give its folder with --bin")
+
+
+def find_all(given, names):
+    """{name: path}. InputError names the first that is missing."""
+    return {name: find_program(given, name) for name in sorted(set(names))}
