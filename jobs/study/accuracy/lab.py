@@ -156,13 +156,15 @@ class Lab:
 
     # --- solves
 
-    def measure(self, cases, repeats=None, may_fail=False):
-        """{name: Solve}: every case `repeats` times, all cases in turn and every other time backwards, so that what the machine does besides falls on all of them."""
+    def measure(self, cases, repeats=None, may_fail=False, is_fresh=False):
+        """{name: Solve}: every case `repeats` times, all cases in turn and every other time backwards, so that what the machine does besides falls on all of them.
+        is_fresh: nothing that was kept is taken, for the machine may have another pace by now."""
         repeats = repeats or self.repeats
         keys = {case.name: self.find_key(case) for case in cases}
         if len(keys) != len(cases):
             raise ValueError("two cases have one name")
-        kept = {case.name: read_kept(self.runs / keys[case.name] / "kept.json") or {"cpu_s": [], "wall_s": []} for case in cases}
+        find_kept = lambda case: None if is_fresh else read_kept(self.runs / keys[case.name] / "kept.json")
+        kept = {case.name: find_kept(case) or {"cpu_s": [], "wall_s": []} for case in cases}
         rounds = [[case for case in cases if len(kept[case.name]["cpu_s"]) <= repeat and not kept[case.name].get("error")] for repeat in range(repeats)]
         todo = sum(map(len, rounds))
         if todo < repeats * len(cases) and todo:
