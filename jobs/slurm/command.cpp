@@ -1,4 +1,6 @@
-// Method:     fork and exec with three pipes, and poll() on them until the program has ended or its time is over.
+// Method:     fork and exec with three pipes, and poll() on them until the program has closed its outputs or its time is over; then
+// waitpid()
+//             without blocking, as a program may go on without outputs, and one that waits for a dead disk cannot even be killed.
 // Source:     POSIX; Linux prctl(2).
 // Deviations: none.
 #include "jobs/slurm/command.hpp"
@@ -16,11 +18,15 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 
 #include "runtime/config/error.hpp"
 
 namespace carillon::slurm {
 namespace {
+
+constexpr long kStepNs = 2'000'000;
+constexpr double kKillPatienceS = 5.0;
 
 class Pipe {
  public:
@@ -41,6 +47,22 @@ class Pipe {
 
  private:
   std::array<int, 2> ends_{-1, -1};
+};
+
+/// A program that takes no input is no reason to die.
+class Quiet {
+ public:
+  Quiet() {
+    struct sigaction ignore {};
+    ignore.sa_handler = SIG_IGN;
+    ::sigaction(SIGPIPE, &ignore, &before_);
+  }
+  ~Quiet() { ::sigaction(SIGPIPE, &before_, nullptr); }
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+
+ private:
+  struct sigaction before_ {};
 };
 
 double find_seconds() {
@@ -76,50 +98,66 @@ bool give(int descriptor, std::string_view& input) {
   return !input.empty() && (put > 0 || errno == EINTR || errno == EAGAIN);
 }
 
-/// True when the program closed both its outputs in time.
-bool talk(Pipe& in, Pipe& out, Pipe& err, std::string_view input, double deadline_s, Finished& finished) {
+/// Until the program has closed both its outputs, or printed too much, or its time is over.
+void talk(Pipe& in, Pipe& out, Pipe& err, std::string_view input, double deadline_s, std::size_t most_bytes, Finished& finished) {
   ::fcntl(in.end(1), F_SETFL, O_NONBLOCK);
   if (input.empty()) in.close(1);
   while (out.end(0) >= 0 || err.end(0) >= 0) {
     const double left_s = deadline_s - find_seconds();
-    if (left_s <= 0.0) return false;
+    finished.was_slow = left_s <= 0.0;
+    finished.was_long = std::max(finished.output.size(), finished.errors.size()) > most_bytes;
+    if (finished.was_slow || finished.was_long) return;
     std::array<pollfd, 3> all{{{in.end(1), POLLOUT, 0}, {out.end(0), POLLIN, 0}, {err.end(0), POLLIN, 0}}};
-    if (::poll(all.data(), all.size(), static_cast<int>(std::min(left_s * 1e3 + 1.0, 1e6))) < 0 && errno != EINTR) return false;
+    if (::poll(all.data(), all.size(), static_cast<int>(std::min(left_s * 1e3 + 1.0, 1e6))) < 0) {
+      finished.was_slow = errno != EINTR;
+      if (finished.was_slow) return;
+      continue;
+    }
     if (all[0].revents != 0 && !give(in.end(1), input)) in.close(1);
     if (all[1].revents != 0 && !take(out.end(0), finished.output)) out.close(0);
     if (all[2].revents != 0 && !take(err.end(0), finished.errors)) err.close(0);
   }
-  return true;
+}
+
+/// Its status when it ends before the deadline.
+std::optional<int> await(pid_t child, double deadline_s) {
+  for (;;) {
+    int status = 0;
+    const pid_t ended = ::waitpid(child, &status, WNOHANG);
+    if (ended == child) return status;
+    if (ended < 0 && errno != EINTR) return 0;
+    if (find_seconds() >= deadline_s) return std::nullopt;
+    const timespec time{0, kStepNs};
+    ::nanosleep(&time, nullptr);
+  }
 }
 
 }  // namespace
 
-Finished run_command(const std::vector<std::string>& words, std::string_view input, double patience_s) {
+Finished run_command(const std::vector<std::string>& words, std::string_view input, double patience_s, std::size_t most_bytes) {
   std::vector<char*> pointers;
   for (const std::string& word : words) pointers.push_back(const_cast<char*>(word.c_str()));
   pointers.push_back(nullptr);
   Pipe in, out, err;
-  struct sigaction ignore {
-  }, before{};
-  ignore.sa_handler = SIG_IGN;
-  ::sigaction(SIGPIPE, &ignore, &before);  // a program that takes no input is no reason to die
+  const Quiet quiet;
+  const double deadline_s = find_seconds() + patience_s;
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
+  if (child < 0) throw SystemError(fmt::format("{} cannot be started: {}", words[0], std::strerror(errno)));
   if (child == 0) become(pointers, {in.end(0), out.end(1), err.end(1)}, parent);
+  in.close(0);
+  out.close(1);
+  err.close(1);
   Finished finished;
-  if (child > 0) {
-    in.close(0);
-    out.close(1);
-    err.close(1);
-    finished.was_slow = !talk(in, out, err, input, find_seconds() + patience_s, finished);
-    if (finished.was_slow) ::kill(child, SIGKILL);
-    int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
-    finished.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  talk(in, out, err, input, deadline_s, most_bytes, finished);
+  std::optional<int> status;
+  if (!finished.was_slow && !finished.was_long) status = await(child, deadline_s);
+  if (!status) {
+    finished.was_slow = !finished.was_long;
+    ::kill(child, SIGKILL);
+    status = await(child, find_seconds() + kKillPatienceS).value_or(SIGKILL);
   }
-  const int error = errno;
-  ::sigaction(SIGPIPE, &before, nullptr);
-  if (child < 0) throw SystemError(fmt::format("{} cannot be started: {}", words[0], std::strerror(error)));
+  finished.exit_code = WIFEXITED(*status) ? WEXITSTATUS(*status) : 128 + WTERMSIG(*status);
   return finished;
 }
 

@@ -50,8 +50,9 @@ bool is_unreachable(const Finished& finished) {
                                                       "Resource temporarily unavailable",
                                                       "in standby mode",
                                                       "rotocol authentication error"};
-  return finished.was_slow || std::any_of(kPhrases.begin(), kPhrases.end(),
-                                          [&](std::string_view phrase) { return finished.errors.find(phrase) != std::string::npos; });
+  return finished.was_slow || finished.was_long || std::any_of(kPhrases.begin(), kPhrases.end(), [&](std::string_view phrase) {
+           return finished.errors.find(phrase) != std::string::npos;
+         });
 }
 
 bool is_unknown_job(const Finished& finished) { return finished.errors.find("nvalid job id") != std::string::npos; }
@@ -62,8 +63,10 @@ Finished ask(const std::vector<std::string>& words, std::string_view input = {})
   if (finished.exit_code == 127)
     throw Unreachable(fmt::format("{} is not in PATH; install Slurm's commands (slurm-client), or load the site's module", words[0]));
   if (finished.exit_code != 0 && is_unreachable(finished))
-    throw Unreachable(
-        fmt::format("Slurm does not answer ({}: {})", words[0], finished.was_slow ? "no word for a minute" : strip(finished.errors)));
+    throw Unreachable(fmt::format("Slurm does not answer ({}: {})", words[0],
+                                  finished.was_slow   ? "no word for a minute"
+                                  : finished.was_long ? "words without end"
+                                                      : strip(finished.errors)));
   return finished;
 }
 

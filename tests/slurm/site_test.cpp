@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <string>
 
 #include "jobs/slurm/command.hpp"
@@ -64,6 +65,23 @@ TEST(slurm_command, a_program_that_does_not_end_is_ended) {
   const Finished finished = run_command({"/bin/sh", "-c", "echo begun; exec sleep 1000"}, {}, 0.5);
   EXPECT_TRUE(finished.was_slow);
   EXPECT_EQ(finished.output, "begun\n");
+}
+
+TEST(slurm_command, a_program_that_closes_its_outputs_and_stays_is_ended) {
+  const auto start = std::chrono::steady_clock::now();
+  const Finished finished = run_command({"/bin/sh", "-c", "echo begun; exec sleep 30 >&- 2>&-"}, {}, 0.5);
+  EXPECT_TRUE(finished.was_slow);
+  EXPECT_EQ(finished.output, "begun\n");
+  EXPECT_EQ(finished.exit_code, 137);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(15));
+}
+
+TEST(slurm_command, a_program_that_prints_without_end_is_ended) {
+  const Finished finished = run_command({"/usr/bin/yes"}, {}, 60.0, 1 << 20);
+  EXPECT_TRUE(finished.was_long);
+  EXPECT_FALSE(finished.was_slow);
+  EXPECT_EQ(finished.exit_code, 137);
+  EXPECT_LT(finished.output.size(), 2u << 20);
 }
 
 }  // namespace
