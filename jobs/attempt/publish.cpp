@@ -13,7 +13,6 @@
 #include <system_error>
 
 #include "jobs/attempt/attempt.hpp"
-#include "jobs/report/report.hpp"
 #include "runtime/bank/bank.hpp"
 
 namespace carillon::attempt {
@@ -24,7 +23,6 @@ namespace fs = std::filesystem;
 constexpr const char* kReserveFile = "reserve";
 constexpr off_t kReserveBytes = 64 << 10;
 constexpr double kFullBytes = 1 << 20;
-constexpr double kMostDrawSeconds = 60.0;
 
 /// A missing file is passed over.
 void link_or_copy(const fs::path& from, const fs::path& to) {
@@ -36,17 +34,10 @@ void link_or_copy(const fs::path& from, const fs::path& to) {
 }
 
 /// A page about the bank. A bank is no worse without.
-void write_report(const fs::path& folder, bool has_pictures, double memory_gb) {
+void write_report(const fs::path& folder, report::Options& wanted) {
   try {
-    report::Options options;
-    options.draw_limit_s = kMostDrawSeconds;
-    const bool has_room = memory_gb <= 0.0 || memory_gb >= kDrawGb;
-    if (!has_pictures || !has_room) options.drawn_modes = 0;
-    if (has_pictures && !has_room)
-      options.undrawn_reason =
-          fmt::format("drawing takes about {:g} GB, and the job had {:g}; carillon report JOB -o FOLDER draws them", kDrawGb, memory_gb);
-    if (const std::optional<store::Request> request = store::read_request(folder)) options.title = store::find_input_name(*request);
-    report::write_report(folder / store::kBankFile, folder / store::kJobFile, folder, options);
+    if (const std::optional<store::Request> request = store::read_request(folder)) wanted.title = store::find_input_name(*request);
+    report::write_report(folder / store::kBankFile, folder / store::kJobFile, folder, wanted);
   } catch (const std::exception& error) {
     fmt::print(stderr, "carillon attempt: no report was made: {}\n", error.what());
   }
@@ -67,7 +58,7 @@ std::optional<std::string> find_bank_fault(const fs::path& work, bool& has_bank)
   }
 }
 
-void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, bool has_pictures, double memory_gb) {
+void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, report::Options wanted) {
   const fs::path work = store.work_folder(id);
   const fs::path folder = store.make_temporary();
   try {
@@ -78,7 +69,7 @@ void publish(const store::Store& store, const store::Id& id, const outcome::Outc
     link_or_copy(fs::exists(resolved, error) ? resolved : work / store::kJobFile, folder / store::kJobFile);
     link_or_copy(work / "request.json", folder / "request.json");
     link_or_copy(work / store::kLogFile, folder / store::kLogFile);
-    write_report(folder, has_pictures, memory_gb);
+    write_report(folder, wanted);
     outcome::write_outcome(folder, outcome);
     store.publish(id, folder);
   } catch (...) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "jobs/outcome/outcome.hpp"
+#include "jobs/report/report.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::attempt {
@@ -14,10 +15,9 @@ namespace carillon::attempt {
 /// one.
 std::optional<std::string> find_bank_fault(const std::filesystem::path& work, bool& has_bank);
 
-/// Puts bank, resolved job, request, log, outcome and a report, with pictures or without, into one folder and publishes it as the bank of
+/// Puts bank, resolved job, request, log, outcome and a report (titled by the job's input) into one folder and publishes it as the bank of
 /// `id`; nothing is taken from the folder of work before that. SystemError when the disk refuses: nothing is published then.
-void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, bool has_pictures = true,
-             double memory_gb = 0.0);
+void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, report::Options wanted);
 
 /// A file that keeps some room on the disk, so that the end of an attempt can be written when the disk is full. Without effect where there
 /// is no room already.

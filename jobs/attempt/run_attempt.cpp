@@ -30,6 +30,7 @@ namespace fs = std::filesystem;
 using outcome::Cause;
 
 constexpr std::uintmax_t kMostLog = 1 << 16;  // what is read of it
+constexpr double kMostDrawSeconds = 60.0;
 
 fs::path find_root(const fs::path& work) {
   // work/ab/<id> of a store
@@ -60,6 +61,18 @@ double find_seconds() {
   timespec time{};
   ::clock_gettime(CLOCK_MONOTONIC, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// Pictures where they are wanted and the job was given the memory to draw them.
+report::Options find_report_options(const Options& attempt) {
+  report::Options wanted;
+  wanted.draw_limit_s = kMostDrawSeconds;
+  const bool has_room = attempt.memory_gb <= 0.0 || attempt.memory_gb >= kDrawGb;
+  if (!attempt.has_pictures || !has_room) wanted.drawn_modes = 0;
+  if (attempt.has_pictures && !has_room)
+    wanted.undrawn_reason = fmt::format("drawing takes about {:g} GB, and the job had {:g}; carillon report JOB -o FOLDER draws them",
+                                        kDrawGb, attempt.memory_gb);
+  return wanted;
 }
 
 /// Others look at the lock for a moment now and then.
@@ -180,7 +193,7 @@ class Attempt {
     if (outcome_.cause == Cause::done) {
       outcome_.percent = 100.0;
       try {
-        publish(store_, id_, outcome_, options_.has_pictures, options_.memory_gb);
+        publish(store_, id_, outcome_, find_report_options(options_));
         process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
         store_.remove_work(id_);
         return 0;

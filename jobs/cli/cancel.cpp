@@ -60,9 +60,7 @@ int run_retry(Shared& shared, const Options& options) {
   }
   std::optional<store::Lock> lock = shared.store().lock_shared();  // gc waits
   const int code = do_to_all(shared, jobs, [&](const registry::Job& job) {
-    const queue::Said said = queue::retry(shared.store(), shared.registry(), job.id);
-    if (said.is_done) shared.registry().update(job.id, [&](registry::Job& row) { return options.resources.apply(row); });
-    return said;
+    return queue::retry(shared.store(), shared.registry(), job.id, [&](registry::Job& row) { options.resources.apply(row); });
   });
   lock.reset();
   const auto is_for_slurm = [&](const registry::Job& job) {

@@ -86,18 +86,14 @@ Verdict find_verdict(Shared& shared, const store::Id& id, const std::optional<re
             fmt::format("nothing would run: its bank is {}", show((shared.store().bank_folder(id) / store::kBankFile).string(), 4000)),
             false};
   if (!job) return {"new", "it would run: the store has no bank of these inputs", true};
-  const std::string state = to_text(job->state);
-  switch (job->state) {
-    case registry::State::failed:
-      return {state,
-              fmt::format("nothing would run: it failed, {}; carillon retry {} tries again", show_message(find_reason(shared, *job)),
-                          id.short_text()),
-              false};
-    case registry::State::cancelled:
-      return {state, "it would run: it was cancelled, and carillon submit asks for it again", true};
-    default:
-      return {state, fmt::format("nothing new would run: it is {} already", state), false};
-  }
+  const std::string state = to_text(job->state), reason = show_message(find_reason(shared, *job));
+  if (job->state == registry::State::cancelled)
+    return {state, "it would run: it was cancelled, and carillon submit asks for it again", true};
+  if (is_submitted_again(*job, shared.store().has_work(id)))
+    return {state, fmt::format("it would run: it failed before it ran, {}; carillon submit asks for it again", reason), true};
+  if (job->state == registry::State::failed)
+    return {state, fmt::format("nothing would run: it failed, {}; carillon retry {} tries again", reason, id.short_text()), false};
+  return {state, fmt::format("nothing new would run: it is {} already", state), false};
 }
 
 int run_explain(Shared& shared, const std::string& word) {
@@ -147,7 +143,10 @@ void add_explain(CLI::App& app, Shared& shared, Run& run) {
   CLI::App* command =
       app.add_subcommand("explain", "Would this job run, and why: which part of it changed since it was submitted last. Changes nothing.");
   command->add_option("JOB", *word, "Job file")->required();
-  command->callback([&shared, &run, word] { run = [&shared, word] { return run_explain(shared, *word); }; });
+  command->callback([&shared, &run, word] {
+    shared.only_reads = true;
+    run = [&shared, word] { return run_explain(shared, *word); };
+  });
 }
 
 }  // namespace carillon::cli

@@ -79,7 +79,10 @@ void add_get(CLI::App& app, Shared& shared, Run& run) {
       "get", "Prints the path of the finished bank, read-only in the store. Exit code 1: not there yet, with its state.");
   command->add_option("JOB", options->word, "Job file (what it holds now), or an id or its beginning")->required();
   command->add_option("--to", options->to, "Copy the bank to this file or into this folder");
-  command->callback([&shared, &run, options] { run = [&shared, options] { return run_get(shared, *options); }; });
+  command->callback([&shared, &run, options] {
+    shared.only_reads = true;
+    run = [&shared, options] { return run_get(shared, *options); };
+  });
 }
 
 }  // namespace carillon::cli

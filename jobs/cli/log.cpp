@@ -42,6 +42,8 @@ std::string filter(const std::string& bytes) {
 std::string read_from(const fs::path& file, off_t& from, off_t most) {
   std::string bytes;
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
+  if (fd < 0 && (errno == EACCES || errno == EPERM))
+    throw InputError(fmt::format("{}: you may not read this log; ask the owner of the store", file.string()));
   if (fd < 0) return bytes;
   struct stat info {};
   if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && info.st_size > from) {
@@ -97,7 +99,10 @@ void add_log(CLI::App& app, Shared& shared, Run& run) {
       app.add_subcommand("log", "What the solver printed for a job, all attempts one after the other. Exit code 1: nothing yet.");
   command->add_option("ID", options->word, "Id (or its beginning) or job file")->required();
   command->add_flag("-f,--follow", options->follow, "Go on until the job has ended");
-  command->callback([&shared, &run, options] { run = [&shared, options] { return run_log(shared, *options); }; });
+  command->callback([&shared, &run, options] {
+    shared.only_reads = true;
+    run = [&shared, options] { return run_log(shared, *options); };
+  });
 }
 
 }  // namespace carillon::cli

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "jobs/cli/shared.hpp"
+#include "runtime/config/document.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::cli {
@@ -41,23 +42,40 @@ int fail(bool json, const std::string& what, int code) {
   return code;
 }
 
-/// What follows "study" belongs to another program, its own --help too; of what stands before it, only --json does.
-void hand_over_study(int argc, char** argv) {
-  std::vector<std::string> json;
+/// Where the name of the command stands, behind options of all commands; argc when there is none.
+int find_command(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    if (word == "study") {
-      std::vector<std::string> rest(argv + i + 1, argv + argc);
-      rest.insert(rest.end(), json.begin(), json.end());
-      become(find_program("carillon-study"), rest);
-    }
-    if (word == "--json")
-      json = {"--json"};
-    else if (word == "--store" || word == "--profile")
+    if (!word.starts_with('-')) return i;
+    if (word == "--store" || word == "--profile")
       ++i;
-    else
-      return;
+    else if (word != "--json" && !word.starts_with("--store=") && !word.starts_with("--profile="))
+      break;
   }
+  return argc;
+}
+
+/// What follows "study" belongs to another program, its own --help too; of what stands before it, only --json does.
+void hand_over_study(int argc, char** argv) {
+  const int at = find_command(argc, argv);
+  if (at == argc || std::string_view(argv[at]) != "study") return;
+  std::vector<std::string> rest(argv + at + 1, argv + argc);
+  if (std::any_of(argv + 1, argv + at, [](const char* word) { return std::string_view(word) == "--json"; })) rest.emplace_back("--json");
+  become(find_program("carillon-study"), rest);
+}
+
+/// Throws InputError for a word that is no command, with the nearest one.
+void check_command(CLI::App& app, int argc, char** argv) {
+  const int at = find_command(argc, argv);
+  if (at == argc) return;
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
+    if (command->get_name() == argv[at]) return;
+    if (!command->get_group().empty()) known.push_back(command->get_name());
+  }
+  const std::string near = config::find_nearest(argv[at], known);
+  throw InputError(fmt::format("\"{}\" is no command{}; carillon --help lists them", show(argv[at]),
+                               near.empty() ? "" : ", did you mean \"" + near + "\"?"));
 }
 
 int run(int argc, char** argv) {
@@ -77,7 +95,9 @@ int run(int argc, char** argv) {
   add_attempt(app, command);
   const bool wants_json = std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
   try {
+    shared.json = wants_json;
     hand_over_study(argc, argv);
+    check_command(app, argc, argv);
     app.parse(argc, argv);
     return command();
   } catch (const CLI::ParseError& error) {

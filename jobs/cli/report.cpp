@@ -90,6 +90,7 @@ void add_report(CLI::App& app, Shared& shared, Run& run) {
   command->add_option("-o,--output", options->folder, "Write report.html and its pictures into this folder");
   command->add_flag("--no-pictures", options->no_pictures, "With -o: without pictures of the first modes");
   command->callback([&shared, &run, options] {
+    shared.only_reads = true;
     run = [&shared, options] {
       std::error_code error;
       const bool is_file =

@@ -23,6 +23,10 @@ fs::path find_self() {
 }
 
 void Shared::settle() {
+  if (!store().may_write()) {
+    registry_.reset();
+    return;
+  }
   queue::settle(store(), registry());
   follow_slurm(*this);
   if (hands_over) hand_over_to_slurm(*this);

@@ -74,14 +74,15 @@ const store::Store& Shared::store() {
     const fs::path folder = !store_option.empty()      ? fs::path(store_option)
                             : !profile().store.empty() ? profile().store
                                                        : store::find_default_store();
-    store_ = store::Store::open(folder);
+    store_ = only_reads ? store::Store::open_to_read(folder) : store::Store::open(folder);
   }
   return *store_;
 }
 
 registry::Registry& Shared::registry() {
   const auto say = [](const std::string& line) { fmt::print(stderr, "carillon: {}\n", show_message(line)); };
-  if (!registry_) registry_.emplace(registry::Registry::open(store(), say));
+  if (!registry_)
+    registry_.emplace(store().may_write() ? registry::Registry::open(store(), say) : registry::Registry::open_to_read(store()));
   return *registry_;
 }
 
@@ -111,6 +112,11 @@ std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::stri
       jobs.push_back(std::move(job));
   }
   return jobs;
+}
+
+bool is_submitted_again(const registry::Job& job, bool has_work) {
+  const bool is_lost = job.state == registry::State::failed && (!has_work || job.attempts == 0);  // a retry has nothing to go on with
+  return job.state == registry::State::cancelled || is_lost;
 }
 
 std::string find_reason(Shared& shared, const registry::Job& job) {

@@ -39,11 +39,12 @@ class Shared {
   std::string store_option;    // --store
   std::string profile_option;  // --profile
   bool json = false;           // --json
+  bool only_reads = false;     // what this command does may be done on a store that may only be read
 
   const Profile& profile();
   const store::Store& store();
   registry::Registry& registry();
-  /// Rows whose process is gone are settled: what every command does that looks at states.
+  /// Rows whose process is gone are settled: what every command does that looks at states. A store that may only be read is looked at anew.
   void settle();
 
   bool hands_over = false;                      // settle() hands over to Slurm too: for a command that waits for its jobs
@@ -98,6 +99,9 @@ std::string read_solver_version();
 std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words);
 /// The same of one word.
 registry::Job find_job(Shared& shared, const std::string& word);
+
+/// Whether carillon submit puts a row that has ended back into the queue; `has_work`: its folder of work is there.
+bool is_submitted_again(const registry::Job& job, bool has_work);
 
 /// A row with its progress, its bank and its log, under the keys of docs/howto/jobs.md.
 Json::Value describe(Shared& shared, const registry::Job& job);

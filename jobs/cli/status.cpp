@@ -90,12 +90,15 @@ int run_status(Shared& shared, const Options& options) {
           job.state == registry::State::queued || job.state == registry::State::running || job.state == registry::State::waiting;
       if (is_open || !options.words.empty()) ids.push_back(job.id);
     }
-    if (ids.empty()) return 0;
-    return follow(shared, ids, true);
+    const int code = ids.empty() ? 0 : follow(shared, ids, true);
+    if (!options.words.empty()) return code;
+    // All jobs were asked for: those too that had ended before.
+    return std::max(code, find_exit_code(shared.registry().list({registry::State::failed, registry::State::cancelled})));
   }
   if (shared.json) {
     Json::Value root;
     root["store"] = to_json(shared.store().root().string());
+    root["read_only"] = !shared.store().may_write();
     root["jobs"] = Json::arrayValue;
     for (const char* state : {"queued", "running", "waiting", "done", "failed", "cancelled"}) root["counts"][state] = 0;
     for (const registry::Job& job : jobs) {
@@ -113,6 +116,7 @@ int run_status(Shared& shared, const Options& options) {
   const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 2 + 1 : kMostRows;
   for (const std::string& line : format_bars(shared, jobs, rows, kWideColumns)) fmt::print("{}\n", line);
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+  if (!shared.store().may_write()) fmt::print(stderr, "carillon: this store may only be read; states are as its files tell them\n");
   return 0;
 }
 
@@ -146,9 +150,12 @@ void add_status(CLI::App& app, Shared& shared, Run& run) {
   command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, all jobs");
   command->add_flag("--watch", options->watch,
                     "Until they have ended: bars on a terminal, elsewhere one JSON object a line for every change. Exit code 0 when all "
-                    "are done, 3 when one failed");
+                    "are done, 3 when one failed or was cancelled, also earlier where no ID is given");
   command->add_flag("--all", options->all, "Every job, however many there are");
-  command->callback([&shared, &run, options] { run = [&shared, options] { return run_status(shared, *options); }; });
+  command->callback([&shared, &run, options] {
+    shared.only_reads = true;
+    run = [&shared, options] { return run_status(shared, *options); };
+  });
 }
 
 }  // namespace carillon::cli

@@ -31,13 +31,11 @@ struct Answer {
   bool is_new = false;               // this call made it
 };
 
-/// A row that was there: cancelled ones are wanted again, and what was asked for explicitly counts from now on.
+/// A row that was there: cancelled and lost ones are wanted again, and what was asked for explicitly counts from now on.
 void renew(Shared& shared, const Options& options, const Source& source, bool was_made) {
   shared.registry().update(store::require_id(source.request.id, "request"), [&](registry::Job& job) {
     if (job.state == registry::State::running || job.state == registry::State::done) return false;
-    const bool is_lost =
-        job.state == registry::State::failed && (was_made || job.attempts == 0);  // its folder was gone, and is there again
-    const bool is_wanted = job.state == registry::State::cancelled || is_lost;
+    const bool is_wanted = is_submitted_again(job, !was_made);
     if (is_wanted) {
       job.state = registry::State::queued;
       job.reason.clear();
@@ -52,13 +50,13 @@ std::vector<Answer> enter(Shared& shared, const Options& options, const std::vec
   shared.registry();  // brought up to date before there are new folders
   const store::Lock lock = shared.store().lock_shared();
   std::vector<registry::Submission> submissions;
-  std::vector<store::Work> works;
+  std::vector<store::Asked> asked;
   for (const Source& source : sources) {
     if (!source.error.empty()) continue;
-    works.push_back({&source.job, &source.request});
+    asked.push_back({&source.job, &source.request});
     submissions.push_back({source.job_file, source.request});
   }
-  const std::vector<bool> was_made = store::prepare_work(shared.store(), works);
+  const std::vector<bool> was_made = store::prepare_work(shared.store(), asked);
   const std::vector<bool> was_inserted = shared.registry().submit(submissions);
   std::vector<Answer> answers;
   std::size_t at = 0;

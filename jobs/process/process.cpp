@@ -97,6 +97,11 @@ std::optional<Identity> find_process(pid_t pid) {
   return Identity{find_host(), find_boot(), static_cast<int>(pid), stat->start_ticks};
 }
 
+bool is_self(const Identity& identity) {
+  const Identity self = find_self();
+  return identity.pid == self.pid && identity.start_ticks == self.start_ticks && identity.boot == self.boot;
+}
+
 Life find_life(const Identity& identity) {
   if (identity.pid <= 0) return Life::gone;
   const std::string boot = find_boot();

@@ -33,6 +33,8 @@ std::string find_boot();
 /// This process, and the one of a number; none when there is none (a zombie is none).
 Identity find_self();
 std::optional<Identity> find_process(pid_t pid);
+/// Whether `identity` is this process: number, start and boot; its machine may have got another name meanwhile.
+bool is_self(const Identity& identity);
 
 /// Of this machine and this boot: running or gone. Of an earlier boot of this machine: gone. Else: elsewhere.
 Life find_life(const Identity& identity);

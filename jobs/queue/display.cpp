@@ -83,7 +83,8 @@ void Display::tell(const std::string& event, const registry::Job& job) {
         event, process::find_boot_seconds(), job.id.text(), config::quote(job.name), job.given.ranks, job.given.memory_gb, job.attempts,
         job.failures, config::quote(job.reason)));
   }
-  if (event == "start" || event == "predict") return;  // the bar shows it
+  const bool is_in_bar = (event == "start" && job.reason.empty()) || event == "predict";
+  if (is_in_bar) return;
   print(fmt::format("{} {}: {}{}{}", job.id.short_text(), clean(job.name), event, job.reason.empty() ? "" : ": ", clean(job.reason)));
 }
 

@@ -4,7 +4,6 @@
 // Source:     docs/howto/when-jobs-die.md. Deviations: none.
 #include "jobs/queue/run.hpp"
 
-#include <fcntl.h>
 #include <fmt/core.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -36,6 +35,7 @@ using registry::Job;
 using registry::State;
 
 constexpr std::size_t kMostCandidates = 256;
+constexpr int kMostRounds = 3;       // of reading what new jobs need, before the next step goes on with it
 constexpr double kDrawingHosts = 4;  // Smaller machines than so many drawings take give no job memory for them.
 constexpr double kAskAgainS = 5.0, kDiskPatienceS = 2.0, kLostPatienceS = 60.0;
 
@@ -161,7 +161,6 @@ class Runner {
   }
 
   void tell_adopted(const std::vector<Job>& jobs) {
-    const process::Identity self = process::find_self();
     for (const Job& job : jobs) {
       const bool is_ours = std::any_of(children_.begin(), children_.end(), [&](const auto& child) { return child.second.id == job.id; });
       if (job.state == State::running && !is_ours) display_.tell("adopt", job);
@@ -223,12 +222,21 @@ class Runner {
     const Host host = find_room();
     const double now_s = process::find_boot_seconds();
     std::vector<std::pair<Job, double>> never;
+    std::vector<Job> unknown;  // Their needs are read from files and from the solver, for which no transaction waits.
     const auto pick = [&](const std::vector<Job>& running, const std::vector<Job>& ready) {
-      return pick_jobs(host, now_s, running, ready, never);
+      for (const Job& job : ready) {
+        if (needs_.count(job.id.text()) == 0) unknown.push_back(job);
+      }
+      return unknown.empty() ? pick_jobs(host, now_s, running, ready, never) : std::vector<Job>();
     };
-    const std::vector<Job> claimed = registry_.claim("local", process::find_self(), pick, kMostCandidates);
+    for (int round = 0; round < kMostRounds; ++round) {
+      const std::vector<Job> claimed = registry_.claim("local", process::find_self(), pick, kMostCandidates);
+      claimed_.insert(claimed_.end(), claimed.begin(), claimed.end());
+      if (unknown.empty()) break;
+      for (const Job& job : unknown) find_job_needs(job);
+      unknown.clear();
+    }
     for (const auto& [job, memory_gb] : never) refuse(job, memory_gb, host);
-    claimed_.insert(claimed_.end(), claimed.begin(), claimed.end());
   }
 
   /// A row that was claimed must be started, or given back: it is ours until then.
@@ -257,10 +265,8 @@ class Runner {
 
   /// Claimed by this process, neither started nor waiting to be: its end could not be written (a full disk).
   bool is_forgotten(const Job& job) const {
-    const process::Identity self = process::find_self();
-    const bool is_ours = job.worker.pid == self.pid && job.worker.start_ticks == self.start_ticks && job.worker.boot == self.boot;
     const auto is_same = [&](const Job& other) { return other.id == job.id; };
-    return is_ours && std::none_of(claimed_.begin(), claimed_.end(), is_same) &&
+    return process::is_self(job.worker) && std::none_of(claimed_.begin(), claimed_.end(), is_same) &&
            std::none_of(children_.begin(), children_.end(), [&](const auto& child) { return is_same(child.second); });
   }
 
@@ -300,9 +306,15 @@ class Runner {
       if (rulings[i].answer != Answer::start) continue;
       job.given.ranks = rulings[i].ranks;
       job.given.memory_gb = rulings[i].memory_gb;
+      job.reason = describe_ranks(candidates[i].need.ranks, job.given.ranks);
       chosen.push_back(job);
     }
     return chosen;
+  }
+
+  /// Why a job runs on fewer ranks than it asks for; empty when it does not.
+  static std::string describe_ranks(int asked, int given) {
+    return asked > given ? fmt::format("asks for {} ranks, and runs on {}: more cores there are not to use", asked, given) : "";
   }
 
   /// A prediction runs in a slot of its own: one rank, and memory for the mesh and what is assembled of it.

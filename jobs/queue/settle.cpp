@@ -145,6 +145,14 @@ void settle_unstarted(const store::Store& store, registry::Registry& registry, c
       registry, job, [&](Job& row) { apply(row, outcome); }, nullptr);
 }
 
+void cancel_unstarted(Job& job) {
+  const std::string what = job.state == State::failed ? "cancelled after it had failed"
+                           : !job.reason.empty()      ? "cancelled while it waited"
+                           : job.attempts > 0         ? "cancelled before it went on"
+                                                      : "cancelled before it ran";
+  end(job, State::cancelled, job.reason.empty() ? what : what + ": " + job.reason);
+}
+
 Said cancel(const store::Store& store, registry::Registry& registry, const store::Id& id, double patience_s) {
   Said answer{false, "there is no such job"};
   bool is_running = false;
@@ -162,7 +170,7 @@ Said cancel(const store::Store& store, registry::Registry& registry, const store
         answer = {true, "it runs, and is asked to stop"};
         return true;
       default:
-        end(row, State::cancelled, "cancelled before it ran");
+        cancel_unstarted(row);
         answer = {true, "cancelled"};
         return true;
     }
@@ -181,7 +189,7 @@ Said cancel(const store::Store& store, registry::Registry& registry, const store
   return answer;
 }
 
-Said retry(const store::Store& store, registry::Registry& registry, const store::Id& id) {
+Said retry(const store::Store& store, registry::Registry& registry, const store::Id& id, const std::function<void(Job&)>& change) {
   Said answer{false, "there is no such job"};
   registry.update(id, [&](Job& row) {
     if (row.state == State::done) {
@@ -201,6 +209,7 @@ Said retry(const store::Store& store, registry::Registry& registry, const store:
     row.failures = 0;
     row.cancel_wanted = false;
     row.ready_boot_s = 0.0;
+    if (change) change(row);
     answer = {true, "queued again"};
     return true;
   });

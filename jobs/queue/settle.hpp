@@ -46,7 +46,12 @@ struct Said {
 /// carillon::slurm looks after them.
 Said cancel(const store::Store& store, registry::Registry& registry, const store::Id& id, double patience_s = 90.0);
 
+/// Cancels a row that nobody works on; its reason says what it was, and why it had failed or waited. Pure.
+void cancel_unstarted(registry::Job& job);
+
 /// Puts a failed or cancelled job back into the queue, with its checkpoint and a new count of retries; a waiting one is ready at once.
-Said retry(const store::Store& store, registry::Registry& registry, const store::Id& id);
+/// `change` edits the row in the same transaction (what it asks for from now on), where it is put back.
+Said retry(const store::Store& store, registry::Registry& registry, const store::Id& id,
+           const std::function<void(registry::Job&)>& change = {});
 
 }  // namespace carillon::queue

@@ -33,6 +33,14 @@ Database::Database(const std::filesystem::path& file) : file_(file) {
   }
 }
 
+Database::Database() : file_("registry in memory") {
+  if (const int code = sqlite3_open_v2(":memory:", &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr); code != SQLITE_OK) {
+    sqlite3_close_v2(handle_);
+    handle_ = nullptr;
+    fail(code);
+  }
+}
+
 Database::~Database() { sqlite3_close_v2(handle_); }
 
 void Database::run(const char* sql) {

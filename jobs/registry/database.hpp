@@ -19,6 +19,8 @@ class Database {
  public:
   /// Opens a file that exists: WAL, synchronous=FULL, waits up to a minute for others. Throws Damaged, SystemError.
   explicit Database(const std::filesystem::path& file);
+  /// An empty one in memory.
+  Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
   ~Database();

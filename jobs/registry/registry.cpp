@@ -84,7 +84,7 @@ bool is_ready(const Job& job, const std::string& boot, double now_s) {
 struct Registry::Data {
   store::Store store;
   Say say;
-  fs::path file;
+  fs::path file;  // empty: in memory, for reading
   std::unique_ptr<Database> database;
   std::pair<dev_t, ino_t> opened{};
 
@@ -121,9 +121,16 @@ struct Registry::Data {
     return true;
   }
 
+  void require_writing() const {
+    if (!file.empty()) return;
+    throw InputError(fmt::format("{}: this store may only be read; ask its owner for the right to write, or choose another with --store",
+                                 store.root().string()));
+  }
+
   /// Runs `act` on the registry of now; when that proves damaged or was replaced meanwhile, on the one that is made in its place.
   template <class Act>
   auto guard(const Act& act) {
+    if (file.empty()) return act(*database);
     if (find_file(file) != opened) open();
     try {
       return act(*database);
@@ -145,7 +152,17 @@ Registry Registry::open(const store::Store& store, const std::function<void(cons
   return Registry(std::move(data));
 }
 
+Registry Registry::open_to_read(const store::Store& store) {
+  auto database = std::make_unique<Database>();
+  Transaction transaction(*database);
+  make_tables(*database);
+  fill_from_store(*database, store);
+  transaction.commit();
+  return Registry(std::make_unique<Data>(Data{store, {}, {}, std::move(database), {}}));
+}
+
 std::vector<bool> Registry::submit(const std::vector<Submission>& submissions) {
+  data_->require_writing();
   append_submissions(data_->store, submissions);
   return data_->guard([&](Database& database) {
     std::vector<bool> is_new;
@@ -207,6 +224,7 @@ std::vector<Submission> Registry::list_last_submissions() const {
 }
 
 std::vector<Job> Registry::claim(const std::string& engine, const process::Identity& worker, const Choose& choose, std::size_t most) {
+  data_->require_writing();
   return data_->guard([&](Database& database) {
     Transaction transaction(database);
     const std::string boot = process::find_boot();
@@ -221,9 +239,9 @@ std::vector<Job> Registry::claim(const std::string& engine, const process::Ident
     for (Job job : choose(running, ready)) {
       const auto known = read_job(database, job.id);
       if (!known || !is_ready(*known, boot, now_s)) continue;
-      job.reason.clear();
       if (data_->store.has_bank(job.id)) {
         job.state = State::done;
+        job.reason.clear();
       } else {
         job.state = State::running;
         job.token = store::make_random_name();
@@ -242,6 +260,7 @@ std::vector<Job> Registry::claim(const std::string& engine, const process::Ident
 }
 
 bool Registry::update(const store::Id& id, const std::function<bool(Job&)>& change) {
+  data_->require_writing();
   return data_->guard([&](Database& database) {
     Transaction transaction(database);
     const auto known = read_job(database, id);
@@ -256,6 +275,7 @@ bool Registry::update(const store::Id& id, const std::function<bool(Job&)>& chan
 }
 
 void Registry::remove(const std::vector<store::Id>& ids) {
+  data_->require_writing();
   data_->guard([&](Database& database) {
     Transaction transaction(database);
     for (const store::Id& id : ids) {
@@ -267,6 +287,7 @@ void Registry::remove(const std::vector<store::Id>& ids) {
 }
 
 void Registry::keep_submissions(const std::vector<Submission>& submissions) {
+  data_->require_writing();
   rewrite_submission_log(data_->store, submissions);
   data_->guard([&](Database& database) {
     Transaction transaction(database);

@@ -57,6 +57,10 @@ class Registry {
   /// Opens the store's registry; a damaged one is set aside and rebuilt, and `say` gets one line about it. Then brings it up to date with
   /// the store: folders without a row get one, a row whose bank is there is done, a done row whose bank is gone is failed.
   static Registry open(const store::Store& store, const std::function<void(const std::string&)>& say);
+  /// For who may only read the store: its jobs as its folders and its log of submissions tell them now, in memory; the registry's own file
+  /// is neither opened nor made. What folders do not tell (ranks given, times, numbers of Slurm) is as in a new row. What changes jobs
+  /// throws InputError.
+  static Registry open_to_read(const store::Store& store);
   Registry(Registry&&) noexcept;
   ~Registry();
 
@@ -73,7 +77,7 @@ class Registry {
   std::vector<Submission> list_last_submissions() const;
 
   /// In one write transaction: hands `choose` the jobs that run (all engines) and at most `most` that are ready for `engine` in the order
-  /// of submission; those that it returns (with `given` set) become running: attempts + 1, new token, `runner` answers
+  /// of submission; those that it returns (with `given` and `reason` set) become running: attempts + 1, new token, `runner` answers
   /// for them. Returns them. Nothing in `choose` may use the registry.
   using Choose = std::function<std::vector<Job>(const std::vector<Job>& running, const std::vector<Job>& ready)>;
   std::vector<Job> claim(const std::string& engine, const process::Identity& worker, const Choose& choose, std::size_t most = 1000);

@@ -89,7 +89,7 @@ std::vector<Job> Engine::hand_over(registry::Registry& registry, const FindNeeds
   const auto choose = [&](const std::vector<Job>&, const std::vector<Job>& ready) {
     std::vector<Job> chosen;
     for (const Job& job : ready) {
-      if (job.slurm_job.empty() && !read_handed(store_.work_folder(job.id))) chosen.push_back(job);
+      if (job.slurm_job.empty() && !read_handed(store_.work_folder(job.id))) chosen.emplace_back(job).reason.clear();
     }
     return chosen;
   };
@@ -218,8 +218,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
     // A registry that was made again names the attempt itself, wherever it runs; else whoever claimed the job may be about to hand it over.
     const auto attempt = outcome::read_attempt(store_.work_folder(job.id));
     const bool is_attempt = handed && attempt && attempt->token == job.token;
-    if (is_claimed && !is_attempt && process::find_life(job.worker) != process::Life::gone && job.worker.pid != process::find_self().pid)
-      continue;
+    if (is_claimed && !is_attempt && process::find_life(job.worker) != process::Life::gone && !process::is_self(job.worker)) continue;
     std::string number;
     if (handed) {
       number = numbers.try_emplace(handed->batch, read_number(store_.root(), handed->batch)).first->second;
@@ -315,8 +314,7 @@ bool Engine::cancel(registry::Registry& registry, const store::Id& id) {
     if (!is_open(row)) return false;
     const bool is_with_slurm = !row.slurm_job.empty() || row.state == State::running || read_handed(store_.work_folder(id));
     if (!is_with_slurm) {
-      row.state = State::cancelled;
-      row.reason = "cancelled before it ran";
+      queue::cancel_unstarted(row);
       return true;
     }
     has_slurm = row.cancel_wanted = true;

@@ -149,7 +149,7 @@ void write_unsynced(const fs::path& file, const std::string& text) {
 }
 
 /// Writes the files of a job into its folder, which is to become work/ab/<id>.
-void fill_work(const Store& store, const spec::JobSpec& job, const Request& request, const Store::Work& place) {
+void fill_work(const Store& store, const spec::JobSpec& job, const Request& request, const Store::Prepared& place) {
   spec::JobSpec inner = job;
   const fs::path work = store.work_folder(place.id);
   if (request.input_kind != "shape") {
@@ -221,22 +221,18 @@ Request RequestMaker::make(const spec::JobSpec& job) {
   return request;
 }
 
-bool prepare_work(const Store& store, const spec::JobSpec& job, const Request& request) {
-  return prepare_work(store, std::vector<Work>{{&job, &request}})[0];
-}
-
-std::vector<bool> prepare_work(const Store& store, const std::vector<Work>& works) {
-  std::vector<bool> was_made(works.size(), false);
+std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& asked) {
+  std::vector<bool> was_made(asked.size(), false);
   std::vector<std::size_t> index;  // of what lies in `folders`
-  std::vector<Store::Work> folders;
+  std::vector<Store::Prepared> folders;
   try {
-    for (std::size_t i = 0; i < works.size(); ++i) {
-      const Id id = require_id(works[i].request->id, "the request");
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      const Id id = require_id(asked[i].request->id, "the request");
       if (store.has_bank(id) || store.has_work(id)) continue;
-      take_snapshot(store, *works[i].job, *works[i].request);
+      take_snapshot(store, *asked[i].job, *asked[i].request);
       folders.push_back({id, store.make_temporary()});
       index.push_back(i);
-      fill_work(store, *works[i].job, *works[i].request, folders.back());
+      fill_work(store, *asked[i].job, *asked[i].request, folders.back());
     }
     if (folders.empty()) return was_made;
     const std::vector<bool> was_published = store.publish_work(folders);
@@ -244,7 +240,7 @@ std::vector<bool> prepare_work(const Store& store, const std::vector<Work>& work
     return was_made;
   } catch (...) {
     std::error_code none;
-    for (const Store::Work& work : folders) fs::remove_all(work.folder, none);
+    for (const Store::Prepared& work : folders) fs::remove_all(work.folder, none);
     throw;
   }
 }

@@ -36,15 +36,15 @@ class RequestMaker {
   std::map<std::filesystem::path, Known> known_;
 };
 
-/// Copies the input into the store unless it is there, and makes work/ab/<id> with job.json and request.json unless it is there. True when
-/// this call made it. Throws InputError when the input is no longer what was hashed, SystemError when the disk refuses.
-bool prepare_work(const Store& store, const spec::JobSpec& job, const Request& request);
-
-/// The same for many, with one sync for all of them. Per job: true when this call made it.
-struct Work {
+/// A job and the request made of it.
+struct Asked {
   const spec::JobSpec* job = nullptr;
   const Request* request = nullptr;
 };
-std::vector<bool> prepare_work(const Store& store, const std::vector<Work>& works);
+
+/// Copies the inputs into the store unless they are there, and makes work/ab/<id> with job.json and request.json unless it is there, with
+/// one sync for all of them. Per job: true when this call made it. Throws InputError when an input is no longer what was hashed,
+/// SystemError when the disk refuses.
+std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& asked);
 
 }  // namespace carillon::store

@@ -30,7 +30,7 @@ constexpr const char* kVersionText = "carillon store 1\n";
 constexpr std::uint64_t kMostVersionBytes = 1000;
 constexpr off_t kMostCopiedBytes = 16 << 20;
 constexpr std::size_t kMostHostLength = 64;
-constexpr std::size_t kFewWorks = 8;  // are synced one by one; of more, the whole file system once
+constexpr std::size_t kFewFolders = 8;  // are synced one by one; of more, the whole file system once
 const std::set<std::string> kFolders{"banks", "inputs", "work", "tmp"};
 
 /// Throws unless the folder holds nothing, or what a store that is being made holds.
@@ -44,6 +44,12 @@ void check_empty(const fs::path& root) {
   }
   if (error)
     throw InputError(fmt::format("{}: this store cannot be read: {}; check owner, group and rights", root.string(), error.message()));
+}
+
+fs::path find_root(const fs::path& folder) {
+  if (folder.empty()) throw InputError("the store's name is empty; name a folder with --store");
+  const fs::path root = fs::absolute(folder).lexically_normal();
+  return root.has_filename() ? root : root.parent_path();
 }
 
 void make_root(const fs::path& root) {
@@ -84,6 +90,14 @@ void check_rights(const fs::path& folder) {
                   "group is made with "
                   "\"install -d -m 2775 -g GROUP {}\" before its first use, or choose another with --store",
                   folder.string(), ::geteuid(), info.st_uid, info.st_gid, info.st_mode & 07777U, folder.string()));
+}
+
+/// A store, and there is a part of it that this process may not write to.
+bool is_only_readable(const fs::path& root) {
+  if (::access((root / "VERSION").c_str(), R_OK) != 0) return false;
+  const auto refuses = [](const fs::path& path) { return ::access(path.c_str(), W_OK) != 0 && errno != ENOENT; };
+  return refuses(root) || refuses(root / "registry.sqlite") ||
+         std::any_of(kFolders.begin(), kFolders.end(), [&](const std::string& name) { return refuses(root / name); });
 }
 
 void make_content(const fs::path& root) {
@@ -166,9 +180,7 @@ Lock::~Lock() {
 }
 
 Store Store::open(const fs::path& folder) {
-  if (folder.empty()) throw InputError("the store's name is empty; name a folder with --store");
-  fs::path root = fs::absolute(folder).lexically_normal();
-  if (!root.has_filename()) root = root.parent_path();
+  const fs::path root = find_root(folder);
   make_root(root);
   follow_group(root);
   check_rights(root);
@@ -179,6 +191,15 @@ Store Store::open(const fs::path& folder) {
     check_rights(root / name);
   }
   return Store(root);
+}
+
+Store Store::open_to_read(const fs::path& folder) {
+  const fs::path root = find_root(folder);
+  if (!is_only_readable(root)) return open(folder);
+  check_version(root);
+  Store store(root);
+  store.may_write_ = false;
+  return store;
 }
 
 fs::path Store::bank_folder(const Id& id) const { return sharded(root_ / "banks", id); }
@@ -226,17 +247,15 @@ bool Store::publish(const Id& id, const fs::path& folder) const {
   return true;
 }
 
-bool Store::publish_work(const Id& id, const fs::path& folder) const { return publish_work({{id, folder}})[0]; }
-
-std::vector<bool> Store::publish_work(const std::vector<Work>& works) const {
-  if (works.size() > kFewWorks) {
+std::vector<bool> Store::publish_work(const std::vector<Prepared>& prepared) const {
+  if (prepared.size() > kFewFolders) {
     sync_file_system(root_ / "tmp");
   } else {
-    for (const Work& work : works) sync_tree(work.folder, false);
+    for (const Prepared& work : prepared) sync_tree(work.folder, false);
   }
   std::vector<bool> was_made;
   std::set<fs::path> parents;
-  for (const Work& work : works) {
+  for (const Prepared& work : prepared) {
     const fs::path target = work_folder(work.id);
     make_folder(target.parent_path());
     parents.insert(target.parent_path());

@@ -54,7 +54,11 @@ class Store {
   /// no right to write there (names owner, group and mend). SystemError: the disk refuses. Where the folder is writable by its group, all
   /// that this process makes from then on is too (umask).
   static Store open(const std::filesystem::path& folder);
+  /// The same, but a store that this process may only read (another user's, a disk mounted read-only) is taken as it is and nothing is made
+  /// in it: may_write() is false then. InputError when it may not be read either.
+  static Store open_to_read(const std::filesystem::path& folder);
 
+  bool may_write() const { return may_write_; }
   const std::filesystem::path& root() const { return root_; }
   std::filesystem::path registry_folder() const;  // where registry.sqlite goes; made when there is none
 
@@ -76,14 +80,12 @@ class Store {
   /// is no error: false, and `folder` is removed. What is left of work/ab/<id> is removed by remove_work(). SystemError when the disk
   /// refuses; `folder` stays then.
   bool publish(const Id& id, const std::filesystem::path& folder) const;
-  /// The same into work/ (nothing made read-only).
-  bool publish_work(const Id& id, const std::filesystem::path& folder) const;
-  /// The same for many at once, with one sync for all. Per folder: true when it got its name.
-  struct Work {
+  /// The same into work/ for any number at once, with one sync for all; nothing is made read-only. Per folder: true when it got its name.
+  struct Prepared {
     Id id;
     std::filesystem::path folder;
   };
-  std::vector<bool> publish_work(const std::vector<Work>& works) const;
+  std::vector<bool> publish_work(const std::vector<Prepared>& prepared) const;
 
   /// Removes work/ab/<id> or banks/ab/<id>: renamed into tmp/ first, so that it is there whole or not at all.
   void remove_work(const Id& id) const;
@@ -97,6 +99,7 @@ class Store {
   void remove_folder(const std::filesystem::path& folder) const;
   explicit Store(std::filesystem::path root) : root_(std::move(root)) {}
   std::filesystem::path root_;  // absolute
+  bool may_write_ = true;
 };
 
 /// Where the store is when nobody says: $XDG_DATA_HOME/carillon, else ~/.local/share/carillon.

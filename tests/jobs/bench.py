@@ -19,6 +19,8 @@ def make_job(**changes):
 
 
 class Bench(unittest.TestCase):
+    wrapper = []  # words before carillon
+
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="carillon-jobs-"))
         self.addCleanup(self.clean)
@@ -37,7 +39,7 @@ class Bench(unittest.TestCase):
         return file
 
     def command(self, *words):
-        return [str(BIN / "carillon"), *map(str, words), "--store", str(self.store)]
+        return [*self.wrapper, str(BIN / "carillon"), *map(str, words), "--store", str(self.store)]
 
     def run_it(self, *words, code=0, **options):
         done = subprocess.run(self.command(*words), capture_output=True, text=True, errors="surrogateescape", cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,

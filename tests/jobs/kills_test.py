@@ -56,6 +56,25 @@ class Kills(Bench):
                 self.assertEqual(self.ask("explain", "bar.json")["changes"], [])
         self.assertGreaterEqual(killed, len(kills) - 2)
 
+    def test_retry_killed_at_every_sync_did_all_or_nothing(self):
+        self.write("bar.json", make_job())
+        id_ = self.ask("submit", "bar.json", "--ranks", "1")["jobs"][0]["id"]
+        self.ask("cancel", "bar.json")
+        kept = self.folder / "kept"
+        shutil.copytree(self.store, kept)
+        self.assertEqual(self.trace(None, "retry", id_, "--ranks", "2").returncode, 0)
+        calls = collections.Counter(re.findall(r"^(f\w*sync)\(", (self.folder / "trace").read_text(), re.M))
+        self.assertGreater(sum(calls.values()), 2)
+        seen = set()
+        for kill in [(name, when) for name, count in calls.items() for when in range(1, count + 1)]:
+            shutil.rmtree(self.store)
+            shutil.copytree(kept, self.store)
+            self.trace(kill, "retry", id_, "--ranks", "2")
+            job = self.ask("status", id_)["jobs"][0]
+            seen.add((job["state"], job["ranks"]))
+        self.assertLessEqual(seen, {("cancelled", 1), ("queued", 2)})
+        self.assertIn(("cancelled", 1), seen)
+
 
 if __name__ == "__main__":
     unittest.main()

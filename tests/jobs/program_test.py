@@ -7,6 +7,7 @@ import concurrent.futures
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import unittest
@@ -104,6 +105,77 @@ class Path(Bench):
         for words in (["study", "scaling", "none.json", "--json"], ["--json", "study", "scaling", "none.json"]):
             done = subprocess.run([BIN / "carillon", *words], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
             self.assertEqual((done.returncode, json.loads(done.stdout)["exit_code"]), (2, 2))
+
+    @unittest.skipIf(os.geteuid() == 0 and not shutil.which("setpriv"), "root reads and writes all")
+    def test_a_reader_gets_what_is_there_and_changes_nothing(self):
+        done, failed, queued = (self.write(f"{n}.json", make_job(max_modes=n)) for n in (1, 2, 3))
+        mesh = make_job(mesh="none.msh")
+        (self.folder / "none.msh").write_text("$MeshFormat\nno mesh\n")
+        del mesh["body"]
+        self.write("2.json", mesh)
+        self.run_it("submit", done, failed)
+        self.run_it("run", "--quiet")
+        self.run_it("submit", queued)
+        wanted = {job["name"]: (job["id"], job["state"], job["reason"], job["bank"]) for job in self.ask("status")["jobs"]}
+        self.assertEqual([state for _, state, *_ in wanted.values()], ["done", "failed", "queued"])
+        for path, _, names in os.walk(self.store, topdown=False):
+            for name in names:
+                os.chmod(os.path.join(path, name), 0o444)
+            os.chmod(path, 0o555)
+        before = self.picture()
+        # Root has to be told that rights count for it too.
+        self.wrapper = ["setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner", "--inh-caps=-dac_override,-dac_read_search,-fowner"] if os.geteuid() == 0 else []
+        bank = wanted["1.json"][3]
+        self.assertEqual(self.run_it("get", done).stdout.strip(), bank)
+        self.run_it("get", done, "--to", self.folder / "copy.hdf")
+        self.assertEqual((self.folder / "copy.hdf").read_bytes(), pathlib.Path(bank).read_bytes())
+        self.assertIn("failed", self.run_it("get", failed, code=1).stderr)
+        said = self.ask("status")
+        self.assertTrue(said["read_only"])
+        self.assertEqual({job["name"]: (job["id"], job["state"], job["reason"], job["bank"]) for job in said["jobs"]}, wanted)
+        self.assertIn("may only be read", self.run_it("status").stderr)
+        self.run_it("status", "--watch", done)
+        self.assertFalse(self.ask("explain", failed)["would_run"])
+        self.assertTrue(self.run_it("report", done).stdout.strip().endswith("report.html"))
+        self.assertIn("modes", self.run_it("log", done).stdout)
+        self.refuse("log", queued, says="nothing yet", code=1)
+        for words in (("submit", done), ("cancel", queued), ("retry", failed), ("run", "--quiet"), ("gc",)):
+            self.refuse(*words, says="may not write to this store")
+        self.assertEqual(self.picture(), before)
+
+    def picture(self):
+        """Every file of the store with its moment, but that of the last look."""
+        return sorted((os.path.join(path, name), os.lstat(os.path.join(path, name)).st_mtime_ns) for path, folders, names in os.walk(self.store) for name in folders + names)
+
+    def test_an_unknown_command_is_named_with_the_nearest(self):
+        self.refuse("statsu", says=['"statsu"', '"status"'])
+        self.refuse("xyzzy", says=['"xyzzy"', "--help"])
+        self.assertEqual(self.ask("sbmit", code=2)["exit_code"], 2)
+
+    def test_watching_tells_by_its_exit_code_what_failed_before(self):
+        self.run_it("status", "--watch")
+        file = self.write("bar.json", make_job())
+        self.ask("submit", file)
+        self.ask("cancel", file)
+        self.run_it("status", "--watch", code=3)
+
+    def test_more_ranks_than_cores_run_on_the_cores_and_it_is_said(self):
+        self.run_it("submit", self.write("bar.json", make_job()), "--ranks", "1000")
+        events = [json.loads(line) for line in self.run_it("run", "--cores", "1").stdout.splitlines()]
+        start = next(event for event in events if event["event"] == "start")
+        self.assertEqual(start["ranks"], 1)
+        self.assertIn("asks for 1000 ranks", start["reason"])
+        self.assertEqual([(job["state"], job["reason"]) for job in self.ask("status")["jobs"]], [("done", "")])
+
+    def test_explain_and_submit_agree_on_a_job_that_failed_before_it_ran(self):
+        file = self.write("bar.json", make_job())
+        self.run_it("submit", file, "--memory-gb", "1000000")
+        self.run_it("run", "--quiet")
+        self.assertEqual(self.ask("status")["jobs"][0]["state"], "failed")
+        said = self.ask("explain", file)
+        self.assertTrue(said["would_run"])
+        self.assertIn("it would run", said["why"])
+        self.assertEqual(self.ask("submit", file)["jobs"][0]["state"], "queued")
 
     def test_cancel_and_retry(self):
         file = self.write("bar.json", make_job())

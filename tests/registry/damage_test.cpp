@@ -5,12 +5,9 @@
 
 #include "tests/registry/jobs.hpp"
 
+namespace carillon::tests {
 namespace {
 
-using namespace carillon;
-using carillon::tests::Folder;
-using carillon::tests::make_id;
-using carillon::tests::make_submission;
 using registry::Job;
 using registry::Registry;
 using registry::State;
@@ -22,17 +19,17 @@ fs::path find_fast_disk() { return ::access("/dev/shm", W_OK) == 0 ? fs::path("/
 class Damage : public testing::Test {
  protected:
   Damage() : folder_(find_fast_disk()), store_(store::Store::open(folder_ / "store")) {
-    Registry registry = Registry::open(store_, tests::be_silent);
+    Registry registry = Registry::open(store_, be_silent);
     for (int n = 0; n < 6; ++n) {
-      tests::make_work(store_, make_submission(n));
+      make_work(store_, make_submission(n));
       registry.submit({make_submission(n)});
     }
-    tests::make_bank(store_, make_submission(0));
+    make_bank(store_, make_submission(0));
     store_.remove_work(make_id(0));
     registry.update(make_id(0), [](Job& job) { return job.state = State::done, true; });
     registry.update(make_id(1), [](Job& job) { return job.state = State::failed, job.reason = "the mesh is bad", job.failures = 1, true; });
     registry.update(make_id(2), [](Job& job) { return job.state = State::cancelled, job.reason = "cancelled", true; });
-    wanted_ = tests::describe(registry);
+    wanted_ = describe(registry);
   }
 
   fs::path file() const { return folder_ / "store/registry.sqlite"; }
@@ -48,7 +45,7 @@ class Damage : public testing::Test {
   bool check(const std::string& what) const {
     int said = 0;
     const Registry registry = Registry::open(store_, [&](const std::string&) { ++said; });
-    EXPECT_EQ(tests::describe(registry), wanted_) << what;
+    EXPECT_EQ(describe(registry), wanted_) << what;
     EXPECT_EQ(registry.list_last_submissions().size(), 6u) << what;
     EXPECT_LE(said, 1) << what;
     return said == 1;
@@ -65,7 +62,7 @@ class DamageShare : public Damage, public testing::WithParamInterface<std::size_
 INSTANTIATE_TEST_SUITE_P(Shares, DamageShare, testing::Range<std::size_t>(0, kShares));
 
 TEST_P(DamageShare, cut_at_every_byte) {
-  const std::string whole = tests::read_all(file());
+  const std::string whole = read_all(file());
   ASSERT_GT(whole.size(), 8000u);
   for (std::size_t length = GetParam(); length < whole.size(); length += kShares) {
     put(whole.substr(0, length));
@@ -77,7 +74,7 @@ TEST_P(DamageShare, cut_at_every_byte) {
 }
 
 TEST_P(DamageShare, any_byte_flipped) {
-  const std::string whole = tests::read_all(file());
+  const std::string whole = read_all(file());
   int made_again = 0;
   for (std::size_t at = GetParam(); at < whole.size(); at += whole[at] != '\0' ? kShares : 5 * kShares) {  // of empty space, every fifth
     std::string bytes = whole;
@@ -91,12 +88,12 @@ TEST_P(DamageShare, any_byte_flipped) {
 
 TEST_F(Damage, a_log_of_writes_cut_or_flipped_anywhere_costs_nothing) {
   // A copy made while the registry is in use has all of the latest changes in its write-ahead log.
-  Registry registry = Registry::open(store_, tests::be_silent);
-  tests::make_work(store_, make_submission(6));
+  Registry registry = Registry::open(store_, be_silent);
+  make_work(store_, make_submission(6));
   registry.submit({make_submission(6)});
-  const std::string whole = tests::read_all(file()), log = tests::read_all(file().string() + "-wal");
+  const std::string whole = read_all(file()), log = read_all(file().string() + "-wal");
   ASSERT_GT(log.size(), 4000u);
-  const std::string wanted = tests::describe(registry);
+  const std::string wanted = describe(registry);
   const Folder other(find_fast_disk());
   fs::copy(folder_ / "store", other / "store", fs::copy_options::recursive);
   const store::Store store = store::Store::open(other / "store");
@@ -109,7 +106,7 @@ TEST_F(Damage, a_log_of_writes_cut_or_flipped_anywhere_costs_nothing) {
       if (!is_cut) bytes[at] = static_cast<char>(bytes[at] ^ 0x55);
       other.write("store/registry.sqlite", whole);
       other.write("store/registry.sqlite-wal", bytes);
-      ASSERT_EQ(tests::describe(Registry::open(store, tests::be_silent)), wanted) << (is_cut ? "cut at " : "flipped at ") << at;
+      ASSERT_EQ(describe(Registry::open(store, be_silent)), wanted) << (is_cut ? "cut at " : "flipped at ") << at;
     }
   }
 }
@@ -122,18 +119,19 @@ TEST_F(Damage, what_is_damaged_is_kept_beside_the_new_one) {
 }
 
 TEST_F(Damage, a_registry_in_use_that_is_taken_away_is_made_again_under_the_hands_of_its_user) {
-  Registry registry = Registry::open(store_, tests::be_silent);
+  Registry registry = Registry::open(store_, be_silent);
   fs::remove(file());
-  EXPECT_EQ(tests::describe(registry), wanted_);
+  EXPECT_EQ(describe(registry), wanted_);
   EXPECT_TRUE(registry.update(make_id(3), [](Job& job) { return job.state = State::failed, job.reason = "x", true; }));
-  EXPECT_EQ(Registry::open(store_, tests::be_silent).find(make_id(3))->state, State::failed);
+  EXPECT_EQ(Registry::open(store_, be_silent).find(make_id(3))->state, State::failed);
 }
 
 TEST_F(Damage, a_pipe_or_a_folder_in_its_place_is_one_clear_error) {
   put("");
   fs::remove(file());
   fs::create_directory(file());
-  EXPECT_THROW(Registry::open(store_, tests::be_silent), InputError);
+  EXPECT_THROW(Registry::open(store_, be_silent), InputError);
 }
 
 }  // namespace
+}  // namespace carillon::tests

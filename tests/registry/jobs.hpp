@@ -30,7 +30,7 @@ inline void make_work(const store::Store& store, const registry::Submission& sub
   const auto folder = store.make_temporary();
   store::write_request(folder, submission.request);
   store::write_standing(folder, {});
-  store.publish_work(store::require_id(submission.request.id, "test"), folder);
+  store.publish_work({{store::require_id(submission.request.id, "test"), folder}});
 }
 
 inline void make_bank(const store::Store& store, const registry::Submission& submission) {

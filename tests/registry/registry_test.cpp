@@ -3,30 +3,29 @@
 #include <unistd.h>
 
 #include "jobs/outcome/outcome.hpp"
+#include "runtime/config/error.hpp"
 #include "tests/registry/jobs.hpp"
 
+namespace carillon::tests {
 namespace {
 
-using namespace carillon;
-using carillon::tests::Folder;
-using carillon::tests::make_id;
-using carillon::tests::make_submission;
 using registry::Job;
 using registry::Registry;
 using registry::State;
+namespace fs = std::filesystem;
 
 std::vector<Job> take_all(const std::vector<Job>&, const std::vector<Job>& ready) { return ready; }
 
 void submit(const store::Store& store, Registry& registry, int number) {
-  tests::make_work(store, make_submission(number));
+  make_work(store, make_submission(number));
   registry.submit({make_submission(number)});
 }
 
 TEST(Registry, a_job_that_is_submitted_twice_has_one_row) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  Registry registry = Registry::open(store, tests::be_silent);
-  tests::make_work(store, make_submission(1));
+  Registry registry = Registry::open(store, be_silent);
+  make_work(store, make_submission(1));
   registry::Submission again = make_submission(1);
   again.job_file = "/other/place.json";
   EXPECT_EQ(registry.submit({make_submission(1), make_submission(1)}), (std::vector<bool>{true, false}));
@@ -41,14 +40,14 @@ TEST(Registry, every_job_is_claimed_once_by_eight_processes) {
   const store::Store store = store::Store::open(folder / "store");
   constexpr int kJobs = 60;
   {
-    Registry registry = Registry::open(store, tests::be_silent);
+    Registry registry = Registry::open(store, be_silent);
     for (int n = 0; n < kJobs; ++n) submit(store, registry, n);
   }
   std::vector<pid_t> children;
   for (int n = 0; n < 8; ++n) {
     const pid_t child = ::fork();
     if (child == 0) {
-      Registry registry = Registry::open(store, tests::be_silent);
+      Registry registry = Registry::open(store, be_silent);
       int claimed = 0;
       const auto first = [](const std::vector<Job>&, const std::vector<Job>& ready) {
         return ready.empty() ? std::vector<Job>() : std::vector<Job>{ready.front()};
@@ -66,13 +65,13 @@ TEST(Registry, every_job_is_claimed_once_by_eight_processes) {
     claimed += WEXITSTATUS(status);
   }
   EXPECT_EQ(claimed, kJobs);
-  for (const Job& job : Registry::open(store, tests::be_silent).list()) EXPECT_EQ(job.attempts, 1);
+  for (const Job& job : Registry::open(store, be_silent).list()) EXPECT_EQ(job.attempts, 1);
 }
 
 TEST(Registry, only_what_is_ready_is_handed_out) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  Registry registry = Registry::open(store, tests::be_silent);
+  Registry registry = Registry::open(store, be_silent);
   for (int n = 0; n < 5; ++n) submit(store, registry, n);
   const auto wait = [&](int number, double seconds, const std::string& boot) {
     registry.update(make_id(number), [&](Job& job) {
@@ -94,9 +93,9 @@ TEST(Registry, only_what_is_ready_is_handed_out) {
 TEST(Registry, what_is_done_is_never_claimed) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  Registry registry = Registry::open(store, tests::be_silent);
+  Registry registry = Registry::open(store, be_silent);
   submit(store, registry, 1);
-  tests::make_bank(store, make_submission(1));  // by somebody else, meanwhile
+  make_bank(store, make_submission(1));  // by somebody else, meanwhile
   EXPECT_TRUE(registry.claim("local", process::find_self(), take_all).empty());
   EXPECT_EQ(registry.find(make_id(1))->state, State::done);
 }
@@ -104,7 +103,7 @@ TEST(Registry, what_is_done_is_never_claimed) {
 TEST(Registry, prefixes_find_jobs_and_nothing_else_does) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  Registry registry = Registry::open(store, tests::be_silent);
+  Registry registry = Registry::open(store, be_silent);
   for (int n = 0; n < 40; ++n) submit(store, registry, n);
   EXPECT_EQ(registry.find_by_prefix(make_id(7).text().substr(0, 12)).size(), 1u);
   EXPECT_EQ(registry.find_by_prefix(make_id(7).text()).size(), 1u);
@@ -116,15 +115,15 @@ TEST(Registry, is_brought_up_to_date_with_the_store) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
   {
-    Registry registry = Registry::open(store, tests::be_silent);
+    Registry registry = Registry::open(store, be_silent);
     for (int n = 0; n < 3; ++n) submit(store, registry, n);
   }
-  tests::make_bank(store, make_submission(0));
+  make_bank(store, make_submission(0));
   store.remove_work(make_id(0));
-  tests::make_bank(store, make_submission(7));  // no row
-  tests::make_work(store, make_submission(8));  // killed before the row
-  store.remove_work(make_id(2));                // by hand
-  const Registry registry = Registry::open(store, tests::be_silent);
+  make_bank(store, make_submission(7));  // no row
+  make_work(store, make_submission(8));  // killed before the row
+  store.remove_work(make_id(2));         // by hand
+  const Registry registry = Registry::open(store, be_silent);
   const auto state = [&](int n) { return to_text(registry.find(make_id(n))->state); };
   EXPECT_EQ(state(0) + state(1) + state(2) + state(7) + state(8), "donequeuedfaileddonequeued");
   EXPECT_NE(registry.find(make_id(2))->reason.find("submit the job again"), std::string::npos);
@@ -133,41 +132,76 @@ TEST(Registry, is_brought_up_to_date_with_the_store) {
 TEST(Registry, a_job_that_somebody_works_on_is_running_whatever_was_forgotten) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  tests::make_work(store, make_submission(1));
+  make_work(store, make_submission(1));
   outcome::Attempt attempt;
   attempt.token = store::make_random_name();
   attempt.process = process::find_self();
   attempt.started = outcome::find_utc();
   outcome::write_attempt(store.work_folder(make_id(1)), attempt);
   {
-    const Registry registry = Registry::open(store, tests::be_silent);
+    const Registry registry = Registry::open(store, be_silent);
     EXPECT_EQ(registry.find(make_id(1))->state, State::running);
     EXPECT_EQ(registry.find(make_id(1))->token, attempt.token);
   }
   attempt.process.start_ticks += 1;  // its number is somebody else's by now
   outcome::write_attempt(store.work_folder(make_id(1)), attempt);
-  std::filesystem::remove(folder / "store/registry.sqlite");
-  EXPECT_EQ(Registry::open(store, tests::be_silent).find(make_id(1))->state, State::queued);
+  fs::remove(folder / "store/registry.sqlite");
+  EXPECT_EQ(Registry::open(store, be_silent).find(make_id(1))->state, State::queued);
+}
+
+TEST(Registry, who_may_only_read_is_told_what_the_folders_tell) {
+  const Folder folder;
+  std::string wanted;
+  {
+    const store::Store store = store::Store::open(folder / "store");
+    Registry registry = Registry::open(store, be_silent);
+    for (int n = 0; n < 4; ++n) submit(store, registry, n);
+    make_bank(store, make_submission(0));
+    store.remove_work(make_id(0));
+    registry.update(make_id(0), [](Job& job) { return job.state = State::done, true; });
+    registry.update(make_id(1), [](Job& job) { return job.state = State::failed, job.reason = "the mesh is bad", job.failures = 1, true; });
+    wanted = describe(registry);
+  }
+  const fs::path file = folder / "store/registry.sqlite";
+  const std::string bytes = read_all(file);
+  const auto moment = fs::last_write_time(file);
+  const store::Store store = store::Store::open_to_read(folder / "store");
+  Registry registry = Registry::open_to_read(store);
+  EXPECT_EQ(describe(registry), wanted);
+  EXPECT_EQ(registry.find_last_submission("/jobs/1.json")->request.id, make_id(1).text());
+  EXPECT_EQ(registry.find_by_prefix(make_id(3).text().substr(0, 12)).size(), 1u);
+  EXPECT_THROW(registry.submit({make_submission(9)}), InputError);
+  EXPECT_THROW(registry.update(make_id(1), [](Job&) { return true; }), InputError);
+  EXPECT_THROW(registry.claim("local", process::find_self(), take_all), InputError);
+  EXPECT_THROW(registry.remove({make_id(1)}), InputError);
+  EXPECT_THROW(registry.keep_submissions({}), InputError);
+  EXPECT_EQ(read_all(file), bytes);
+  EXPECT_EQ(fs::last_write_time(file), moment);
+  EXPECT_FALSE(fs::exists(file.string() + "-wal"));
+  fs::remove(file);
+  EXPECT_EQ(describe(Registry::open_to_read(store)), wanted);
+  EXPECT_FALSE(fs::exists(file));
 }
 
 TEST(Registry, hostile_names_stay_text) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");
-  Registry registry = Registry::open(store, tests::be_silent);
+  Registry registry = Registry::open(store, be_silent);
   int number = 0;
   for (const std::string& name :
        {std::string("/a/'; drop table jobs; --"), std::string("/a/\"; rm -rf /\n.json"), std::string("/a/\x1b[2J"),
         "/a/" + std::string(4096, 'x'), std::string("/a/../../../x"), std::string("/a/\xe2\x80\xae.json")}) {
     registry::Submission submission = make_submission(++number);
     submission.job_file = submission.request.job_file = name;
-    tests::make_work(store, submission);
+    make_work(store, submission);
     registry.submit({submission});
     EXPECT_EQ(registry.find_last_submission(name)->request.id, make_id(number).text());
   }
-  std::filesystem::remove(folder / "store/registry.sqlite");
-  const Registry again = Registry::open(store, tests::be_silent);
+  fs::remove(folder / "store/registry.sqlite");
+  const Registry again = Registry::open(store, be_silent);
   EXPECT_EQ(again.list().size(), static_cast<std::size_t>(number));
   EXPECT_EQ(again.find_last_submission("/a/'; drop table jobs; --")->request.id, make_id(1).text());
 }
 
 }  // namespace
+}  // namespace carillon::tests

@@ -143,8 +143,8 @@ TEST(Identity, work_is_a_job_that_runs_from_the_copies_in_the_store) {
   const store::Store store = store::Store::open(folder / "store");
   const spec::JobSpec job = spec::read_job(folder.write("a.json", job_with("m.msh", "")), spec::BankKey::optional);
   const store::Request request = store::RequestMaker(kSolver).make(job);
-  EXPECT_TRUE(store::prepare_work(store, job, request));
-  EXPECT_FALSE(store::prepare_work(store, job, request));
+  EXPECT_EQ(store::prepare_work(store, {{&job, &request}}), std::vector<bool>{true});
+  EXPECT_EQ(store::prepare_work(store, {{&job, &request}}), std::vector<bool>{false});
   folder.write("m.msh", "something else by now");
   const store::Id id = store::require_id(request.id, "test");
   const spec::JobSpec inner = spec::read_job(store.work_folder(id) / store::kJobFile);
@@ -165,7 +165,7 @@ TEST(Identity, an_input_that_is_no_longer_what_was_hashed_is_refused) {
   const spec::JobSpec job = spec::read_job(folder.write("a.json", job_with("m.msh", "")), spec::BankKey::optional);
   const store::Request request = store::RequestMaker(kSolver).make(job);
   folder.write("m.msh", "after");
-  EXPECT_THROW(store::prepare_work(store, job, request), InputError);
+  EXPECT_THROW(store::prepare_work(store, {{&job, &request}}), InputError);
   EXPECT_FALSE(store.has_work(store::require_id(request.id, "test")));
   EXPECT_TRUE(std::filesystem::is_empty(folder / "store/tmp"));
 }
