@@ -156,7 +156,8 @@ Html make_proof_section(const Subject& subject) {
   if (!bank.proof) {
     return leave_out("proof", "Proof that no mode is missing",
                      subject.version[0] == 1 && subject.version[1] == 0
-                         ? "banks of version 1.0 carry none; nothing shows that the band holds no more modes than these."
+                         ? "banks of version 1.0 and the loudest modes of another bank carry none; nothing shows that the band holds no "
+                           "more modes than these."
                          : "the bank carries none; nothing shows that the band holds no more modes than these.");
   }
   const bank::Proof& proof = *bank.proof;

@@ -17,7 +17,7 @@
 namespace carillon::bank {
 
 inline constexpr int kVersionMajor = 1;
-inline constexpr int kVersionMinor = 1;
+inline constexpr int kVersionMinor = 2;
 
 /// Air, as OCE01 section 4 has it: radiation gains are made with it and sound travels in it.
 inline constexpr double kAirDensityKgM3 = 1.21;
@@ -96,6 +96,7 @@ struct Bank {
   std::vector<double> radiation_gain;      // (m), Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s)
   std::vector<double> shape_scale;         // (m), kg^-1/2 per integer step
   std::vector<std::int16_t> shape;         // (V, m, 3); phi = shape * shape_scale, mass-normalised, error <= shape_scale / 2
+  int shape_bytes = 2;                     // that a component takes in the file; 1 where all lie within -127 and 127 (calc_reduced)
 
   // Error bars [cent]: the true frequency is within the modes of the mesh by the first (a bound) and of the body by the second (an
   // estimate). Both are one-sided widths: f 2^(+-error / 1200).
@@ -109,7 +110,7 @@ struct Bank {
   std::optional<Proof> proof;  // banks of version 1.0 have none
   Counts counts;
   std::array<double, 2> band_hz{20.0, 20000.0};
-  bool complete = true;    // every mode of the band is here (false only when max_modes cut the list)
+  bool complete = true;    // every mode of the band is here (false only when max_modes or calc_reduced cut the list)
   std::string element;     // "T4" or "T10"
   std::string mass;        // "consistent" or "lumped"
   std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per station
@@ -160,7 +161,7 @@ std::string describe_accuracy(const Bank& bank);
 
 /// Reads a bank. Throws InputError for anything that is not a whole bank of a version this reader knows: missing file, not a bank,
 /// newer major version, truncated or changed bytes (checksum), arrays that disagree, content that is not sane. Bytes are untrusted: no
-/// byte is interpreted by HDF5, and no more memory is taken than the file is long. SystemError when the disk fails to read.
+/// byte is interpreted by HDF5, and no more memory is taken than three times the file's length. SystemError when the disk fails to read.
 Bank read_bank(const std::filesystem::path& file);
 
 /// The same from bytes in memory; `name` stands for the file in messages.

@@ -84,7 +84,7 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
   for (std::size_t i = 0; i + 1 < proof.cut_hz.size(); ++i) {
     const std::int64_t wanted = proof.below[i + 1] - proof.below[i];
     const std::int64_t held = count_modes_below(bank, proof.cut_hz[i + 1]) - count_modes_below(bank, proof.cut_hz[i]);
-    // max_modes keeps the lowest ones: only where the list ends may there be more than the bank holds.
+    // max_modes and calc_reduced keep the lowest ones: only where the list ends may there be more than the bank holds.
     const bool is_cut_here = !bank.complete && count_modes_below(bank, proof.cut_hz[i + 1]) == modes;
     if (held == wanted || (is_cut_here && held < wanted)) continue;
     faults.add("{} modes lie between {:.6g} and {:.6g} Hz by the counts, and the bank holds {}", wanted, proof.cut_hz[i],
@@ -217,7 +217,8 @@ Check check_error_bars(const Bank& bank) {
 }
 
 std::vector<Check> check_proof(const Bank& bank) {
-  if (!bank.proof) return {{"proof", "none: nothing but residuals speaks for this bank (version 1.0, or made by hand)", {}}};
+  if (!bank.proof)
+    return {{"proof", "none: nothing but residuals speaks for this bank (version 1.0, made by hand, or the loudest modes of another)", {}}};
   const Proof& proof = *bank.proof;
   std::vector<Check> checks{check_cuts(bank, proof)};
   if (!checks[0].faults.empty()) return checks;
@@ -232,7 +233,9 @@ std::vector<Check> check_proof(const Bank& bank) {
 std::string describe_completeness(const Bank& bank) {
   const auto modes = bank.mode_count();
   const auto [low, high] = bank.band_hz;
-  if (!bank.proof) return fmt::format("none: nothing shows that the band holds no more than these {} modes", modes);
+  if (!bank.proof)
+    return fmt::format("none: {}", bank.complete ? fmt::format("nothing shows that the band holds no more than these {} modes", modes)
+                                                 : fmt::format("{} modes of the band were kept, not all", modes));
   const Proof& proof = *bank.proof;
   const std::int64_t counted = proof.below.back() - proof.below.front();
   std::string text = bank.complete ? fmt::format("{} modes in {:g} .. {:g} Hz and no more", modes, low, high)

@@ -110,7 +110,8 @@ Check check_band(const Bank& bank) {
       faults.add("mode {} at {:.6g} Hz lies outside the band of {:.6g} to {:.6g} Hz", i, freq, low, high);
     }
   }
-  return {"band", fmt::format("{:g} to {:g} Hz, {}", low, high, bank.complete ? "every mode of it is here" : "cut by max_modes"),
+  return {"band",
+          fmt::format("{:g} to {:g} Hz, {}", low, high, bank.complete ? "every mode of it is here" : "not all modes of it are here"),
           faults.take()};
 }
 
@@ -181,6 +182,10 @@ Check check_shapes(const Bank& bank) {
     if (!(bank.shape_scale[i] >= 0.0)) faults.add("shape_scale[{}] is {:.6g}, negative", i, bank.shape_scale[i]);
     step = std::max(step, bank.shape_scale[i]);
   }
+  if (bank.shape_bytes != 1 && bank.shape_bytes != 2) faults.add("shapes of {} bytes a component, neither 1 nor 2", bank.shape_bytes);
+  const auto is_wide = [](std::int16_t steps) { return steps < -127 || steps > 127; };
+  if (bank.shape_bytes == 1 && std::any_of(bank.shape.begin(), bank.shape.end(), is_wide))
+    faults.add("shapes have components beyond 127 steps, which one byte does not hold");
   return {"shapes", fmt::format("error at most {:.2e} kg^-1/2", step / 2.0), faults.take()};
 }
 

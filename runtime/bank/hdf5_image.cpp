@@ -72,6 +72,7 @@ Id make_type(const std::string& dtype) {
   if (dtype == "<i8") return {H5Tcopy(H5T_STD_I64LE), H5Tclose, "a type"};
   if (dtype == "<i4") return {H5Tcopy(H5T_STD_I32LE), H5Tclose, "a type"};
   if (dtype == "<i2") return {H5Tcopy(H5T_STD_I16LE), H5Tclose, "a type"};
+  if (dtype == "|i1") return {H5Tcopy(H5T_STD_I8LE), H5Tclose, "a type"};
   if (dtype == "|u1") return {H5Tcopy(H5T_STD_U8LE), H5Tclose, "a type"};
   return make_string_type(find_item_bytes(dtype));
 }
@@ -258,7 +259,7 @@ Hdf5Image make_hdf5_image(const Bank& bank, const std::vector<Field>& fields) {
     write_vtk_views(file, bank);
     const Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose, "the root");
     write_text_attribute(root, "format", "Carillon mode bank");
-    write_text_attribute(root, "version", fmt::format("{}.{}", kVersionMajor, kVersionMinor));
+    write_text_attribute(root, "version", fmt::format("{}.{}", kVersionMajor, find_version_minor(bank)));
   } catch (...) {
     H5Fclose(file);
     std::free(keeper.memory);

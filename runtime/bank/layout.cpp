@@ -63,6 +63,7 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   const RigidBody& rigid = bank.rigid;
   const Material& material = bank.material;
   const Counts& counts = bank.counts;
+  const bool is_narrow = bank.shape_bytes == 1;
   std::vector<Field> fields{
       {"mesh/vertices", "<f8", {vertices, 3}, "m", "surface vertices", bank.vertices_m.data()},
       {"mesh/triangles", "<i4", {triangles, 3}, "1", "vertices of a triangle, counter-clockwise from outside", bank.triangles.data()},
@@ -72,7 +73,12 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
       {"modes/residual", "<f8", {modes}, "1", "||K phi - lambda M phi|| / (lambda ||M phi||)", bank.residual.data()},
       {"modes/radiation_gain", "<f8", {modes}, "Pa s m^-1 kg^-1/2", "pressure at 1 m for unit modal velocity", bank.radiation_gain.data()},
       {"modes/shape_scale", "<f8", {modes}, "kg^-1/2", "of one integer step of modes/shape", bank.shape_scale.data()},
-      {"modes/shape", "<i2", {vertices, modes, 3}, "modes/shape_scale", "phi = shape * shape_scale, mass-normalised", bank.shape.data()},
+      {"modes/shape",
+       is_narrow ? "|i1" : "<i2",
+       {vertices, modes, 3},
+       "modes/shape_scale",
+       "phi = shape * shape_scale, mass-normalised",
+       is_narrow ? static_cast<const void*>(form.narrow_shape.data()) : bank.shape.data()},
       {"rigid/mass_kg", "<f8", {}, "kg", "mass", &rigid.mass_kg},
       {"rigid/centre_m", "<f8", {3}, "m", "centre of mass", rigid.centre_m.data()},
       {"rigid/inertia_kg_m2", "<f8", {3, 3}, "kg m^2", "about the centre of mass, axes of the mesh", rigid.inertia_kg_m2.data()},
@@ -96,11 +102,13 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   return fields;
 }
 
+int find_version_minor(const Bank& bank) { return bank.shape_bytes == 1 ? kVersionMinor : 1; }
+
 std::uint64_t find_item_bytes(const std::string& dtype) {
   if (dtype == "<f8" || dtype == "<i8") return 8;
   if (dtype == "<i4") return 4;
   if (dtype == "<i2") return 2;
-  if (dtype == "|u1") return 1;
+  if (dtype == "|u1" || dtype == "|i1") return 1;
   if (dtype.size() < 3 || dtype.size() > 12 || dtype.substr(0, 2) != "|S") return 0;
   std::uint64_t bytes = 0;
   const auto [end, error] = std::from_chars(dtype.data() + 2, dtype.data() + dtype.size(), bytes);

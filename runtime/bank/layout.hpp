@@ -12,7 +12,7 @@ namespace carillon::bank {
 /// An array of the file and the memory that holds it.
 struct Field {
   std::string name;                  // path inside the HDF5 file, "mesh/vertices"
-  std::string dtype;                 // as numpy writes it: "<f8", "<i8", "<i4", "<i2", "|u1", "|S10" (text of 10 bytes)
+  std::string dtype;                 // as numpy writes it: "<f8", "<i8", "<i4", "<i2", "|i1", "|u1", "|S10" (text of 10 bytes)
   std::vector<std::uint64_t> shape;  // empty for a scalar
   std::string units;                 // "1" when dimensionless
   std::string meaning;
@@ -21,8 +21,9 @@ struct Field {
 
 /// What a file holds beside the members of Bank, or in another form.
 struct FileForm {
-  std::vector<double> freq_hz;  // (m), sqrt(lambda) / 2 pi: for readers who want no arithmetic
-  std::uint8_t complete = 1;    // Bank::complete
+  std::vector<double> freq_hz;            // (m), sqrt(lambda) / 2 pi: for readers who want no arithmetic
+  std::uint8_t complete = 1;              // Bank::complete
+  std::vector<std::int8_t> narrow_shape;  // (V, m, 3), Bank::shape where Bank::shape_bytes is 1 (since 1.2); else empty
   // Texts of Bank, at least one byte long, perhaps padded with NUL; empty where the file has none.
   std::string element;
   std::string mass;
@@ -36,6 +37,9 @@ struct FileForm {
 /// version 1.0) are left out. The sizes are those of the members at the time of the call, and `data` points into them (`bank` and `form`
 /// must outlive the table).
 std::vector<Field> list_fields(const Bank& bank, const FileForm& form);
+
+/// The oldest minor version that can say what is in the bank: it is the file's, so that older readers read all that they can.
+int find_version_minor(const Bank& bank);
 
 /// Bytes of one value of `dtype`; 0 when it is none that banks use.
 std::uint64_t find_item_bytes(const std::string& dtype);

@@ -164,7 +164,8 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
        {"modes/eigenvalue", "modes/frequency_hz", "modes/decay", "modes/residual", "modes/radiation_gain", "modes/shape_scale"}) {
     check(field, "<f8", {modes});
   }
-  check("modes/shape", "<i2", {vertices, modes, 3});
+  bank.shape_bytes = get_extent(seal, "modes/shape", name).dtype == "|i1" ? 1 : 2;
+  check("modes/shape", bank.shape_bytes == 1 ? "|i1" : "<i2", {vertices, modes, 3});
 
   bank.vertices_m.resize(vertices);
   bank.triangles.resize(triangles);
@@ -172,7 +173,11 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
        {&bank.eigenvalue_rad2_s2, &bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale, &form.freq_hz}) {
     array->resize(modes);
   }
-  bank.shape.resize(vertices * modes * 3);
+  if (bank.shape_bytes == 1) {
+    form.narrow_shape.resize(vertices * modes * 3);
+  } else {
+    bank.shape.resize(vertices * modes * 3);
+  }
   const auto make_text = [&](const std::string& field, std::string& text) {
     const Extent& extent = get_extent(seal, field, name);
     if (!extent.dtype.starts_with("|S"))
@@ -230,6 +235,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   if (form.complete > 1)
     throw InputError(fmt::format("{}: solve/complete is {}, neither 0 nor 1; write the bank again", name, form.complete));
   bank.complete = form.complete == 1;
+  if (bank.shape_bytes == 1) bank.shape.assign(form.narrow_shape.begin(), form.narrow_shape.end());
   bank.element = trim(form.element);
   bank.mass = trim(form.mass);
   bank.provenance = trim(form.provenance);
@@ -298,14 +304,20 @@ std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t 
   const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", file.name());
   const Extent& shape = get_extent(seal, "modes/shape", file.name());
   const Extent& scale = get_extent(seal, "modes/shape_scale", file.name());
-  check_extent({"modes/shape", "<i2", {vertices, modes, 3}, "", "", nullptr}, shape, file.name());
+  const bool is_narrow = shape.dtype == "|i1";
+  check_extent({"modes/shape", is_narrow ? "|i1" : "<i2", {vertices, modes, 3}, "", "", nullptr}, shape, file.name());
   check_extent({"modes/shape_scale", "<f8", {modes}, "", "", nullptr}, scale, file.name());
   if (vertex >= vertices)
     throw InputError(fmt::format("{}: no vertex {}; the bank has {}, numbered from 0", file.name(), vertex, vertices));
   std::vector<std::int16_t> steps(3 * modes);
   std::vector<double> scales(modes);
-  const std::uint64_t row_bytes = 3 * modes * sizeof(std::int16_t);
-  file.read(shape.offset + vertex * row_bytes, std::as_writable_bytes(std::span(steps)));
+  if (is_narrow) {
+    std::vector<std::int8_t> narrow(3 * modes);
+    file.read(shape.offset + vertex * narrow.size(), std::as_writable_bytes(std::span(narrow)));
+    steps.assign(narrow.begin(), narrow.end());
+  } else {
+    file.read(shape.offset + vertex * 3 * modes * sizeof(std::int16_t), std::as_writable_bytes(std::span(steps)));
+  }
   file.read(scale.offset, std::as_writable_bytes(std::span(scales)));
   std::vector<Vec3> row(modes);
   for (std::size_t i = 0; i < modes; ++i) row[i] = {steps[3 * i] * scales[i], steps[3 * i + 1] * scales[i], steps[3 * i + 2] * scales[i]};

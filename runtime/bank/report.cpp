@@ -204,8 +204,9 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   std::string text =
       fmt::format("{}\n  Carillon bank, format {}.{}, {}\n", file.string(), major, minor, format_bytes(std::filesystem::file_size(file)));
   text += fmt::format("modes     {} of {:g} to {:g} Hz ({}), worst residual {:.1e}\n", bank.mode_count(), bank.band_hz[0], bank.band_hz[1],
-                      bank.complete ? "complete" : "cut by max_modes", worst);
-  text += fmt::format("surface   {} vertices, {} triangles\n", bank.vertex_count(), bank.triangles.size());
+                      bank.complete ? "complete" : "not all of the band", worst);
+  text += fmt::format("surface   {} vertices, {} triangles, shapes of {} bytes a component\n", bank.vertex_count(), bank.triangles.size(),
+                      bank.shape_bytes);
   text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,
                       bank.mass, bank.counts.nodes, bank.counts.tets, bank.counts.components, bank.counts.components == 1 ? "" : "s",
                       bank.counts.rigid_modes);
@@ -238,6 +239,7 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   root["triangle_count"] = Json::UInt64(bank.triangles.size());
   root["band_hz"] = make_list(bank.band_hz);
   root["complete"] = bank.complete;
+  root["shape_bytes"] = bank.shape_bytes;
   root["element"] = bank.element;
   root["mass"] = bank.mass;
   Json::Value& counts = root["counts"];

@@ -122,8 +122,8 @@ Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& 
   return seal;
 }
 
-std::string format_seal_text(std::uint64_t length, const std::map<std::string, Extent>& extents) {
-  std::string text = fmt::format("{}{}.{}\nlength {}\n", kMagic, kVersionMajor, kVersionMinor, length);
+std::string format_seal_text(std::uint64_t length, int minor, const std::map<std::string, Extent>& extents) {
+  std::string text = fmt::format("{}{}.{}\nlength {}\n", kMagic, kVersionMajor, minor, length);
   for (const auto& [name, extent] : extents) {
     text += fmt::format("field {} {} {}{}{}\n", name, extent.dtype, extent.offset, extent.shape.empty() ? "" : " ",
                         fmt::join(extent.shape, " "));

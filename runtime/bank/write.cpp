@@ -54,10 +54,11 @@ void write_bank(const Bank& bank, const fs::path& file) {
   form.damping_law = pad_text(bank.damping.law);
   form.regions = bank.regions;
   if (bank.proof) form.proof_method = pad_text(bank.proof->method);
+  if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
 
   const Hdf5Image image = make_hdf5_image(bank, list_fields(bank, form));
   const std::span<std::byte> bytes = image.bytes;
-  const std::string text = format_seal_text(bytes.size(), image.extents);
+  const std::string text = format_seal_text(bytes.size(), find_version_minor(bank), image.extents);
   std::memcpy(bytes.data(), text.data(), kTextBytes);
   Digest digest;
   digest.update(bytes.first(kTextBytes));

@@ -28,9 +28,8 @@ using Point = SimTK::Vec3;
 constexpr double kSink = 2e-5;         // m; how far a resting body sinks into its contact under its own weight
 constexpr double kRolling = 2e-3;      // rolling resistance arm over the size of the smaller body; hard bodies on hard floors: 1e-3 to 5e-3
 constexpr double kLongestStep = 2e-3;  // s
-constexpr double kContactStep = 5e-4;  // s; while something in touch moves by more than kContactDepth
 constexpr double kTurn = 0.02;         // rad; of one Runge-Kutta step of a flight, which is then right to 1e-10 of it
-constexpr double kContactDepth = 5e-6;  // m
+constexpr double kSlowTouch = 0.01;    // m/s; of bodies in touch that move slower, steps get longer in proportion
 
 Point to_vec(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
 
@@ -47,7 +46,8 @@ std::string list_names(const WorldModel& world) {
   return names;
 }
 
-Engine::Engine(const WorldModel& world, SurfaceSet& surfaces, double time_s) : world_(world), matter_(system_), forces_(system_) {
+Engine::Engine(const WorldModel& world, SurfaceSet& surfaces, double time_s, const WorldOptions& options)
+    : world_(world), contact_step_s_(options.contact_step_s), matter_(system_), forces_(system_) {
   SimTK::Force::UniformGravity(forces_, matter_, to_vec(world.gravity_m_s2));
   resting_ = new RestingForce(matter_);
   SimTK::Force::Custom(forces_, resting_);
@@ -262,7 +262,7 @@ double Engine::calc_largest_step(const Snapshot& now, bool in_touch) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const double speed = now.mobiles[i].velocity.norm() + now.mobiles[i].spin.norm() * bodies_[i].surface->size_m();
     if (speed > 0.0) step = std::min(step, 0.25 * thinnest / speed);
-    if (in_touch && speed > 0.0) step = std::min(step, std::max(kContactStep, kContactDepth / speed));
+    if (in_touch && speed > 0.0) step = std::min(step, std::max(contact_step_s_, contact_step_s_ * kSlowTouch / speed));
   }
   return std::max(step, 2e-6);
 }

@@ -47,7 +47,7 @@ class Engine {
  public:
   /// `world` must outlive the engine; surfaces that `surfaces` lacks are added to it. Throws InputError for a spec that cannot be
   /// simulated.
-  Engine(const WorldModel& world, SurfaceSet& surfaces, double time_s);
+  Engine(const WorldModel& world, SurfaceSet& surfaces, double time_s, const WorldOptions& options);
 
   /// Throws InputError when two bodies, or a body and the ground, are inside each other.
   void check_overlaps() const;
@@ -95,6 +95,7 @@ class Engine {
   Mobile make_mobile(int body, const SimTK::Transform& pose, const SimTK::Vec3& velocity, const SimTK::Vec3& spin) const;
 
   const WorldModel& world_;
+  double contact_step_s_ = 0.0;  // WorldOptions
   std::vector<Body> bodies_;
   SimTK::MultibodySystem system_;
   SimTK::SimbodyMatterSubsystem matter_;

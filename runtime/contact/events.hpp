@@ -22,6 +22,9 @@ struct Pose {
 
 /// How a world is run.
 struct WorldOptions {
+  /// The longest step [s] while something in touch moves faster than 1 cm/s; slower, longer ones in proportion. Steps of bodies that fly
+  /// free, and the instant of an impact, do not hang on it.
+  double contact_step_s = 5e-4;
   double end_s = std::numeric_limits<double>::infinity();  // the world stops there
   bool islands = true;                                     // false: one Simbody system for all bodies, for comparison
   bool lasting_contacts = true;                            // false: no stream::Contact records, and none of their cost

@@ -44,7 +44,7 @@ Island::Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces,
                const std::vector<Spot>& spots, const WorldOptions& options)
     : world_(std::move(world)),
       members_(std::move(members)),
-      engine_(world_, surfaces, time_s),
+      engine_(world_, surfaces, time_s, options),
       state_(engine_.initial()),
       has_lasting_(options.lasting_contacts) {
   still_since_s_ = time_s;

@@ -24,7 +24,7 @@ class Island {
  public:
   /// `world`: the bodies that belong together and all that stand still, as they are at time_s. members[i]: the number in the scene of its
   /// body i, rising. `recent`, `spots`: the points of the whole scene that were in contact within the last moments, and what touches.
-  /// `options`: whether contacts that last are recorded.
+  /// `options`: of the world.
   Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces, double time_s, const std::vector<OldPoint>& recent,
          const std::vector<Spot>& spots, const WorldOptions& options);
 

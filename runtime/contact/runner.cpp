@@ -106,7 +106,7 @@ class Runner::Parts {
 };
 
 Runner::Parts::Parts(WorldModel world, const WorldOptions& options) : world_(std::move(world)), options_(options) {
-  Engine(world_, surfaces_, 0.0).check_overlaps();
+  Engine(world_, surfaces_, 0.0, options_).check_overlaps();
   group_.assign(world_.bodies.size(), -1);
 }
 

@@ -125,6 +125,8 @@ Pose make_pose(const stream::Motion& motion, const Vec3& c) {
 
 World::World(const WorldSpec& spec, const WorldOptions& options) {
   if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end of the world, {} s, must be a number, 0 or more", options.end_s));
+  if (!(options.contact_step_s >= 2e-6 && options.contact_step_s <= 2e-3))
+    throw InputError(fmt::format("the step of contacts, {} s, must lie within 2e-6 and 0.002 s", options.contact_step_s));
   runner_ = std::make_unique<Runner>(make_model(spec), options);
 }
 

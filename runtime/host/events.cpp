@@ -33,7 +33,8 @@ std::vector<stream::Event> make_still(const Scene& scene) {
 }
 
 Course run_physics(const Scene& scene, bool has_contacts, const std::function<void(double)>& progress) {
-  contact::World world(make_world(scene), {.end_s = scene.duration_s, .lasting_contacts = has_contacts});
+  contact::World world(make_world(scene),
+                       {.contact_step_s = scene.quality.contact_step_s, .end_s = scene.duration_s, .lasting_contacts = has_contacts});
   Course course;
   constexpr int kParts = 100;
   for (int part = 1; part <= kParts; ++part) {

@@ -13,6 +13,7 @@ plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, 
   facts.duration_s = scene.duration_s;
   facts.microphones_m = microphones.offset_m;
   facts.moves = moves;
+  facts.strictness = scene.quality.planner;
   if (scene.microphones_m.empty()) {
     facts.listener = scene.listener.path;
     if (facts.listener.empty()) facts.listener.push_back({0.0, scene.listener.position_m});

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -121,6 +122,7 @@ class Changes {
 
 /// Below which pressure at 1 m a body sleeps: where the planner is free to say so, what nobody hears.
 double find_silence_pa(const Scene& scene, std::size_t body, const Plan* plan) {
+  if (scene.quality.silence_pa) return *scene.quality.silence_pa;
   const bool is_planned = plan != nullptr && scene.bodies[body].wish.automatic && !scene.bodies[body].wish.on.has(Effect::kModal);
   return is_planned ? plan->planner.calc_silence_pa(static_cast<int>(body)) : synth::BodySettings{}.silence_pa;
 }
@@ -175,6 +177,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                                   .max_bodies = std::max(1, static_cast<int>(fed.size())),
                                   .max_strikes = kMostStrikes,
                                   .max_waypoints = feed.count_waypoints(-1, 0.0),
+                                  .budget = calc_budget(scene.quality, rate_hz),
                                   .ground = make_ground(scene),
                                   .ticks = options.measures ? &get_ticks : nullptr});
   for (std::size_t i = 0; i < fed.size(); ++i) {
@@ -186,7 +189,8 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                           .silence_pa = find_silence_pa(scene, i, options.plan),
                           .surface = {.roughness_m = scene.bodies[i].spec.roughness_m, .friction = scene.bodies[i].spec.friction},
                           .longest_m = longest_m,
-                          .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs)});
+                          .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs),
+                          .isa = scene.quality.instructions});
   }
 
   constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
@@ -225,6 +229,10 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   }
   sound.seconds_cpu = get_cpu_seconds() - started;
   return sound;
+}
+
+double calc_budget(const Quality& quality, double rate_hz) {
+  return quality.modes ? static_cast<double>(*quality.modes) * rate_hz : std::numeric_limits<double>::infinity();
 }
 
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects) {

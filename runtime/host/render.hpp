@@ -48,6 +48,9 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
 /// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put.
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects);
 
+/// Mode-samples that a second of sound may take: quality.modes at all times, or as many as there are.
+double calc_budget(const Quality& quality, double rate_hz);
+
 /// The ground as those feel it who slide on it.
 synth::Surface make_ground(const Scene& scene);
 

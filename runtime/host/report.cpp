@@ -9,6 +9,7 @@
 #include "runtime/config/document.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/plan/table.hpp"
+#include "runtime/synth/kernels.hpp"
 
 namespace carillon::host {
 namespace {
@@ -97,10 +98,12 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
   fmt::format_to(out, " \"scene\": {},\n \"duration_s\": {},\n \"sample_rate_hz\": {},\n \"samples\": {},\n \"channels\": {},\n",
                  config::quote(scene.file.string()), scene.duration_s, sound.rate_hz, sound.pressure_pa[0].size(),
                  sound.pressure_pa.size());
-  fmt::format_to(out,
-                 " \"bodies\": {},\n \"modes\": {},\n \"contacts\": {},\n \"impulses\": {},\n \"impulses_played\": {},\n "
-                 "\"impulses_refused\": {},\n \"resets\": {},\n",
-                 f.bodies, f.modes, f.contacts, simulation.impulses.size(), sound.strikes, sound.refused, sound.resets);
+  fmt::format_to(
+      out,
+      " \"instructions\": \"{}\",\n \"bodies\": {},\n \"modes\": {},\n \"contacts\": {},\n \"impulses\": {},\n \"impulses_played\": {},\n "
+      "\"impulses_refused\": {},\n \"resets\": {},\n",
+      synth::get_name(synth::get_kernels(scene.quality.instructions).isa), f.bodies, f.modes, f.contacts, simulation.impulses.size(),
+      sound.strikes, sound.refused, sound.resets);
   fmt::format_to(
       out,
       " \"physics_steps\": {},\n \"physics_s\": {:.4f},\n \"sound_s\": {:.4f},\n \"sound_cpu_s\": {:.5f},\n \"playing_cpu_s\": {:.6f},\n "

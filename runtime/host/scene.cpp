@@ -271,6 +271,12 @@ Listener parse_listener(config::Object& object) {
   return listener;
 }
 
+/// The position of the text of `key` among names.
+std::size_t read_name(config::Object& object, std::string_view key, const std::vector<std::string>& names, const std::string& fallback) {
+  const std::string name = object.choice_or(key, names, fallback);
+  return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
 Output parse_output(config::Object& object) {
   Output output;
   if (object.has("gain")) {
@@ -282,11 +288,23 @@ Output parse_output(config::Object& object) {
     }
   }
   output.peak_dbfs = read_within(object, "peak_dbfs", output.peak_dbfs, -120.0, 0.0);
-  const std::string format = object.choice_or("format", kSampleFormatNames, "pcm24");
-  output.format =
-      static_cast<SampleFormat>(std::find(kSampleFormatNames.begin(), kSampleFormatNames.end(), format) - kSampleFormatNames.begin());
+  output.format = static_cast<SampleFormat>(read_name(object, "format", kSampleFormatNames, "pcm24"));
   object.finish();
   return output;
+}
+
+Quality parse_quality(config::Object& object) {
+  Quality quality;
+  plan::Strictness& planner = quality.planner;
+  if (object.has("planner_db")) planner.tellable_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", 0.0, -150.0, -10.0));
+  planner.below_loudest_db = read_within(object, "quiet_db", planner.below_loudest_db, 20.0, 250.0);
+  planner.lead_s = read_within(object, "lead_s", planner.lead_s, 0.001, 1.0);
+  if (object.has("silence_pa")) quality.silence_pa = read_within(object, "silence_pa", 0.0, 1e-15, 1.0);
+  quality.modes = object.integer_if("modes", synth::kGroup, std::numeric_limits<std::int32_t>::max());
+  quality.contact_step_s = read_within(object, "contact_step_s", quality.contact_step_s, 1e-5, 2e-3);
+  quality.instructions = static_cast<synth::Isa>(read_name(object, "instructions", kInstructionNames, "best"));
+  object.finish();
+  return quality;
 }
 
 }  // namespace
@@ -309,7 +327,7 @@ Scene parse_scene(const config::Document& document) {
 
   std::vector<config::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
-    for (const char* later : {"strikes", "listener", "microphones", "effects", "radiation", "output"}) root.has(later);
+    for (const char* later : {"strikes", "listener", "microphones", "effects", "radiation", "output", "quality"}) root.has(later);
     root.finish();  // a mistyped key is the likeliest reason
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
   }
@@ -341,10 +359,9 @@ Scene parse_scene(const config::Document& document) {
     root.fail("duration_s", fmt::format("{} s at {} Hz and {} channels need too much memory; give fewer or a lower \"sample_rate_hz\"",
                                         scene.duration_s, scene.sample_rate_hz, count_channels(scene)));
   }
-  const std::string radiation = root.choice_or("radiation", kGainKindNames, "sphere");
-  scene.radiation =
-      static_cast<radiation::GainKind>(std::find(kGainKindNames.begin(), kGainKindNames.end(), radiation) - kGainKindNames.begin());
+  scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", kGainKindNames, "sphere"));
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
+  if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality);
   root.finish();
   return scene;
 }

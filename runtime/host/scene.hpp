@@ -14,6 +14,7 @@
 #include "runtime/plan/planner.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/synth/effects.hpp"
+#include "runtime/synth/kernels.hpp"
 #include "runtime/synth/track.hpp"
 
 namespace carillon::host {
@@ -64,6 +65,18 @@ struct Output {
   SampleFormat format = SampleFormat::kPcm24;
 };
 
+/// The names of quality.instructions, in the order of synth::Isa.
+inline const std::vector<std::string> kInstructionNames{"plain", "sse2", "avx2", "avx512", "best"};
+
+/// What accuracy is bought with; the initialisers are the defaults that docs/accuracy.md chose.
+struct Quality {
+  plan::Strictness planner{};
+  std::optional<double> silence_pa{};   // below which a body sleeps; nothing: as the planner says
+  std::optional<std::int64_t> modes{};  // of all bodies that may ring at once; nothing: all
+  double contact_step_s = contact::WorldOptions{}.contact_step_s;
+  synth::Isa instructions = synth::Isa::kBest;
+};
+
 /// World frame: z up, metres, seconds.
 struct Scene {
   std::filesystem::path file;
@@ -79,6 +92,7 @@ struct Scene {
   plan::Wish wish;                             // the key "effects"
   synth::EffectSet effects = kDefaultEffects;  // of all bodies where nobody plans
   Output output;
+  Quality quality;
 };
 
 /// Reads a scene file. Throws as parse_scene does, and for a file that cannot be read.

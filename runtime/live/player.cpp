@@ -35,9 +35,6 @@ namespace {
 
 constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
 constexpr double kChangeS = 0.03;  // by which a change of effects is sent before the events that call for it
-/// Physics must be known so far ahead that the planner can decide.
-constexpr double kPlanningS = plan::kLeadS + plan::kTickS + kChangeS;
-
 /// Physics and strikes of a scene as one stream, in order of time.
 class Course {
  public:
@@ -48,8 +45,10 @@ class Course {
     for (const stream::Impulse& strike : strikes_) planner.watch(strike);
     if (!host::has_physics(scene)) return;
     try {
-      world_ = std::make_unique<contact::World>(
-          host::make_world(scene), contact::WorldOptions{.end_s = scene.duration_s, .lasting_contacts = planner.needs_contacts()});
+      world_ =
+          std::make_unique<contact::World>(host::make_world(scene), contact::WorldOptions{.contact_step_s = scene.quality.contact_step_s,
+                                                                                          .end_s = scene.duration_s,
+                                                                                          .lasting_contacts = planner.needs_contacts()});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     }
@@ -126,10 +125,12 @@ void play(const PlayerOptions& options) {
                                   .max_bodies = static_cast<int>(scene.bodies.size()),
                                   .max_waypoints = 1024,
                                   .ring_events = 1 << 14,
+                                  .budget = host::calc_budget(scene.quality, rate_hz),
                                   .ground = host::make_ground(scene)});
   synthesiser.set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
   plan::Planner planner(host::make_facts(scene, microphones, host::has_physics(scene)));
-  const bool plans = options.look_ahead_s >= kPlanningS;
+  // Physics must be known so far ahead that the planner can decide.
+  const bool plans = options.look_ahead_s >= scene.quality.planner.lead_s + plan::kTickS + kChangeS;
   std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const contact::BodySpec& spec = scene.bodies[i].spec;
@@ -141,7 +142,9 @@ void play(const PlayerOptions& options) {
     synthesiser.add_body(model, {.position_m = host::calc_world_point(spec.initial, spec.bank->rigid.centre_m),
                                  .rotation = spec.initial.rotation,
                                  .effects = host::find_effects(scene, i, effects),
-                                 .surface = {.roughness_m = spec.roughness_m, .friction = spec.friction}});
+                                 .silence_pa = scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa),
+                                 .surface = {.roughness_m = spec.roughness_m, .friction = spec.friction},
+                                 .isa = scene.quality.instructions});
   }
   Course course(scene, body_banks, planner);
   const auto change_effects = [&](double known_s) {

@@ -47,14 +47,6 @@ constexpr double kVariance = kTrigamma / (2.0 * pi * pi);
 
 }  // namespace
 
-double calc_a_weight(double freq_hz) noexcept {
-  const double f2 = freq_hz * freq_hz;
-  const double gain = 12194.217 * 12194.217 * f2 * f2 /
-                      ((f2 + 20.598997 * 20.598997) * std::sqrt((f2 + 107.65265 * 107.65265) * (f2 + 737.86223 * 737.86223)) *
-                       (f2 + 12194.217 * 12194.217));
-  return 1.2589254 * gain;  // +2.000 dB
-}
-
 double calc_pulse_spectrum(stream::PulseShape shape, double cycles) noexcept {
   if (!(cycles > 0.0)) return 1.0;
   if (shape == stream::PulseShape::kGaussian) return std::exp(-2.0 * pi * pi * kVariance * cycles * cycles);

@@ -5,17 +5,16 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/reduce.hpp"
 #include "runtime/stream/events.hpp"
 
 namespace carillon::plan {
 
 inline constexpr double kReferencePa = 20e-6;
 inline constexpr double kLowestHz = 20.0, kHighestHz = 20000.0;  // what is heard
-/// The ear sums up what falls within about this time (Zwislocki 1969): a sound of that exposure is as loud as a steady one so long.
-inline constexpr double kEarS = 0.2;
-
-/// A-weighting as a factor of the amplitude, 1 at 1 kHz (IEC 61672-1:2013, E.4.2). 0 <= freq_hz.
-double calc_a_weight(double freq_hz) noexcept;
+using bank::calc_a_weight;
+/// The ear sums up what falls within about this time: a sound of that exposure is as loud as a steady one so long.
+using bank::kEarS;
 
 /// |P(f)| / P(0) of a contact pulse at `cycles` = frequency x duration >= 0. kHertz: Gamma(7/4)^2 / (Gamma(7/4 + x) Gamma(7/4 - x)), the
 /// transform of sin^1.5; kGaussian: the Gaussian of the same variance. To 1e-6 below x = 64, an upper bound above. No throw; any thread.

@@ -85,7 +85,7 @@ struct Planner::State {
   double middle_m = 0.0;                                // way to it
   std::vector<double> projection, amplitude_pa, way_m;  // working space
 
-  double calc_inaudible_db() const { return std::min(kInaudibleDb, calc_level_db(loudest_pa2_s) - kBelowLoudestDb); }
+  double calc_inaudible_db() const { return std::min(kInaudibleDb, calc_level_db(loudest_pa2_s) - facts.strictness.below_loudest_db); }
   void find_possible(std::size_t body);
   void begin_walk(double time_s);
   void refuse(Body& body, Effect effect, const Reason& reason) {
@@ -93,7 +93,10 @@ struct Planner::State {
     body.reason[effect] = reason;
   }
   double find_ways(const Body& body, double time_s);
-  void call(Body& body, Effect effect, double share, double until_s, Reason reason, double limit = kTellableShare);
+  void call(Body& body, Effect effect, double share, double until_s, Reason reason) {
+    call(body, effect, share, until_s, reason, facts.strictness.tellable_share);
+  }
+  void call(Body& body, Effect effect, double share, double until_s, Reason reason, double limit);
   void look(Body& body, double time_s);
   void apply(const Pending& pending);
   void apply(const stream::Impulse& impulse);
@@ -205,7 +208,7 @@ void Planner::State::look(Body& body, double time_s) {
   const double travel_s = nearest / bank::kSoundSpeedMs;
   const double end_s = body.sounds_until_s + travel_s;
   const double wave = 2.0 * pi * std::max(body.mean_hz, kLowestHz) / bank::kSoundSpeedMs;  // rad/m
-  const double limit_m = std::sqrt(kTellableShare) / wave;
+  const double limit_m = std::sqrt(facts.strictness.tellable_share) / wave;
   call(body, Effect::kAirDelay, wave * nearest * wave * nearest, end_s, {.rule = Rule::kAirTravel, .value = nearest, .limit = limit_m});
   double moved = 0.0, apart = 0.0;
   for (std::size_t m = 0; m < way_m.size(); ++m) {
@@ -261,10 +264,10 @@ void Planner::State::apply(const stream::Impulse& impulse) {
     body.plan.effects[Effect::kModal].cost_us +=
         1e-3 * (rung_s * facts.rate_hz * costs.mode_sample_ns + static_cast<double>(modes.size()) * costs.strike_mode_ns);
     const double share = weigh(heard);
-    const bool counts = share > kTellableShare || of.wish.off.has(Effect::kAccelerationNoise);
+    const bool counts = share > facts.strictness.tellable_share || of.wish.off.has(Effect::kAccelerationNoise);
     call(body, Effect::kModal, counts ? 1.0 + heard : share, end_s + travel_s,
          counts ? Reason{.rule = Rule::kHeard, .value = modal_db, .distance_m = distance}
-                : Reason{.rule = Rule::kChange, .value = to_db(share), .limit = to_db(kTellableShare)});
+                : Reason{.rule = Rule::kChange, .value = to_db(share), .limit = to_db(facts.strictness.tellable_share)});
     if (levels.mean_hz > body.mean_hz) body.mean_hz = levels.mean_hz;
   } else {
     call(body, Effect::kModal, 0.0, kNever, {.rule = Rule::kTooQuiet, .value = modal_db, .limit = limit_db});
@@ -272,7 +275,7 @@ void Planner::State::apply(const stream::Impulse& impulse) {
   if (!of.fixed && click_db > limit_db) {
     const double share = clicked / (clicked + body.ring_pa2_s);
     const bool thumps = bank::kSoundSpeedMs / (2.0 * pi * body.bank->get_radius_m()) < kThumpHz;
-    const double limit = thumps ? kThumpShare / (1.0 + kThumpShare) : kTellableShare;
+    const double limit = thumps ? kThumpShare / (1.0 + kThumpShare) : facts.strictness.tellable_share;
     call(body, Effect::kAccelerationNoise, share,
          impulse.time_s + half_s + travel_s + 20.0 * body.bank->get_radius_m() / bank::kSoundSpeedMs,
          {.rule = thumps ? Rule::kThump : Rule::kChange, .value = to_db(share), .limit = to_db(limit), .distance_m = click_db}, limit);
@@ -289,8 +292,9 @@ void Planner::State::apply(const stream::Impulse& impulse) {
   }
   // What an impulse without length would add, and to a click all that its pulse takes away.
   const double lost = weigh((levels.pulse_loss_pa2_s + click.pulse_loss_pa2_s) * spreading);
-  call(body, Effect::kHertzPulse, lost, end_s + travel_s, {.rule = Rule::kChange, .value = to_db(lost), .limit = to_db(kTellableShare)});
-  if (lost > kTellableShare) {
+  call(body, Effect::kHertzPulse, lost, end_s + travel_s,
+       {.rule = Rule::kChange, .value = to_db(lost), .limit = to_db(facts.strictness.tellable_share)});
+  if (lost > facts.strictness.tellable_share) {
     body.plan.effects[Effect::kHertzPulse].cost_us +=
         1e-3 * costs.pulse_mode_sample_ns * static_cast<double>(amplitude_pa.size()) * impulse.duration_s * facts.rate_hz;
   }
@@ -337,7 +341,9 @@ void Planner::State::apply(const stream::Contact& contact) {
 
 void Planner::State::damp(Body& body, double share, double time_s) {
   call(body, Effect::kContactDamping, share, time_s,
-       {.rule = Rule::kChange, .value = 10.0 * std::log10(std::max(share, 1e-30)), .limit = 10.0 * std::log10(kTellableShare)});
+       {.rule = Rule::kChange,
+        .value = 10.0 * std::log10(std::max(share, 1e-30)),
+        .limit = 10.0 * std::log10(facts.strictness.tellable_share)});
 }
 
 void Planner::State::apply(const Pending& next) {
@@ -433,7 +439,7 @@ std::vector<Change> Planner::advance(double known_s) {
   State& s = *state_;
   std::vector<Change> changes;
   for (;; ++s.tick) {
-    const double time_s = static_cast<double>(s.tick) * kTickS, seen_s = time_s + kTickS + kLeadS;
+    const double time_s = static_cast<double>(s.tick) * kTickS, seen_s = time_s + kTickS + s.facts.strictness.lead_s;
     if (!(time_s <= s.facts.duration_s) || !(seen_s <= known_s)) break;
     while (!s.pending.empty() && s.pending.top().from_s <= seen_s) {
       s.apply(s.pending.top());

@@ -47,6 +47,13 @@ inline constexpr double kHoldS = 0.25;
 /// Decisions are made on this grid of time.
 inline constexpr double kTickS = 0.01;
 
+/// How strictly a planner judges; the initialisers are what docs/accuracy.md chose.
+struct Strictness {
+  double tellable_share = kTellableShare;     // of a body's exposure: what changes it by less is left out
+  double below_loudest_db = kBelowLoudestDb;  // of the loudest strike: what is so far below it, and below kInaudibleDb, is not heard
+  double lead_s = kLeadS;                     // an effect is on this long before it is needed
+};
+
 /// What the scene says about the effects of a body. `on` and `off` have nothing in common.
 struct Wish {
   bool automatic = true;  // the planner decides about what is neither on nor off; without, that is off
@@ -69,6 +76,7 @@ struct SceneFacts {
   bool moves = true;                       // some body may move, and so touch others
   std::vector<Vec3> microphones_m;         // from the listener, a channel each
   std::vector<synth::Place> listener{{}};  // its way, as far as it is known; at least one place
+  Strictness strictness{};
 };
 
 /// The numbers that decided, and what they mean.
@@ -148,8 +156,8 @@ class Planner {
   /// Events in order of their time, of the bodies by their index; others are not looked at.
   void watch(const stream::Event& event);
 
-  /// Decides for all times for which is known what happens kLeadS later. `known_s`: nothing earlier will be watched from now on. Changes in
-  /// order of time; the first call gives one for every body.
+  /// Decides for all times for which is known what happens Strictness::lead_s later. `known_s`: nothing earlier will be watched from now
+  /// on. Changes in order of time; the first call gives one for every body.
   std::vector<Change> advance(double known_s);
 
   double get_time_s() const;  // up to which it has decided

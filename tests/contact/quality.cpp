@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <map>
+#include <utility>
+#include <variant>
 
 #include "tests/contact/checks.hpp"
 #include "tests/contact/solids.hpp"
@@ -156,6 +158,30 @@ TEST_P(ComingToRest, IsNoMachineGun) {
     }
     EXPECT_LE(pushed, box.rigid.mass_kg * kGravity * (s.impulses.back().time_s + 0.01));
   }
+}
+
+/// Where a block that slides at 1 m/s over a floor of friction 0.4 has stopped, and in how many steps.
+std::pair<double, std::int64_t> slide(double contact_step_s) {
+  const bank::Bank box = make_box({0.08, 0.06, 0.02});
+  WorldSpec w = make_ground_world(make_body(box, {0, 0, 0.01}, 0.3));
+  w.ground->friction = w.bodies[0].friction = 0.4;
+  w.bodies[0].velocity_m_s = {1, 0, 0};
+  World world(w, {.contact_step_s = contact_step_s, .end_s = 0.5});
+  double x = 0.0;
+  world.advance(0.5, 1e9, [&](const stream::Event& event) {
+    if (const auto* motion = std::get_if<stream::Motion>(&event)) x = motion->position_m[0];
+  });
+  return {x, world.get_statistics().steps};
+}
+
+TEST(ContactStep, IsWhatTheOptionsSayAndCostsAsMuch) {
+  const auto [coarse_m, coarse_steps] = slide(1e-3);
+  const auto [fine_m, fine_steps] = slide(1e-4);
+  const double stops_m = 1.0 / (2 * 0.4 * kGravity);
+  EXPECT_NEAR(coarse_m, stops_m, 0.02 * stops_m);
+  EXPECT_NEAR(fine_m, stops_m, 0.01 * stops_m);
+  EXPECT_GT(fine_steps, 5 * coarse_steps);
+  for (const double step : {0.0, -1e-4, 1e-7, 0.01, std::nan("")}) EXPECT_THROW(slide(step), InputError) << step;
 }
 
 }  // namespace

@@ -93,6 +93,44 @@ TEST(Render, AnyListOfMicrophonesIsHeardEachAtItsPlace) {
   }
 }
 
+TEST(Render, AllInstructionSetsAreTheClosedFormToSinglePrecision) {
+  for (const synth::Isa isa : {synth::Isa::kPlain, synth::Isa::kSse2, synth::Isa::kAvx2, synth::Isa::kAvx512}) {
+    Case c({{1000.0, 0.0, 2.0}}, {3.0, 0.0, 0.0}, 0.1);
+    c.scene.quality.instructions = isa;
+    const Sound sound = c.render();
+    for (int n = 6000; n < 24000; ++n)
+      ASSERT_NEAR(sound.pressure_pa[0][n], 2.0 / 3.1 * std::cos(2 * pi * 1000.0 * (n / 48000.0 - 0.1 - 3.1 / 343.0)), 2e-4 * 2.0 / 3.1);
+  }
+}
+
+TEST(Render, SilenceIsWhereTheSceneSays) {
+  // A mode that falls by e^-100 t from 2 / 3 Pa: asleep at 1 Pa, it is cut off; the time is that at 1 m.
+  Case c({{1000.0, 100.0, 2.0}}, {3.0, 0.0, 0.0}, 0.1);
+  const auto find_last_sample = [](const Sound& sound) {
+    std::size_t last = sound.pressure_pa[0].size();
+    while (last > 0 && sound.pressure_pa[0][last - 1] == 0.0) --last;
+    return last;
+  };
+  const std::size_t usual = find_last_sample(c.render());
+  c.scene.quality.silence_pa = 0.2;
+  // Below 0.2 Pa / (1 group + 1) after ln(20) / 100 s, looked at every 1024 samples.
+  const double until_s = 0.1 + 3.1 / 343.0 + std::log(20.0) / 100.0;
+  EXPECT_NEAR(static_cast<double>(find_last_sample(c.render())) / 48000.0, until_s + 0.5 * 1024 / 48000.0, 0.5 * 1024 / 48000.0 + 2e-3);
+  EXPECT_GT(static_cast<double>(usual) / 48000.0, until_s + 0.1);
+}
+
+TEST(Render, AsManyModesRingAtOnceAsTheSceneAllows) {
+  std::vector<testing::InventedMode> modes;
+  for (int i = 0; i < 64; ++i) modes.push_back({400.0 + 150.0 * i, 2.0, 1.0 / (1.0 + i)});
+  Case c(modes, {3.0, 0.0, 0.0}, 0.01);
+  const RenderOptions options{.rate_hz = 48000, .measures = true};
+  const auto count_mode_samples = [&](const Sound& sound) { return sound.effect_counters[0].units[synth::Effect::kModal]; };
+  const auto all = count_mode_samples(calc_sound(c.scene, {&c.bank}, c.list_events(), options));
+  c.scene.quality.modes = 16;
+  const auto few = count_mode_samples(calc_sound(c.scene, {&c.bank}, c.list_events(), options));
+  EXPECT_NEAR(static_cast<double>(all) / static_cast<double>(few), 4.0, 0.4);
+}
+
 TEST(Render, AListenerThatWalksTakesItsEarsAlong) {
   Case c({{1000.0, 0.0, 2.0}}, {0.0, 0.0, 0.0}, 0.01);
   c.scene.listener.path = {{0.0, {1.0, -3.0, 0.0}}, {0.6, {1.0, 3.0, 0.0}}};

@@ -141,6 +141,25 @@ TEST(Scene, SurfacesAreAsRoughAsTheySay) {
   EXPECT_THROW(parse(R"({"duration_s": 2, "ground": {"roughness_m": -1e-6}, "bodies": [{"name": "a", "bank": "a.h5"}]})"), InputError);
 }
 
+TEST(Scene, QualityIsReadAndWithoutItNothingChanges) {
+  const Quality usual = parse("{\"duration_s\": 2, " + kBody + "}").quality;
+  EXPECT_EQ(usual.planner.tellable_share, plan::kTellableShare);
+  EXPECT_EQ(usual.planner.lead_s, plan::kLeadS);
+  EXPECT_FALSE(usual.silence_pa.has_value() || usual.modes.has_value());
+  EXPECT_EQ(usual.contact_step_s, contact::WorldOptions{}.contact_step_s);
+  EXPECT_EQ(usual.instructions, synth::Isa::kBest);
+  const Quality quality = parse("{\"duration_s\": 2, " + kBody + R"(, "quality": {"planner_db": -70, "quiet_db": 90, "lead_s": 0.1,
+    "silence_pa": 1e-6, "modes": 320, "contact_step_s": 1e-4, "instructions": "avx2"}})")
+                              .quality;
+  EXPECT_NEAR(quality.planner.tellable_share, 1e-7, 1e-16);
+  EXPECT_EQ(quality.planner.below_loudest_db, 90.0);
+  EXPECT_EQ(quality.planner.lead_s, 0.1);
+  EXPECT_EQ(quality.silence_pa, 1e-6);
+  EXPECT_EQ(quality.modes, 320);
+  EXPECT_EQ(quality.contact_step_s, 1e-4);
+  EXPECT_EQ(quality.instructions, synth::Isa::kAvx2);
+}
+
 TEST(Scene, TheLeftEarIsOnTheLeft) {
   Listener listener;
   listener.position_m = {1.0, 2.0, 3.0};
@@ -264,6 +283,13 @@ INSTANTIATE_TEST_SUITE_P(
             "too_many_channels",
             "{\"duration_s\": 1000, \"sample_rate_hz\": 96000, \"microphones\": [[0,0,1],[0,0,1],[0,0,1],[0,0,1],[0,0,1]], " + kBody + "}",
             {"duration_s", "5 channels", "memory"}},
+        BadScene{"misspelt_quality", with_root("\"quality\": {\"silence\": 1e-3}"), {":2:", "silence", "silence_pa"}},
+        BadScene{"quality_that_is_a_number", with_root("\"quality\": 3"), {":2:", "quality", "object"}},
+        BadScene{"loud_silence", with_root("\"quality\": {\"silence_pa\": 2}"), {":2:", "silence_pa", "out of range"}},
+        BadScene{"coarse_contacts", with_root("\"quality\": {\"contact_step_s\": 0.1}"), {":2:", "contact_step_s", "0.002"}},
+        BadScene{"fewer_modes_than_a_group", with_root("\"quality\": {\"modes\": 1}"), {":2:", "modes", "16"}},
+        BadScene{"loud_effects", with_root("\"quality\": {\"planner_db\": 3}"), {":2:", "planner_db", "-10"}},
+        BadScene{"unknown_instructions", with_root("\"quality\": {\"instructions\": \"neon\"}"), {":2:", "instructions", "avx2"}},
         BadScene{"unknown_radiation", with_root("\"radiation\": \"sfere\""), {":2:", "radiation", "sphere"}},
         BadScene{"strikes_as_object", with_root("\"strikes\": {}"), {":2:", "strikes", "list"}},
         BadScene{"strike_at_nobody",

@@ -1,0 +1,277 @@
+"""What the runtime's knobs cost and buy: each turned by itself, the error of the sound against the CPU of a second of it. The reference is the most accurate setting."""
+import dataclasses
+import json
+
+import numpy as np
+
+from accuracy import banks, plots, sounds
+from accuracy.section import Section
+
+NAME, TITLE = "playing", "Playing: what each knob of the runtime costs and buys"
+EFFECTS = ("modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler", "two_ears")
+INSTRUCTIONS = ("plain", "sse2", "avx2", "avx512")
+# The strictest that a scene may ask of the planner, and the most accurate of all: the reference of what a planner leaves out.
+STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15, "lead_s": 0.2}
+TILE = {"body": {"shape": "plate", "length_m": 0.1, "width_m": 0.1, "thickness_m": 0.008}, "element": "T10", "band_hz": [20, 16000],
+        "material": {"young_modulus_pa": 60e9, "poisson_ratio": 0.22, "density_kg_m3": 2400, "damping": {"internal_friction": {"tan_phi": 0.004}}}}
+SHELF = {"body": {"shape": "plate", "length_m": 0.24, "width_m": 0.2, "thickness_m": 0.01}, "element": "T10", "band_hz": [20, 12000], "fixed": "y-max",
+         "material": {"young_modulus_pa": 34.05e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 30}}}}
+
+
+@dataclasses.dataclass(frozen=True)
+class Knob:
+    """A key of a scene's "quality" (or "sample_rate_hz"), its settings from accurate to cheap, the default, and the scene that it is turned in. physics: it changes what happens,
+    and its CPU is that of the physics."""
+    key: str
+    title: str
+    settings: tuple
+    default: object
+    scene: str
+    physics: bool = False
+
+
+KNOBS = (
+    Knob("silence_pa", "Culling: below this pressure at 1 m a body sleeps", (1e-15, 1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3), 1e-10, "hang"),
+    Knob("modes", "Budget: modes that may ring at once", (None, 400, 200, 100, 48, 16), None, "hang"),
+    Knob("sample_rate_hz", "Sample rate", (192000, 96000, 48000, 44100, 32000, 22050), 48000, "hang"),
+    Knob("planner_db", "Planner: what changes a body's sound by less is left out", (-150, -100, -70, -50, -40, -30, -20, -10), -50, "chute"),
+    Knob("quiet_db", "Planner: what is so far below the loudest strike is not heard", (250, 120, 90, 70, 50, 40, 30), 70, "chute"),
+    Knob("lead_s", "Planner: look-ahead, by which an effect is on before it is needed", (0.2, 0.1, 0.05, 0.02, 0.01, 0.001), 0.05, "chute"),
+    Knob("contact_step_s", "Physics: longest step while bodies touch and move", (2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3), 5e-4, "slide", True),
+)
+
+
+@dataclasses.dataclass
+class Turn:
+    """One setting of a knob."""
+    setting: object
+    cpu_ms: float
+    spread: float
+    difference: sounds.Difference | None  # None of the reference
+
+
+def find_jobs(lab):
+    """{name: job} of the bodies that move."""
+    grow = lambda job, nodes: job | {"body": job["body"] | {"nodes": nodes // 2 if lab.quick else nodes}}
+    return {"tile": grow(TILE, 2000), "shelf": grow(SHELF, 1500)}
+
+
+def make_hang(lab, bank):
+    """A body hangs still and is struck three times."""
+    return banks.make_scene(lab, bank)
+
+
+def make_slide(lab, paths):
+    """The tile slides to rest over a floor whose friction stops it within half a second."""
+    return {"duration_s": 0.6 if lab.quick else 1.0, "ground": {"friction": 0.35}, "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0]},
+            "bodies": [{"name": "tile", "bank": str(paths["tile"]), "position_m": [-0.15, 0, 0.004], "velocity_m_s": [1, 0.2, 0], "friction": 0.35, "roughness_m": 5e-6}]}
+
+
+def make_chute(lab, paths):
+    """The chute in short form: a tile falls on a slanting shelf, slides off it and onto the floor, and comes to rest."""
+    return {"duration_s": 1.2 if lab.quick else 2.0, "ground": {"restitution": 0.3}, "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0.1]},
+            "bodies": [{"name": "tile", "bank": str(paths["tile"]), "position_m": [-0.02, 0, 0.32], "rotation_deg": [4, 17, 10], "restitution": 0.3, "friction": 0.2},
+                       {"name": "shelf", "bank": str(paths["shelf"]), "fixed": True, "position_m": [0, 0, 0.2], "rotation_deg": [0, 22, 0], "restitution": 0.3, "friction": 0.2}]}
+
+
+def turn(scene, key, setting):
+    """The scene with a knob at a setting; None: not given."""
+    if key == "sample_rate_hz":
+        return scene | {key: setting}
+    quality = dict(scene.get("quality", {}))
+    if setting is None:
+        quality.pop(key, None)
+    else:
+        quality[key] = setting
+    return scene | {"quality": quality}
+
+
+def thin(lab, settings, default):
+    """Quick studies look at the ends and the default."""
+    return tuple(s for n, s in enumerate(settings) if n in (0, len(settings) - 1) or s == default) if lab.quick else settings
+
+
+def measure_knob(lab, knob, scene, contacts=None):
+    """[Turn] of a knob, the most accurate setting first, which is the reference."""
+    settings = thin(lab, knob.settings, knob.default)
+    scenes = {f"{knob.key}-{number}": turn(scene, knob.key, setting) for number, setting in enumerate(settings)}
+    played = list(sounds.play_all(lab, scenes, contacts=None if knob.physics else contacts).values())
+    cpu = lambda one: one.physics_ms if knob.physics else one.cpu_ms
+    return [Turn(setting, cpu(one), one.spread, sounds.compare(played[0].sound, one.sound) if number else None) for number, (setting, one) in enumerate(zip(settings, played))]
+
+
+def measure_effects(lab, scene, contacts):
+    """{what: (Turn)}: everything on, each effect off by itself, and as the planner says, with the same contacts."""
+    wishes = {"all on": list(EFFECTS)} | {f"without {effect}": [name for name in EFFECTS if name != effect] for effect in (EFFECTS[1::3] if lab.quick else EFFECTS)} | {"auto": "auto"}
+    quality = {"quality": {"silence_pa": 1e-15}}
+    scenes = {f"effects-{number}": scene | {"effects": wish} | (quality if wish != "auto" else {}) for number, wish in enumerate(wishes.values())}
+    played = list(sounds.play_all(lab, scenes, contacts=contacts).values())
+    return {what: Turn(what, one.cpu_ms, one.spread, sounds.compare(played[0].sound, one.sound) if number else None) for number, (what, one) in enumerate(zip(wishes, played))}
+
+
+# --- the kernel against the closed form
+
+
+def calc_closed_form(bank, strikes, rate_hz, samples):
+    """Pressure at 1 m of ideal blows in double precision, without the runtime's tables: sum g (phi . J) e^(-d t) (cos w_d t - d / w_d sin w_d t)."""
+    names = ("mesh/triangles", "modes/eigenvalue", "modes/decay", "modes/radiation_gain", "modes/shape_scale", "modes/shape")
+    arrays = sounds.read_arrays(bank, set(names))
+    triangles, eigenvalue, decay, gain, scale, shape = (arrays[name] for name in names)
+    heard = (np.sqrt(eigenvalue) < np.pi * rate_hz) & (decay < 0.9 * np.sqrt(eigenvalue))
+    pressure = np.zeros(samples)
+    for strike in strikes:
+        phi = shape[triangles[strike["triangle"]]].astype(float).mean(axis=0) * scale[:, None]  # the middle of the triangle
+        amplitude = gain * (phi @ np.array(strike["impulse_n_s"]))
+        first = int(np.ceil(strike["time_s"] * rate_hz - 1e-9))
+        time = np.arange(first, samples) / rate_hz - strike["time_s"]
+        for a, d, w in zip(amplitude[heard], decay[heard], np.sqrt(eigenvalue[heard] - decay[heard] ** 2)):
+            pressure[first:] += a * np.exp(-d * time) * (np.cos(w * time) - d / w * np.sin(w * time))
+    return pressure
+
+
+def measure_kernels(lab, bank):
+    """[(instructions, Turn)], against the closed form; those that this processor has not are left out. The blows are between two samples, at the middle of the body's sphere of 1 m."""
+    scene = banks.make_scene(lab, bank, seconds=1.5 if lab.quick else 4.0, radiation="osg02", effects=["modal"], quality={"silence_pa": 1e-15})
+    centre = sounds.read_arrays(bank, {"rigid/centre_m"})["rigid/centre_m"]
+    scene["microphones"] = [[float(x) for x in centre + np.array([0.0, 1.0, 0.0])]]
+    for number, strike in enumerate(scene["strikes"]):
+        strike |= {"duration_s": 0.0, "time_s": (round(strike["time_s"] * 48000) + 0.3 * number) / 48000}
+    scenes = {f"kernel-{name}": scene | {"quality": scene["quality"] | {"instructions": name}} for name in INSTRUCTIONS}
+    played = sounds.play_all(lab, scenes)
+    truth = None
+    rows = []
+    for name in INSTRUCTIONS:
+        one = played[f"kernel-{name}"]
+        if one.report["instructions"] != name:
+            continue
+        if truth is None:
+            truth = sounds.Sound(one.sound.rate_hz, calc_closed_form(bank, scene["strikes"], one.sound.rate_hz, len(one.sound.pressure_pa))[:, None])
+        rows.append((name, Turn(name, one.cpu_ms, one.spread, sounds.compare(truth, one.sound))))
+    return rows
+
+
+# --- words and tables
+
+
+HEAD = ("CPU, ms for 1 s", "spread", *sounds.HEAD, "by ear")
+DATA = ("cpu_ms_per_s", "cpu_spread", "error_dba", "log_spectral_distance_db", "loudness_change_dba", "told_apart")
+
+
+def to_cells(one):
+    apart = one.difference.to_cells() if one.difference else ("-", "-", "-")
+    return (f"{one.cpu_ms:.2f}", f"{100 * one.spread:.0f} %", *apart, banks.describe_verdict(one.difference))
+
+
+def to_data(one):
+    apart = dataclasses.astuple(one.difference) if one.difference else (-300.0, 0.0, 0.0)
+    return (one.cpu_ms, one.spread, *apart, "" if one.difference is None else int(one.difference.is_told))
+
+
+def format_setting(setting):
+    return "all" if setting is None else f"{setting:g}"
+
+
+def find_turn(turns, setting):
+    return next(one for one in turns if one.setting == setting)
+
+
+def describe_knob(knob, turns):
+    """What the default is worth against the most accurate and the cheapest setting that nobody tells apart."""
+    best, usual = turns[0], find_turn(turns, knob.default)
+    cheap = None
+    for one in turns[1:]:
+        if one.difference.is_told:
+            break
+        cheap = one
+    what = "physics" if knob.physics else "CPU"
+    if usual is best:
+        text = f"{knob.title} (`{knob.key}`): the default leaves nothing out, {best.cpu_ms:.2f} ms of {what} for a second"
+    else:
+        text = (f"{knob.title} (`{knob.key}`): the default, {format_setting(knob.default)}, takes {usual.cpu_ms:.2f} ms of {what} for a second where the most accurate one, {format_setting(best.setting)}, takes {best.cpu_ms:.2f}, "
+                f"and differs from it by {sounds.format_db(usual.difference.error_db)} dB(A), {usual.difference.distance_db:.2f} dB in bands and {usual.difference.loudness_db:+.2f} dB in loudness ({banks.describe_verdict(usual.difference)})")
+    if cheap is None:
+        return text + "; every cheaper setting is told apart."
+    return text + f"; the cheapest that nobody tells apart is {format_setting(cheap.setting)}, {cheap.cpu_ms:.2f} ms."
+
+
+def add_knob(section, knob, turns):
+    section.add_table(knob.key, [(knob.key, *HEAD), *((format_setting(one.setting) + (" (default)" if one.setting == knob.default else ""), *to_cells(one)) for one in turns)],
+                      f"{knob.title}. Scene: {knob.scene}.", [(knob.key, *DATA), *((format_setting(one.setting), *to_data(one)) for one in turns)])
+    section.conclude(describe_knob(knob, turns))
+
+
+def add_effects(section, effects):
+    section.add_table("effects", [("effects", *HEAD), *((what, *to_cells(one)) for what, one in effects.items())],
+                      "Everything on against each effect left out by itself and against the planner's choice; the same contacts in all. Scene: chute.", [("effects", *DATA), *((what, *to_data(one)) for what, one in effects.items())])
+    told = [what.removeprefix("without ") for what, one in effects.items() if what.startswith("without") and one.difference.is_told]
+    silent = [what.removeprefix("without ") for what, one in effects.items() if what.startswith("without") and not one.difference.is_told]
+    whole, auto = effects["all on"], effects["auto"]
+    parts = ([f"{', '.join(told)} {'is' if len(told) == 1 else 'are'} missed when left out"] if told else []) + ([f"{', '.join(silent)} {'is' if len(silent) == 1 else 'are'} not"] if silent else [])
+    section.conclude(f"In the chute {'; '.join(parts)}. What the planner chooses takes {100 * auto.cpu_ms / max(whole.cpu_ms, 1e-9):.0f} % of the CPU of everything on and differs by "
+                     f"{sounds.format_db(auto.difference.error_db)} dB(A) ({banks.describe_verdict(auto.difference)}).")
+
+
+def add_kernels(section, rows):
+    section.add_table("kernel", [("instructions", *HEAD), *((name, *to_cells(one)) for name, one in rows)],
+                      "Single-precision tables with a double-precision state against the closed form in double precision (numpy), by instruction set.", [("instructions", *DATA), *((name, *to_data(one)) for name, one in rows)])
+    worst, fastest = max(rows, key=lambda row: row[1].difference.error_db), min(rows, key=lambda row: row[1].cpu_ms)
+    slowest = max(rows, key=lambda row: row[1].cpu_ms)
+    section.conclude(f"Single precision in the kernel is {abs(worst[1].difference.error_db):.0f} dB(A) below the sound or better with every instruction set that this processor has ({', '.join(name for name, _ in rows)}); "
+                     f"{fastest[0]} takes {fastest[1].cpu_ms:.2f} ms for a second of sound, {slowest[0]} {slowest[1].cpu_ms:.2f} ms.")
+
+
+def add_chart(section, measured):
+    panels, rows = [], [("knob", "setting", *DATA)]
+    for knob, turns in measured:
+        points = sorted((one.cpu_ms, one.difference.error_db) for one in turns[1:] if one.difference.error_db > -299)
+        rows += [(knob.key, format_setting(one.setting), *to_data(one)) for one in turns]
+        panels.append(plots.Panel(knob.key, f"{'physics' if knob.physics else 'CPU'}, ms for a second", "error, dB(A)", {"settings": points},
+                                  levels=[(sounds.ERROR_LIMIT_DB, "-40 dB: not told apart below")], x_log=False, y_log=False))
+    section.add_chart("knobs", plots.draw_panels(panels, "Each knob by itself", "error against the most accurate setting, and the CPU of a second of sound", 3), "Error of the sound against CPU, setting by setting.", rows)
+
+
+def study(lab, bodies):
+    section = Section(NAME, TITLE, lab.make_command(NAME))
+    soundings = banks.find_soundings(lab, bodies)
+    paths = banks.solve(lab, soundings + [banks.Sounding(name, name, job) for name, job in find_jobs(lab).items()])
+    hung = max((one.name for one in soundings), key=lambda name: banks.count_modes(paths[name]))
+    if banks.count_modes(paths[hung]) == 0:
+        hung = "tile"
+    scenes = {"hang": make_hang(lab, paths[hung]), "slide": make_slide(lab, paths), "chute": make_chute(lab, paths)}
+    contacts = lab.out / "work/sounds/chute.jsonl"
+    sounds.play(lab, "record", scenes["chute"] | {"effects": list(EFFECTS)}, record=contacts)
+    section.say(f"Three scenes. hang: the {hung} hangs still, struck three times. slide: a tile slides over a floor to rest. chute: a tile falls on a slanting shelf, slides off it and onto the floor; what happens is "
+                "recorded once, and each setting plays the same contacts. Each knob is turned by itself; the reference is its most accurate setting.")
+    add_kernels(section, measure_kernels(lab, paths[hung]))
+    measured = []
+    for knob in KNOBS:
+        measured.append((knob, measure_knob(lab, knob, make_base(knob, scenes[knob.scene]), contacts if knob.scene == "chute" else None)))
+        add_knob(section, *measured[-1])
+    add_effects(section, measure_effects(lab, scenes["chute"], contacts))
+    add_chart(section, measured)
+    section.say(describe_defaults(measured))
+    return section
+
+
+def make_base(knob, scene):
+    """What else is set while a knob is turned: effects of the planner where it is one of its knobs."""
+    if knob.scene == "chute":
+        return scene | {"quality": {key: value for key, value in STRICTEST.items() if key != knob.key}}
+    if knob.physics:
+        return scene | {"effects": list(EFFECTS), "quality": {"silence_pa": 1e-15}}
+    return scene
+
+
+def find_defaults(measured):
+    """[(key, default, its error in dB(A), its distance in dB)]: the figures that the defaults rest on."""
+    out = []
+    for knob, turns in measured:
+        usual = find_turn(turns, knob.default).difference
+        out.append((knob.key, format_setting(knob.default), usual.error_db if usual else -300.0, usual.distance_db if usual else 0.0))
+    return out
+
+
+def describe_defaults(measured):
+    told = [f"`{knob.key}`" for knob, turns in measured if (usual := find_turn(turns, knob.default).difference) and usual.is_told]
+    kept = [f"`{knob.key}` {format_setting(knob.default)}" for knob, turns in measured if f"`{knob.key}`" not in told]
+    return (f"Defaults that nobody tells from the most accurate setting: {', '.join(kept) or 'none'}." + (f" Defaults that are told from it: {', '.join(told)}." if told else ""))

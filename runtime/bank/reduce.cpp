@@ -1,0 +1,147 @@
+// Method:     a mode that a blow leaves with the pressure p at 1 m and the decay d has the exposure p^2 / (2 (2 d + 1 / T)) within the
+// ear's
+//             time T. Modes are ranked by it, their squared shapes averaged over the surface; equal ones keep the order of their
+//             frequencies.
+// Source:     A-weighting: IEC 61672-1:2013, E.4.2; T: Zwislocki 1969.
+// Deviations: modes do not mask each other; the gains are the bank's own, which know no cancellation (docs/decisions/radiation-gain.md).
+#include "runtime/bank/reduce.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <numeric>
+
+#include "runtime/bank/surface.hpp"
+
+namespace carillon::bank {
+namespace {
+
+/// Mean over the outer surface of (phi . n)^2 of every mode, (m) [1/kg].
+std::vector<double> calc_mean_squares(const Bank& bank) {
+  std::vector<double> sums(bank.mode_count(), 0.0);
+  double area = 0.0;
+  for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
+    const Vec3 normal = calc_normal(bank.vertices_m, triangle);
+    const double size = std::hypot(normal[0], normal[1], normal[2]);
+    if (!(size > 0.0)) continue;
+    area += size;
+    for (const std::int32_t vertex : triangle) {
+      const std::int16_t* row = &bank.shape[static_cast<std::size_t>(vertex) * bank.mode_count() * 3];
+      for (std::size_t m = 0; m < bank.mode_count(); ++m, row += 3) {
+        const double steps = (row[0] * normal[0] + row[1] * normal[1] + row[2] * normal[2]) / size;
+        sums[m] += size * steps * steps / 3.0;
+      }
+    }
+  }
+  for (std::size_t m = 0; m < sums.size(); ++m) sums[m] *= area > 0.0 ? bank.shape_scale[m] * bank.shape_scale[m] / area : 0.0;
+  return sums;
+}
+
+/// Numbers of the modes that stay, ascending.
+std::vector<std::size_t> find_kept(const Bank& bank, const Reduction& reduction) {
+  std::vector<std::size_t> kept(bank.mode_count());
+  std::iota(kept.begin(), kept.end(), std::size_t{0});
+  if (!reduction.modes || *reduction.modes >= kept.size()) return kept;
+  if (reduction.keep == Keep::kLoudest) {
+    const std::vector<double> audibility = calc_audibility(bank);
+    std::stable_sort(kept.begin(), kept.end(), [&](std::size_t a, std::size_t b) { return audibility[a] > audibility[b]; });
+  }
+  kept.resize(*reduction.modes);
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
+void keep_values(std::vector<double>& values, const std::vector<std::size_t>& kept) {
+  if (values.empty()) return;                                                 // error bars that are unknown
+  for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];  // kept[i] >= i
+  values.resize(kept.size());
+}
+
+void keep_modes(Bank& bank, const std::vector<std::size_t>& kept) {
+  const std::size_t before = bank.mode_count();
+  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
+    for (std::size_t i = 0; i < kept.size(); ++i)
+      std::copy_n(&bank.shape[(v * before + kept[i]) * 3], 3, &bank.shape[(v * kept.size() + i) * 3]);
+  }
+  bank.shape.resize(bank.vertex_count() * kept.size() * 3);
+  for (auto* values : {&bank.eigenvalue_rad2_s2, &bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale,
+                       &bank.algebraic_error_cents, &bank.discretisation_error_cents}) {
+    keep_values(*values, kept);
+  }
+  bank.complete = false;
+}
+
+/// The counts stay true; groups of equal modes end where the list ends.
+void cut_groups(Proof& proof, std::int64_t modes) {
+  std::size_t groups = 0;
+  for (; groups < proof.cluster_first.size(); ++groups) {
+    std::int64_t& count = proof.cluster_count[groups];
+    count = std::min(count, modes - proof.cluster_first[groups]);
+    if (count < 2) break;
+  }
+  proof.cluster_first.resize(groups);
+  proof.cluster_count.resize(groups);
+}
+
+void round_shapes(Bank& bank, int bits) {
+  const int steps = (1 << (bits - 1)) - 1;
+  const std::size_t modes = bank.mode_count();
+  std::vector<int> largest(modes, 0);
+  for (std::size_t i = 0; i < bank.shape.size(); ++i) {
+    int& most = largest[i / 3 % modes];
+    most = std::max(most, std::abs(static_cast<int>(bank.shape[i])));
+  }
+  for (std::size_t i = 0; i < bank.shape.size(); ++i) {
+    const int most = largest[i / 3 % modes];
+    if (most > steps) bank.shape[i] = find_step(bank.shape[i], static_cast<double>(most) / steps);
+  }
+  for (std::size_t m = 0; m < modes; ++m) {
+    if (largest[m] > steps) bank.shape_scale[m] *= static_cast<double>(largest[m]) / steps;
+  }
+  if (bits <= 8) bank.shape_bytes = 1;
+}
+
+}  // namespace
+
+double calc_a_weight(double freq_hz) noexcept {
+  const double f2 = freq_hz * freq_hz;
+  const double gain = 12194.217 * 12194.217 * f2 * f2 /
+                      ((f2 + 20.598997 * 20.598997) * std::sqrt((f2 + 107.65265 * 107.65265) * (f2 + 737.86223 * 737.86223)) *
+                       (f2 + 12194.217 * 12194.217));
+  return 1.2589254 * gain;  // +2.000 dB
+}
+
+std::vector<double> calc_audibility(const Bank& bank) {
+  std::vector<double> exposure = calc_mean_squares(bank);
+  for (std::size_t m = 0; m < exposure.size(); ++m) {
+    const double pressure = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m];
+    exposure[m] *= pressure * pressure / (2.0 * (2.0 * bank.decay_per_s[m] + 1.0 / kEarS));
+  }
+  return exposure;
+}
+
+Bank calc_reduced(const Bank& bank, const Reduction& reduction) {
+  if (reduction.modes && *reduction.modes == 0) throw InputError("a bank of 0 modes is silent; keep 1 or more");
+  if (reduction.shape_bits < kLeastShapeBits || reduction.shape_bits > kMostShapeBits) {
+    throw InputError(fmt::format("shapes of {} bits; give {} to {}", reduction.shape_bits, kLeastShapeBits, kMostShapeBits));
+  }
+  Bank reduced = bank;
+  const std::vector<std::size_t> kept = find_kept(bank, reduction);
+  if (kept.size() < bank.mode_count()) {
+    keep_modes(reduced, kept);
+    if (reduction.keep == Keep::kLoudest) {
+      reduced.proof.reset();
+    } else if (reduced.proof) {
+      cut_groups(*reduced.proof, static_cast<std::int64_t>(kept.size()));
+    }
+  }
+  if (reduction.shape_bits < kMostShapeBits) round_shapes(reduced, reduction.shape_bits);
+  reduced.provenance = fmt::format(R"({{"reduced": {{"modes": {}, "of_modes": {}, "keep": "{}", "shape_bits": {}}})", kept.size(),
+                                   bank.mode_count(), reduction.keep == Keep::kLoudest ? "loudest" : "lowest", reduction.shape_bits);
+  reduced.provenance += bank.provenance.empty() ? "}" : fmt::format(R"(, "of": {}}})", bank.provenance);
+  return reduced;
+}
+
+}  // namespace carillon::bank
