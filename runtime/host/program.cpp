@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 
 #include "runtime/config/file.hpp"
 #include "runtime/host/banks.hpp"
@@ -145,10 +146,12 @@ void run(const ProgramOptions& options) {
   Figures figures;
   figures.bodies = scene.bodies.size();
   auto started = Clock::now();
+  const std::clock_t ticks = std::clock();
   const bool has_contacts = options.record.has_value() || plan::Planner(facts).needs_contacts();
   const Course course =
       options.contacts ? read_course(*options.contacts, scene) : simulate(scene, has_contacts, Progress("physics", options.quiet));
   figures.physics_s = get_seconds_since(started);
+  figures.physics_cpu_s = static_cast<double>(std::clock() - ticks) / CLOCKS_PER_SEC;
   const bool measures = options.plan || options.report.has_value();
   const Plan plan = make_plan(std::move(facts), course.recording.events, measures ? plan::measure_costs() : plan::Costs{});
   if (options.plan) {

@@ -104,11 +104,12 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
       "\"impulses_refused\": {},\n \"resets\": {},\n",
       synth::get_name(synth::get_kernels(scene.quality.instructions).isa), f.bodies, f.modes, f.contacts, simulation.impulses.size(),
       sound.strikes, sound.refused, sound.resets);
-  fmt::format_to(
-      out,
-      " \"physics_steps\": {},\n \"physics_s\": {:.4f},\n \"sound_s\": {:.4f},\n \"sound_cpu_s\": {:.5f},\n \"playing_cpu_s\": {:.6f},\n "
-      "\"real_time_factor\": {:.4f},\n",
-      simulation.steps, f.physics_s, f.sound_s, sound.seconds_cpu, sound.seconds_playing_cpu, f.real_time_factor);
+  fmt::format_to(out,
+                 " \"physics_steps\": {},\n \"physics_s\": {:.4f},\n \"physics_cpu_s\": {:.5f},\n \"sound_s\": {:.4f},\n \"sound_cpu_s\": "
+                 "{:.5f},\n \"playing_cpu_s\": {:.6f},\n "
+                 "\"real_time_factor\": {:.4f},\n",
+                 simulation.steps, f.physics_s, f.physics_cpu_s, f.sound_s, sound.seconds_cpu, sound.seconds_playing_cpu,
+                 f.real_time_factor);
   fmt::format_to(
       out, " \"peak_pa\": {:.6g},\n \"mean_db_spl\": {},\n \"loudest_db_spl\": {},\n \"gain_per_pa\": {:.6g},\n \"gain_reduced\": {},\n",
       f.peak_pa, make_level(f.levels.mean_db), make_level(f.levels.loudest_db), f.gain.per_pa, f.gain.reduced);

@@ -17,6 +17,7 @@ struct Figures {
   int modes = 0;
   std::int64_t contacts = 0;  // a contact between two bodies counts once
   double physics_s = 0.0;     // wall clock
+  double physics_cpu_s = 0.0;
   double sound_s = 0.0;
   double peak_pa = 0.0;
   Levels levels;

@@ -3,15 +3,15 @@ import dataclasses
 import os
 import pathlib
 
-import numpy as np
-
 import measuring
 from accuracy import bodies as known_bodies
 from accuracy import plots, sounds
 from accuracy.lab import Case, calc_digest, calc_key
 from accuracy.section import Section
+from accuracy.sounds import np
 
 NAME, TITLE = "banks", "Modes kept, precision of shapes, size of banks"
+PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank", "carillon-render")
 COUNTS = (800, 400, 200, 100, 50, 20)
 BITS = (14, 12, 10, 8, 6, 4)
 SHIPPED_BITS = 16
@@ -176,12 +176,12 @@ def describe_modes(name, rows):
         fewest = find_fewest(rows, kept)
         if fewest:
             out.append(f"Of the {whole.modes} modes of the {name}, the {fewest.modes} {kept} do: nobody tells them from all ({fewest.difference.distance_db:.2f} dB log-spectral distance, "
-                       f"{fewest.difference.loudness_db:+.2f} dB loudness), with {100 * fewest.bank_bytes / whole.bank_bytes:.0f} % of the bank's bytes and "
+                       f"{sounds.format_change(fewest.difference.loudness_db)} dB loudness), with {100 * fewest.bank_bytes / whole.bank_bytes:.0f} % of the bank's bytes and "
                        f"{100 * fewest.played.cpu_ms / max(whole.played.cpu_ms, 1e-9):.0f} % of the CPU.")
         else:
             most = max((row for row in rows if row.kept == kept), key=lambda row: row.modes)
             out.append(f"Of the {whole.modes} modes of the {name}, even the {most.modes} {kept} are told from all ({most.difference.distance_db:.2f} dB log-spectral distance, "
-                       f"{most.difference.loudness_db:+.2f} dB loudness).")
+                       f"{sounds.format_change(most.difference.loudness_db)} dB loudness).")
     return out
 
 
@@ -192,7 +192,7 @@ def describe_lost(name, rows, counts=(800, 200, 50)):
         row = next((row for row in rows if row.modes == count and row.kept == "loudest"), None)
         if row:
             parts.append(f"at {count} the difference is {sounds.format_db(row.difference.error_db)} dB(A), {row.difference.distance_db:.2f} dB in log-spectral distance and "
-                         f"{row.difference.loudness_db:+.2f} dB in loudness ({describe_verdict(row.difference)})")
+                         f"{sounds.format_change(row.difference.loudness_db)} dB in loudness ({describe_verdict(row.difference)})")
         elif rows[0].modes <= count:
             parts.append(f"{count} are all that there are")
     return f"The {name} has {rows[0].modes} modes; of the loudest, {'; '.join(parts)}."
@@ -215,22 +215,43 @@ def add_body(lab, section, one, bank):
     bits = measure_bits(lab, one.name, bank, BITS[1::2] if lab.quick else BITS)
     section.add_table(f"{one.name}-bits", [("bits", *CELLS), *((row.bits, *to_cells(row)) for row in bits)],
                       f"The {one.name} with all modes and shapes of fewer bits; up to 8 they take one byte a component in the file, else two.", [("bits", *DATA), *((row.bits, *to_data(row)) for row in bits)], command)
-    describe_bits(section, one.name, bits)
+    section.conclude(describe_bits(one.name, bits))
+    if bargain := describe_bargain(one.name, rows, bits):
+        section.conclude(bargain)
     return rows, bits
 
 
-def describe_bits(section, name, bits):
+def describe_bits(name, bits):
+    """What shapes of so many bits are worth, one sentence."""
+    shipped = estimate_shipped_db(bits)
+    text = f"Rounding shapes to {SHIPPED_BITS} bits, as banks have them, is an error of {shipped:.0f} dB(A) in the {name}'s sound, by the 6 dB that a bit is worth: all that floats could gain; "
     enough = [row for row in bits[1:] if not row.difference.is_told]
-    text = f"Shapes of {SHIPPED_BITS} bits, as banks have them, are {abs(estimate_shipped_db(bits)):.0f} dB(A) below the {name}'s sound by the 6 dB that a bit is worth"
-    text += " (floats could gain no more than that); " if estimate_shipped_db(bits) < -60 else "; "
     if enough:
         least = min(enough, key=lambda row: row.bits)
-        text += f"{least.bits} bits are not told apart ({sounds.format_db(least.difference.error_db)} dB(A)), "
+        text += f"{least.bits} bits are the fewest that nobody tells from them ({sounds.format_db(least.difference.error_db)} dB(A))"
     else:
-        text += f"none of the coarser ones escapes the ear ({max(row.bits for row in bits[1:])} bits: {sounds.format_db(bits[1].difference.error_db)} dB(A)), "
+        text += f"none of the coarser ones escapes the ear ({bits[1].bits} bits: {sounds.format_db(bits[1].difference.error_db)} dB(A))"
     byte = next((row for row in bits if row.bits == 8), None)
-    text += f"and 8, one byte, make the bank {bits[0].bank_bytes / byte.bank_bytes:.1f} times smaller at {sounds.format_db(byte.difference.error_db)} dB(A). The CPU is that of all." if byte else "and take as much CPU."
-    section.conclude(text)
+    return text + (f"; with 8, one byte, the bank is {bits[0].bank_bytes / byte.bank_bytes:.1f} times smaller at {sounds.format_db(byte.difference.error_db)} dB(A)." if byte else ".")
+
+
+def describe_bargain(name, modes, bits):
+    """Whether coarser shapes or fewer modes are the better way to a smaller bank, one sentence; "" where nothing can be compared."""
+    byte = next((row for row in bits if row.bits == 8), None)
+    fitting = [row for row in modes if row.kept == "loudest" and byte and row.bank_bytes <= byte.bank_bytes]
+    if not fitting:
+        return ""
+    few = max(fitting, key=lambda row: row.modes)
+    better = "coarser shapes are" if byte.difference.distance_db < few.difference.distance_db else "fewer modes are"
+    return (f"Of the two ways to a smaller bank of the {name}, {better} the better one: all modes at 8 bits, {byte.bank_bytes / 1e6:.2f} MB, are {byte.difference.distance_db:.2f} dB off, "
+            f"the {few.modes} loudest at {SHIPPED_BITS} bits, {few.bank_bytes / 1e6:.2f} MB, {few.difference.distance_db:.2f} dB.")
+
+
+def measure_papers(lab, counts=(800, 200, 50)):
+    """([Row], sentence) of the body of many modes: what is lost at the numbers of modes that the papers name."""
+    stone = make_stone(lab)
+    rows = measure_modes(lab, "stone-papers", solve(lab, [stone])["stone"], counts, ("loudest",))
+    return rows, describe_lost("stone", rows, counts)
 
 
 def add_charts(section, results):

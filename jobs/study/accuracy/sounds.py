@@ -13,9 +13,13 @@ import json
 import math
 import pathlib
 
-import numpy as np
+import measuring
+from errors import InputError, RunError
 
-from errors import RunError
+try:
+    import numpy as np
+except ImportError:
+    raise InputError("this section of the study needs numpy; install python3-numpy") from None
 
 REFERENCE_PA = 20e-6
 EAR_S = 0.2
@@ -25,7 +29,13 @@ LOW_HZ, HIGH_HZ = 20.0, 20000.0
 # Full scale per pascal, in files of floating point: so small that nothing is ever scaled down.
 GAIN_PER_PA = 1e-6
 # Below these nobody tells two sounds apart (above).
+NONE_DB = -200.0  # the same but for the rounding of these sums
 ERROR_LIMIT_DB, DISTANCE_LIMIT_DB, LOUDNESS_LIMIT_DB = -40.0, 1.0, 1.0
+
+
+def find_spread(values):
+    """Half the distance of the extremes over the median; 0 of what took no time."""
+    return measuring.find_spread(values) if measuring.find_median(values) > 0 else 0.0
 
 
 @dataclasses.dataclass
@@ -49,11 +59,15 @@ class Played:
 
     @property
     def spread(self):
-        middle = float(np.median(self.playing_s))
-        return (max(self.playing_s) - min(self.playing_s)) / 2 / middle if middle > 0 and len(self.playing_s) > 1 else 0.0
+        return find_spread(self.playing_s)
+
+    @property
+    def physics_spread(self):
+        return find_spread(self.physics_s)
 
     @property
     def physics_ms(self):
+        """The same of the physics."""
         return 1e3 * float(np.median(self.physics_s))
 
 
@@ -69,14 +83,19 @@ class Difference:
         return self.error_db > ERROR_LIMIT_DB and (self.distance_db > DISTANCE_LIMIT_DB or abs(self.loudness_db) > LOUDNESS_LIMIT_DB)
 
     def to_cells(self):
-        return format_db(self.error_db), f"{self.distance_db:.2f}", f"{self.loudness_db:+.2f}"
+        return format_db(self.error_db), f"{self.distance_db:.2f}", format_change(self.loudness_db)
 
 
 HEAD = ("error, dB(A)", "log-spectral distance, dB", "loudness, dB(A)")
 
 
 def format_db(value):
-    return "none" if value < -299 else f"{value:.0f}"
+    return "none" if value < NONE_DB else f"{value:.0f}"
+
+
+def format_change(value):
+    """With its sign, and no minus before nothing."""
+    return f"{round(value, 2) + 0.0:+.2f}"
 
 
 # --- rendering
@@ -114,7 +133,7 @@ def play(lab, name, scene, repeats=1, contacts=None, record=None):
         lab.call(words, f"carillon-render {name}", cwd=folder)
         report = json.loads(report_file.read_text())
         playing.append(report["playing_cpu_s"] / report["duration_s"])
-        physics.append(report["physics_s"] / report["duration_s"])
+        physics.append(report["physics_cpu_s"] / report["duration_s"])
     try:
         sound = read_wav(wav.read_bytes(), wav)
     except ValueError as error:
