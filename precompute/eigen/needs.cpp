@@ -74,7 +74,7 @@ std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64
 }
 
 std::int64_t calc_dense_bytes(std::int64_t unknowns) {
-  constexpr std::int64_t kMatrices = 4;  // K, M, and the vectors as they were calculated and distributed
+  constexpr std::int64_t kMatrices = 6;  // K, M, two of LAPACK's own, and the vectors as they were calculated and distributed
   return kMatrices * 8 * unknowns * unknowns;
 }
 

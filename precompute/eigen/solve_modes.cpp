@@ -173,7 +173,7 @@ void BandSolver::solve_dense_band() {
     pairs = solve_dense(problem_.stiffness, problem_.mass);
   }
   modes_.factor = {};
-  modes_.factor.solver = "LAPACK dsygv (dense)";
+  modes_.factor.solver = "LAPACK dsygvd (dense)";
   modes_.factor.ordering = "none";
   const auto count_under = [&](double lambda) {
     return std::lower_bound(pairs.lambda.begin(), pairs.lambda.end(), lambda) - pairs.lambda.begin();
@@ -190,7 +190,7 @@ void BandSolver::solve_dense_band() {
   modes_.mechanism_count = count_under(low_ * 1e-4) - modes_.rigid_count;
   Proof& proof = modes_.proof;
   proof.found = modes_.band_count;
-  proof.method = fmt::format("all {} eigenvalues of the dense problem (LAPACK dsygv), counted", n_);
+  proof.method = fmt::format("all {} eigenvalues of the dense problem (LAPACK dsygvd), counted", n_);
   for (const double end : {low, high}) {
     double margin = std::numeric_limits<double>::infinity();
     for (const double lambda : pairs.lambda) margin = std::min(margin, std::abs(lambda - end) / end);
@@ -250,7 +250,8 @@ void BandSolver::solve_sparse_band() {
   make_counter();
   const Slice band = count_band();
   if (band.count() == 0) return describe_proof();
-  if (n_ <= kDenseRowsFull && 4 * band.below_high > n_) {
+  const std::int64_t last = std::min(band.below_high, band.below_low + options_.max_modes.value_or(band.count()));
+  if (n_ <= kDenseRowsFull && static_cast<double>(last) > kDenseShare * n_) {
     keeper_.set_counter(nullptr);
     counter_.reset();
     return solve_dense_band();

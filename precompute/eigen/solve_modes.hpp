@@ -95,7 +95,7 @@ struct Seconds {
 };
 
 struct FactorStatistics {
-  std::string solver;        // "carillon L D L^T", "MUMPS 5.5.1 L D L^T", "CHOLMOD L L^T", "LAPACK dsygv (dense)"
+  std::string solver;        // "carillon L D L^T", "MUMPS 5.5.1 L D L^T", "CHOLMOD L L^T", "LAPACK dsygvd (dense)"
   std::string ordering;      // "METIS nested dissection (given)", "PORD", ...
   std::int64_t entries = 0;  // stored entries of the factor, all ranks; 0 if the solver does not tell
   double flops = 0;          // of one numeric factorisation; 0 if unknown

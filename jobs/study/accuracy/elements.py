@@ -3,7 +3,7 @@ import collections
 import statistics
 
 from accuracy import cents, plots
-from accuracy.bodies import KINDS, find_kind
+from accuracy.bodies import KINDS
 from accuracy.section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
@@ -11,12 +11,12 @@ LEVELS = ((1, "one cent"), (10, "ten cents"), (100, "a semitone"))
 DEAR_NODES = 30000  # beyond, one repeat is enough to tell
 
 
-def measure(lab, bodies):
-    """{body: [(kind, Solve)]}, meshes from coarse to fine; two sizes that give the same mesh count once."""
+def measure(lab, bodies, kinds=None):
+    """{body's name: [(kind, Solve)]}, meshes from coarse to fine; two sizes that give the same mesh count once. kinds: names, all without them."""
     cases, order = {}, collections.defaultdict(list)
     for body in bodies:
         lab.say(f"meshing: {body.name}")
-        for kind in body.get_kinds():
+        for kind in [kind for kind in body.get_kinds() if not kinds or kind.name in kinds]:
             seen = set()
             for nodes in body.get_sizes(lab):
                 case = body.make_case(lab, kind, nodes)

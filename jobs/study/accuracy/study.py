@@ -8,7 +8,7 @@ from accuracy.lab import Lab
 from errors import InputError
 
 # One module a section, each with study(lab, bodies) -> Section and PROGRAMS, the programs it starts.
-SECTIONS = ("elements", "solver", "banks", "playing")
+SECTIONS = ("elements", "solver", "banks", "playing", "papers")
 
 
 def add_command(commands, read_count):
