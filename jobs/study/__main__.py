@@ -3,6 +3,7 @@
     carillon-study scaling JOB.json [-o FOLDER] [--ranks 1,2,4] [--nodes 2500,5000,10000] [--repeats 3]
     carillon-study scaling JOB.json --quick --record FILE | --check FILE
     carillon-study accuracy [--quick] [--on BODY...] [--only SECTION...] -o REPORT
+    carillon-study advise BODY --cents 5 [--seconds 10]
 
 Exit codes: 0 done, 2 the input cannot be used, 3 the work has grown, 4 the machine refused.
 """
@@ -16,7 +17,7 @@ import programs
 import report
 import scaling
 import work
-from accuracy import study
+from accuracy import advise, study
 from errors import InputError, RunError
 
 
@@ -41,7 +42,7 @@ def read_count(text):
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        raise InputError(message + "; carillon-study scaling --help says what there is")
+        raise InputError(f"{message}; {self.prog} --help says what there is")
 
 
 def make_parser():
@@ -63,6 +64,7 @@ def make_parser():
     one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: beside this program)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error")
     study.add_command(commands, read_count)
+    advise.add_command(commands)
     return parser
 
 
@@ -72,6 +74,8 @@ def run(arguments):
         made = study.run(options)
         print(json.dumps(made, indent=2) if options.json else made["report"], flush=True)
         return 0
+    if options.command == "advise":
+        return advise.run(options)
     if not options.json:
         run_study(options)
         return 0

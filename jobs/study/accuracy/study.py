@@ -1,14 +1,15 @@
 """`carillon-study accuracy`: which sections, on which bodies, in which order."""
 import importlib
+import pathlib
 import shlex
 
 import programs
-from accuracy import bodies, report
+from accuracy import advice, bodies, report
 from accuracy.lab import Lab
 from errors import InputError
 
 # One module a section, each with study(lab, bodies) -> Section and PROGRAMS, the programs it starts.
-SECTIONS = ("elements", "solver", "banks", "playing", "papers")
+SECTIONS = ("elements", "solver", "banks", "playing", "papers", "advice")
 
 
 def add_command(commands, read_count):
@@ -25,6 +26,7 @@ def add_command(commands, read_count):
     one.add_argument("--repeats", type=read_count, help="of every case, all cases in turn (default: 2; with --quick 1)")
     one.add_argument("--surface", metavar="FILE", default=bodies.BUNNY_SURFACE, help=f"the bunny's surface (default: {bodies.BUNNY_SURFACE}, of Debian's glmark2-data)")
     one.add_argument("--timeout", type=float, default=3600, help="seconds that one run may take (default: 3600)")
+    one.add_argument("--write-advice", metavar="FILE", help="also write what carillon study advise foresees from, for its --advice")
     one.add_argument("--bin", metavar="FOLDER", help="where the programs are (default: beside this one)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output: the report's path and what it says in words")
 
@@ -47,5 +49,7 @@ def run(options):
         sections.append(module.study(lab, on))
     words = ["carillon", "study", "accuracy", *(["--quick"] if options.quick else []), *(["--on", *options.on] if options.on else []), *(["--only", *options.only] if options.only else []),
              *(["--repeats", str(options.repeats)] if options.repeats else []), "-o", "REPORT"]
+    if options.write_advice:
+        advice.write(lab, on, pathlib.Path(options.write_advice))
     page = report.write(lab, sections, shlex.join(words))
     return {"report": str(page), "findings": {section.name: section.findings for section in sections}}

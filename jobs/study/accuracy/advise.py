@@ -1,0 +1,385 @@
+"""`carillon study advise BODY --cents 5 [--seconds 10]`: the setting to use, what it will reach and cost, and afterwards what it did.
+
+Bodies of the study are foreseen from what the study measured on them; others from two coarse solves of their own (forecast.Probe). Seconds
+of another machine are scaled by one small solve that both made.
+"""
+import argparse
+import contextlib
+import dataclasses
+import difflib
+import json
+import math
+import os
+import pathlib
+import pkgutil
+import re
+import shutil
+import sys
+
+import programs
+import scaling
+from accuracy import bodies, forecast, targets
+from accuracy.lab import Case, Lab
+from errors import InputError, RunError
+
+RANKS_FROM_S = 4.0  # CPU seconds from which a second rank saves more of the clock than its start takes
+PROBE_NODES, PROBE_GROWTH, MOST_PROBE_NODES = {"shape": 1000, "surface": 6000}, {"shape": 3, "surface": 2}, 60000
+TRIAL_TOLERANCE = 1e-6
+START_S = 0.15  # CPU seconds of starting, which no station of a run's record claims
+BUDGET_MARGIN = 0.85  # of --seconds: what is aimed at
+CHECK_GROWTH = 2.5  # of the nodes, for --check
+MOST_CENTS, MOST_SECONDS = 2400.0, 1e6
+PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
+
+
+@dataclasses.dataclass
+class Outcome:
+    """What the run came to. how: "known" frequencies, a "finer" mesh, or error "bars"."""
+    cents: float
+    mode: int
+    bar: float
+    how: str
+    cpu_s: float
+    wall_s: float
+    nodes: int
+    modes: int
+
+
+class KnownTarget:
+    """A body of the study."""
+
+    def __init__(self, body, advice):
+        self.body, self.name, self.kind, self.has_surface = body, body.name, "study", body.surface
+        self.notes = [f"the study's {body.name}: {body.summary}; its lowest {body.modes} modes"]
+        self.truth_hz = list(body.truth.freq_hz) if body.truth else advice.content.get("truths", {}).get(body.name, {}).get("freq_hz", [])
+        self.truth_text = body.truth.source if body.truth else "the study's finest curved T10, extrapolated"
+
+    def make_case(self, lab, setting, name):
+        element, _, mass = setting.element.partition(" ")
+        kind = bodies.find_kind(f"T4 {mass or 'consistent'}" if element == "T4" else "T10 curved" if self.body.round else "T10 straight")
+        case = self.body.make_case(lab, kind, setting.nodes, setting.ranks, name, solver={"tolerance": setting.tolerance})
+        return case
+
+
+class OwnTarget:
+    """Any other body: a shape, a surface, a mesh, a job."""
+
+    def __init__(self, target):
+        self.target, self.name, self.kind, self.notes, self.truth_hz = target, target.name, target.kind, target.notes, []
+        self.has_surface = target.kind == "surface"
+
+    def make_case(self, lab, setting, name):
+        return Case(f"{self.name}, {name}", self.target.make_job(setting), setting.ranks)
+
+
+class Adviser:
+    def __init__(self, options, tools, advice):
+        self.options, self.advice = options, advice
+        self.target = self.find_target(options.body)
+        self.lab = Lab(options.out, tools, repeats=1, surface=options.surface)
+        self.lab.say = lambda text: None  # what there is to say is said here
+        self.cores = len(os.sched_getaffinity(0))
+        self.probe, self.probe_cpu_s = None, 0.0
+        self.pace = 1.0  # CPU seconds of this machine over those of the study's
+
+    def find_target(self, word):
+        known = bodies.make_bodies()
+        if word in known:
+            if self.options.wall or self.options.height or self.options.band:
+                raise InputError(f"{word}: --wall, --height and --band are for bodies of your own; the study's has its own")
+            return KnownTarget(bodies.choose([word], self.options.surface)[0], self.advice)
+        target = targets.find_target(word, self.options.wall, self.options.height, self.options.band)
+        if target is None:
+            near = difflib.get_close_matches(word, [*known, *targets.SHAPES], 1)
+            raise InputError(f"{word}: there is no such file, and no body of the study ({', '.join(known)}) or shape ({', '.join(targets.SHAPES)})" + (f'; did you mean "{near[0]}"?' if near else ""))
+        return OwnTarget(target)
+
+    # --- before
+
+    def calibrate(self):
+        """How fast this machine is beside the study's, by the study's small solve."""
+        known = self.advice.get_calibration()
+        solve = self.lab.measure([Case("calibration", known["job"])], 2, is_fresh=True)["calibration"]
+        self.pace = min(max(min(solve.cpu_s) / known["cpu_s"], 0.05), 20.0)
+
+    def find_curves(self):
+        """The curves to choose from, seconds of this machine."""
+        curves = self.advice.curves.get(self.target.name) if self.target.kind == "study" else None
+        if curves is None:
+            return [self.try_coarse().make_curve()]
+        return [forecast.Curve(curve.element, [dataclasses.replace(s, cpu_s=s.cpu_s * self.pace) for s in curve.samples]) for curve in curves.values() if curve.element != "T10 straight"]
+
+    def try_mesh(self):
+        """[(Setting, Solve, cents)] of a mesh file with both elements: it is what it is, and no finer one can be made of it here."""
+        tried = []
+        for element in ("T4", "T10"):
+            setting = forecast.Setting(element, 0, forecast.find_tolerance(self.options.cents or 1.0))
+            solve = self.solve(setting, f"{element} on the mesh file")
+            self.probe_cpu_s += solve.cpu
+            if solve.freq_hz:
+                tried.append((setting, solve, max(find_bars(solve)) / self.advice.find_usual_ratio(element)))
+        if not tried:
+            raise InputError(f"{self.target.name}: no mode was found in the band; give another band (--band LOW,HIGH, or \"band_hz\" of the job)")
+        return tried
+
+    def choose_for_mesh(self):
+        cents, seconds = self.options.cents, self.options.seconds
+        tried = [forecast.Forecast(dataclasses.replace(setting, nodes=solve.nodes), worst, solve.cpu, min(solve.wall_s)) for setting, solve, worst in self.try_mesh()]
+        affordable = [f for f in tried if seconds is None or f.cpu_s <= seconds]
+        best = min(tried, key=lambda f: f.cents)
+        if not affordable:
+            raise InputError(f"{self.target.name}: {seconds:g} CPU s are too few for this mesh: T4 takes {tried[0].cpu_s:.2g}; give more, or a coarser mesh")
+        enough = [f for f in affordable if cents is not None and f.cents <= cents]
+        if enough:
+            return min(enough, key=lambda f: f.cpu_s), ""
+        if cents is not None and seconds is None:
+            raise InputError(f"{self.target.name}: {cents:g} cents are out of reach of this mesh file, which comes to about {best.cents:.2g} with {best.setting.element} ({best.cpu_s:.2g} CPU s); "
+                             f"give a finer mesh, the surface or shape itself, or --cents {math.ceil(best.cents * 110) / 100:g}")
+        chosen = min(affordable, key=lambda f: f.cents)
+        return chosen, "" if cents is None else f"{cents:g} cents are out of reach of this mesh file within {seconds:g} CPU s; about {chosen.cents:.2g} can be had"
+
+    def try_coarse(self):
+        """Solves of a body that the study does not have, each on three times the nodes of the one before, until what is asked comes within reach."""
+        self.probe = forecast.Probe(self.advice, "T10")
+        kind = "surface" if self.target.has_surface else "shape"
+        nodes, growth = PROBE_NODES[kind], PROBE_GROWTH[kind]
+        while True:
+            try:
+                trial = self.try_one(nodes)
+            except RunError as error:
+                least = re.search(r"at least about (\d+)", str(error))  # nodes that the mesher needs for a thin wall
+                if not least or error.code != 2 or int(least.group(1)) <= nodes:
+                    raise
+                nodes = math.ceil(1.05 * int(least.group(1)))
+                continue
+            self.probe_cpu_s += trial.cpu_s
+            self.probe.trials.append(trial)
+            if nodes * growth > MOST_PROBE_NODES or self.is_within_reach():
+                break
+            nodes *= growth
+        if not trial.freq_hz:
+            raise InputError(f"{self.target.name}: no mode was found in the band on {trial.nodes:,} nodes; give another band (--band LOW,HIGH, or \"band_hz\" of the job)")
+        return self.probe
+
+    def is_within_reach(self):
+        """Whether the trials tell enough: the cents, or all that the seconds buy, are no more than a step away."""
+        trials, options = self.probe.trials, self.options
+        if len(trials) < 2 or not trials[-2].freq_hz:
+            return False
+        curve = self.probe.make_curve()
+        if options.cents is not None and curve.find_nodes(options.cents) is not None:
+            return True
+        return options.seconds is not None and curve.predict_cpu(curve.get_most_nodes()) > options.seconds
+
+    def try_one(self, nodes):
+        return self.make_trial(self.solve(forecast.Setting("T10", nodes, TRIAL_TOLERANCE), f"trial of {nodes} nodes"), nodes)
+
+    def make_trial(self, solve, nodes):
+        stations = sum(station.get("cpu_seconds", station["seconds"]) for station in solve.record["stations"])
+        mesh_s = max(solve.cpu - stations - START_S, 0.0) if self.target.kind == "surface" else 0.0
+        return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, find_bars(solve), solve.cpu, mesh_s)
+
+    def solve(self, setting, name):
+        case = self.target.make_case(self.lab, setting, name)
+        return self.lab.measure([case], is_fresh=True)[case.name]
+
+    def make_forecast(self, curve, nodes):
+        cents = curve.predict_cents(nodes)
+        cpu_s = curve.predict_cpu(nodes)
+        ranks, (more, wall) = 1, (1.0, 1.0)
+        for count in range(2, self.cores + 1):
+            if cpu_s >= RANKS_FROM_S and self.advice.has_ranks(count):
+                ranks, (more, wall) = count, self.advice.find_rank_cost(count)
+        setting = forecast.Setting(curve.element, nodes, forecast.find_tolerance(self.options.cents or cents), ranks)
+        return forecast.Forecast(setting, cents, cpu_s * more, cpu_s * wall)
+
+    def choose(self):
+        """(Forecast, sentence): the cheapest setting that meets the cents, or the best within the seconds."""
+        if self.target.kind == "mesh":
+            return self.choose_for_mesh()
+        cents, seconds = self.options.cents, self.options.seconds
+        curves = self.find_curves()
+        best = None
+        if cents is not None:
+            found = [self.make_forecast(curve, nodes) for curve in curves if (nodes := curve.find_nodes(cents)) is not None]
+            best = min(found, key=lambda f: f.cpu_s, default=None)
+            if best is None and seconds is None:
+                raise InputError(self.describe_reach(curves, cents))
+            if best is not None and (seconds is None or best.cpu_s <= seconds):
+                return best, ""
+        affordable = [self.make_forecast(curve, nodes) for curve in curves if (nodes := curve.find_affordable(BUDGET_MARGIN * seconds)) is not None]
+        affordable = [f for f in affordable if f.cpu_s <= seconds] or affordable
+        if not affordable:
+            least = min((curve.predict_cpu(curve.samples[0].nodes) for curve in curves))
+            raise InputError(f"{self.target.name}: {seconds:g} CPU s are too few: the coarsest mesh takes about {least:.2g}; give --seconds {math.ceil(20 * least) / 10:g} or more")
+        chosen = min(affordable, key=lambda f: f.cents)
+        if cents is None:
+            return chosen, ""
+        price = f"would take about {best.cpu_s:.1f} CPU s" if best else "are out of reach"
+        return chosen, f"{cents:g} cents {price}; in {seconds:g} CPU s about {chosen.cents:.2g} can be had"
+
+    def describe_reach(self, curves, cents):
+        finest = min((self.make_forecast(curve, math.floor(curve.get_most_nodes())) for curve in curves), key=lambda f: f.cents)
+        least = math.ceil(finest.cents / forecast.GOAL * 100) / 100
+        return (f"{self.target.name}: {cents:g} cents are out of reach of what the study can foresee: the finest mesh, {finest.setting.nodes:,} nodes, comes to about {finest.cents:.2g} cents in "
+                f"{finest.cpu_s:.0f} CPU s; give --cents {least:g} or more")
+
+    # --- after
+
+    def judge(self, setting, solve):
+        bars = find_bars(solve)
+        bar = max(bars)
+        if self.target.truth_hz:
+            errors = [abs(1200 * math.log2(f / true)) for f, true in zip(solve.freq_hz, self.target.truth_hz)]
+            how = "known"
+        elif self.options.check:
+            finer = self.solve(dataclasses.replace(setting, nodes=round(CHECK_GROWTH * setting.nodes)), "finer mesh, to check")
+            slope = self.probe.find_slope(*self.probe.trials[-2:]) if self.probe else 4 / 3
+            # What the finer mesh is wrong itself is made up for by the rate.
+            errors = [abs(1200 * math.log2(f / fine)) / (1 - CHECK_GROWTH**-slope) for f, fine in zip(solve.freq_hz, finer.freq_hz)]
+            how = "finer"
+        else:
+            worst = self.probe.judge(self.make_trial(solve, setting.nodes)) if self.probe else bar / self.advice.find_usual_ratio()
+            errors = [worst * b / bar for b in bars]
+            how = "bars"
+        worst = max(errors)
+        return Outcome(worst, errors.index(worst) + 1, bar, how, solve.cpu, min(solve.wall_s), solve.nodes, len(solve.freq_hz))
+
+    def keep(self, solve):
+        """The job and its bank, under the body's name in the folder."""
+        name = pathlib.Path(self.target.name).stem
+        bank = self.lab.out / f"{name}.hdf"
+        job = json.loads((solve.bank.parent / "job.json").read_text()) | {"bank": bank.name}
+        shutil.copyfile(solve.bank, bank)
+        (self.lab.out / f"{name}.json").write_text(json.dumps(job, indent=1) + "\n")
+        return self.lab.out / f"{name}.json", bank
+
+
+def find_bars(solve):
+    return [a + b for a, b in zip(solve.algebraic_cents, solve.discretisation_cents)]
+
+
+# --- what is said
+
+HOW = {"known": "against frequencies that are known without a mesh", "finer": "against a finer mesh, what that one is wrong itself made up for", "bars": "by its error bars over the factor by which such bars are too long"}
+
+
+def show(cents):
+    return f"{cents:.2g}" if cents < 10 else f"{cents:.0f}"
+
+
+def describe_setting(setting, kind):
+    element, _, mass = setting.element.partition(" ")
+    size = "" if kind == "mesh" else f", {setting.nodes:,} nodes"
+    return (f"{element}{' with curved sides' if element == 'T10' and kind != 'mesh' else ''}, {mass or 'consistent'} mass{size}, tolerance {setting.tolerance:g}, {setting.ranks} rank{'s' if setting.ranks > 1 else ''}")
+
+
+def describe_prediction(adviser, found, remark):
+    options = adviser.options
+    asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
+    lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]] + [f"asked:     {asked}"]
+    if remark:
+        lines.append(f"           {remark}")
+    if adviser.probe_cpu_s:
+        tried = "both elements" if adviser.target.kind == "mesh" else "coarse meshes of this body, up to {:,} nodes".format(adviser.probe.trials[-1].nodes)
+        lines.append(f"tried:     {tried}, {adviser.probe_cpu_s:.2f} CPU s")
+    wall = f", {found.wall_s:.2g} s by the clock" if found.setting.ranks > 1 else ""
+    lines.append(f"use:       {describe_setting(found.setting, adviser.target.kind)}")
+    lines.append(f"predicted: at most {show(found.cents)} cents, {found.cpu_s:.2g} CPU s{wall} (this machine takes {adviser.pace:.2f} times the study's seconds)")
+    return lines
+
+
+def describe_outcome(outcome, options, found):
+    is_met = options.cents is None or outcome.cents <= options.cents
+    lines = [f"reached:   {show(outcome.cents)} cents (mode {outcome.mode} of {outcome.modes}), {HOW[outcome.how]}; error bars up to {show(outcome.bar)} cents",
+             f"           {outcome.cpu_s:.2f} CPU s, {outcome.cpu_s / found.cpu_s:.2f} times the prediction, {outcome.wall_s:.2f} s by the clock, {outcome.nodes:,} nodes"]
+    if not is_met:
+        lines.append(f"           more than was asked; ask for {show(0.7 * options.cents * options.cents / outcome.cents)} to be sure")
+    return lines
+
+
+def make_document(adviser, found, remark, outcome, job, bank):
+    options, setting = adviser.options, found.setting
+    element, _, mass = setting.element.partition(" ")
+    document = {"body": adviser.target.name, "kind": adviser.target.kind, "notes": adviser.target.notes, "asked": {"cents": options.cents, "cpu_seconds": options.seconds}, "remark": remark or None,
+                "setting": {"element": element, "mass": mass or "consistent", "nodes": setting.nodes, "tolerance": setting.tolerance, "ranks": setting.ranks},
+                "predicted": {"cents": found.cents, "cpu_seconds": found.cpu_s, "wall_seconds": found.wall_s}, "probe_cpu_seconds": adviser.probe_cpu_s, "machine_pace": adviser.pace, "reached": None}
+    if outcome:
+        document["reached"] = {"cents": outcome.cents, "mode": outcome.mode, "how": outcome.how, "worst_bar_cents": outcome.bar, "cpu_seconds": outcome.cpu_s, "wall_seconds": outcome.wall_s,
+                               "nodes": outcome.nodes, "modes": outcome.modes, "is_met": options.cents is None or outcome.cents <= options.cents}
+        document |= {"job": str(job), "bank": str(bank)}
+    return document
+
+
+def read_packed_advice(path=None):
+    """That of the package, or of a file that `carillon study accuracy --write-advice` wrote."""
+    if path is None:
+        return forecast.read_advice(pkgutil.get_data(__package__, "advice.json").decode())
+    mend = "carillon study accuracy --write-advice FILE writes one"
+    try:
+        return forecast.read_advice(scaling.read_text(path, "advice", mend))
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(f"{path}: {error}; {mend}") from None
+
+
+def run(options):
+    """Exit code 0; what goes wrong is raised."""
+    if options.cents is None and options.seconds is None:
+        raise InputError("give --cents, how wrong a frequency may be, or --seconds, how much CPU time may be spent, or both")
+    adviser = Adviser(options, programs.find_all(options.bin, PROGRAMS), read_packed_advice(options.advice))
+    with contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext():
+        adviser.calibrate()
+        found, remark = adviser.choose()
+        print("\n".join(describe_prediction(adviser, found, remark)), flush=True)
+        outcome = job = bank = None
+        if not options.dry_run:
+            solve = adviser.solve(found.setting, "as advised")
+            outcome = adviser.judge(found.setting, solve)
+            job, bank = adviser.keep(solve)
+            print("\n".join(describe_outcome(outcome, options, found) + [f"kept:      {job}, {bank}"]), flush=True)
+    if options.json:
+        print(json.dumps(make_document(adviser, found, remark, outcome, job, bank), indent=2))
+    return 0
+
+
+def read_positive(most, unit):
+    def read(text):
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and 0 < value <= most):
+            raise argparse.ArgumentTypeError(f"{text!r}: give a number of {unit} above 0, {most:g} at most")
+        return value
+    return read
+
+
+def read_band(text):
+    try:
+        low, high = map(float, text.split(","))
+    except ValueError:
+        low = high = math.nan
+    if not 0 < low < high < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r}: give two frequencies in Hz, like 20,20000")
+    return low, high
+
+
+def add_command(commands):
+    one = commands.add_parser("advise", help="the setting to use for so many cents or seconds, what it will reach and cost, and afterwards what it did",
+                              description="Says which element, mass, mesh size, tolerance and ranks to use for a body, with the error and the CPU seconds to expect, then solves it so and says what "
+                              "they were. Bodies of the study are foreseen from its measurements; others are tried on two coarse meshes first.")
+    one.add_argument("body", metavar="BODY", help=f"a body of the study ({', '.join(bodies.make_bodies())}), a shape ({', '.join(targets.SHAPES)}), a job (.json), a surface (.obj .stl .ply .off) or a mesh file; "
+                     "steel where no material is given")
+    one.add_argument("--cents", type=read_positive(MOST_CENTS, "cents"), metavar="C", help="the largest error that any frequency of the band may have")
+    one.add_argument("--seconds", type=read_positive(MOST_SECONDS, "CPU seconds"), metavar="S", help="CPU seconds, of all ranks, that the solve may take (trials and calibration beside it)")
+    one.add_argument("--dry-run", action="store_true", help="say what to use, and do not solve (a body of your own is tried on its coarse meshes all the same)")
+    one.add_argument("--check", action="store_true", help="a body whose frequencies nobody knows: solve a mesh of 2.5 times the nodes as well, and compare")
+    one.add_argument("--wall", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: hollow, with a wall of so many metres")
+    one.add_argument("--height", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: scaled to this height")
+    one.add_argument("--band", type=read_band, metavar="LOW,HIGH", help="Hz; default: the job's, else 20,20000")
+    one.add_argument("-o", "--out", metavar="FOLDER", default="advice", help="where the job, the bank and what was tried go (default: advice)")
+    one.add_argument("--surface", metavar="FILE", default=bodies.BUNNY_SURFACE, help="the bunny's surface (default: that of Debian's glmark2-data)")
+    one.add_argument("--advice", metavar="FILE", help="measurements of another study: carillon study accuracy --write-advice FILE (default: those in this program)")
+    one.add_argument("--bin", metavar="FOLDER", help="where the programs are (default: beside this one)")
+    one.add_argument("--json", action="store_true", help="one JSON document on standard output; the rest on standard error")
+    return one

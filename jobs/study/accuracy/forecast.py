@@ -1,0 +1,280 @@
+"""What a setting will reach and cost, foreseen from what the study measured (advice.json). Pure: runs nothing.
+
+A curve is one body with one element on meshes of several sizes: the largest error of the band, the largest error bar, CPU seconds. Between
+two sizes all are powers of the nodes. A body that the study does not have is measured on two coarse meshes first (Probe): how much its
+frequencies fall from one to the other, and its error bars, say how wrong the finer one is.
+"""
+import dataclasses
+import json
+import math
+
+FORMAT = 1
+GOAL = 0.8  # of what was asked: aimed at, for meshes come in steps and rates are not quite steady
+MOST_FINER = 6.0  # times the nodes of the finest mesh that was measured: no prediction goes further
+MOST_FINER_TRIAL = 4.0  # times those of a body's finest trial
+START_S, STEEPEST_CPU = 0.1, 1.8  # CPU seconds of starting, and the power of the nodes by which what follows grows at most
+DISTRUST = 0.9  # of a power that coarse meshes show: the next step is seldom as steep
+LEAST_STEEP, STEEPEST = 0.3, 4 / 2  # powers of the nodes by which errors fall: order four, and bodies that are refined in two directions
+LOOSEST_TOLERANCE, STRICTEST_TOLERANCE = 1e-6, 1e-12
+CENTS_OF_RESIDUAL = 600 / math.log(2)  # of a frequency, for a relative residual of lambda
+
+
+class OutOfReach(Exception):
+    """Nothing that can be foreseen meets what was asked."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Setting:
+    element: str  # "T4", "T4 lumped", "T10" (curved where the body is)
+    nodes: int  # asked of the mesher, mid-side nodes among them
+    tolerance: float
+    ranks: int = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Forecast:
+    setting: Setting
+    cents: float  # the largest error of the band
+    cpu_s: float  # of all ranks, on this machine
+    wall_s: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Sample:
+    """One mesh of a curve. Errors and bars are the largest of the band, in cents."""
+    nodes: int  # asked of the mesher
+    unknowns: int
+    modes: int
+    cents: float
+    bar: float
+    cpu_s: float  # of one rank, on the machine of the study
+
+
+def interpolate(points, x, least_slope, most_slope):
+    """points: [(x, y)] by x, both positive: y as powers of x between them; beyond them the slope at the end, held between two limits."""
+    if len(points) == 1:
+        return points[0][1]
+    index = next((i for i in range(1, len(points) - 1) if x < points[i][0]), len(points) - 1)
+    (x_0, y_0), (x_1, y_1) = points[index - 1], points[index]
+    slope = math.log(y_1 / y_0) / math.log(x_1 / x_0)
+    if x > points[-1][0]:
+        x_0, y_0 = points[-1]
+    if not x_0 <= x <= x_1:
+        slope = min(max(slope, least_slope), most_slope)
+    return y_0 * (x / x_0) ** slope
+
+
+class Curve:
+    """Samples of one body and one element, by nodes."""
+
+    def __init__(self, element, samples, is_measured=True):
+        self.element, self.is_measured = element, is_measured
+        self.samples = []
+        for sample in sorted(samples, key=lambda s: s.nodes):
+            if not self.samples or sample.nodes > self.samples[-1].nodes:
+                self.samples.append(sample)
+        # An error that is small by chance (where one sign turns into the other) promises nothing for coarser meshes.
+        worst, self.errors = 0.0, []
+        for sample in reversed(self.samples):
+            worst = max(worst, sample.cents)
+            self.errors.append((sample.nodes, max(worst, 1e-9)))
+        self.errors.reverse()
+
+    def get_most_nodes(self):
+        return self.samples[-1].nodes * (MOST_FINER if self.is_measured else 1.0)
+
+    def predict_cents(self, nodes):
+        return interpolate(self.errors, nodes, -STEEPEST, 0.0)
+
+    def predict_cpu(self, nodes):
+        return interpolate([(s.nodes, s.cpu_s) for s in self.samples], nodes, 0.3, 1.7)
+
+    def find_nodes(self, cents):
+        """The fewest nodes foreseen to be no more than `cents` wrong; a mesh that was measured to be so goes before one that is foreseen. None: out of reach."""
+        for (nodes, error), after in zip(self.errors, [*self.errors[1:], None]):
+            if error <= (0.95 if self.is_measured else GOAL) * cents:
+                return nodes
+            if after and after[1] <= GOAL * cents:
+                found = bisect(lambda n: self.predict_cents(n) <= GOAL * cents, nodes, after[0])
+                return after[0] if self.is_measured and found > 0.85 * after[0] else math.ceil(found)
+        most = self.get_most_nodes()
+        if self.predict_cents(most) > GOAL * cents:
+            return None
+        return math.ceil(bisect(lambda n: self.predict_cents(n) <= GOAL * cents, self.samples[-1].nodes, most))
+
+    def find_affordable(self, cpu_s):
+        """The most nodes for the CPU seconds; None when the coarsest mesh takes more."""
+        if self.samples[0].cpu_s > cpu_s:
+            return None
+        most = self.get_most_nodes()
+        if self.predict_cpu(most) <= cpu_s:
+            return math.floor(most)
+        found = bisect(lambda n: self.predict_cpu(n) > cpu_s, self.samples[0].nodes, most)
+        measured = [s.nodes for s in self.samples if 0.85 * found < s.nodes <= found]
+        return measured[-1] if measured else math.floor(found)
+
+
+def bisect(is_beyond, low, high):
+    """The least x of low .. high for which is_beyond(x), which stays so from there on."""
+    for _ in range(50):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if is_beyond(middle) else (middle, high)
+    return high
+
+
+class CpuModel:
+    """CPU seconds of one rank by unknowns and modes, fitted to all samples of an element: starting, reading and assembly, error bars and shapes, solves, factorisations."""
+
+    def __init__(self, samples):
+        self.weights = fit_positive([[term / s.cpu_s for term in self.list_terms(s.unknowns, s.modes)] for s in samples])
+
+    @staticmethod
+    def list_terms(unknowns, modes):
+        n = unknowns / 1e4
+        return [1.0, n, n * modes / 100, n ** (4 / 3) * (modes / 100 + 1), n**1.7]
+
+    def predict(self, unknowns, modes):
+        return sum(w * term for w, term in zip(self.weights, self.list_terms(unknowns, modes)))
+
+
+def fit_positive(rows):
+    """Weights, none negative, for which every row times the weights is as near to 1 as can be: coordinate descent (Lawson and Hanson's problem, convex)."""
+    weights = [0.0] * len(rows[0])
+    squares = [sum(row[j] ** 2 for row in rows) for j in range(len(weights))]
+    left = [1.0] * len(rows)
+    for _ in range(5000):
+        largest = 0.0
+        for j, square in enumerate(squares):
+            if square == 0.0:
+                continue
+            new = max(0.0, weights[j] + sum(row[j] * r for row, r in zip(rows, left)) / square)
+            step = new - weights[j]
+            if step:
+                left = [r - step * row[j] for row, r in zip(rows, left)]
+                weights[j] = new
+                largest = max(largest, abs(step) * math.sqrt(square))
+        if largest < 1e-9:
+            break
+    return weights
+
+
+def find_tolerance(cents):
+    """The loosest power of ten whose residual is worth no more than a hundredth of what is asked, within what suits mode shapes."""
+    power = math.floor(math.log10(max(0.01 * cents / CENTS_OF_RESIDUAL, STRICTEST_TOLERANCE)) + 1e-9)
+    return min(max(10.0**power, STRICTEST_TOLERANCE), LOOSEST_TOLERANCE)
+
+
+class Advice:
+    """What the study measured: curves by body and element, CPU models by element, bars over errors."""
+
+    def __init__(self, content):
+        self.content = content
+        self.curves = {}
+        for body, rows in content["bodies"].items():
+            for element in {row["element"] for row in rows}:
+                samples = [Sample(row["nodes"], row["unknowns"], row["modes"], row["worst_cents"], row["bar_cents"], row["cpu_s"]) for row in rows if row["element"] == element]
+                self.curves.setdefault(body, {})[element] = Curve(element, samples)
+        self.models = {}
+        for element in {element for curves in self.curves.values() for element in curves}:
+            self.models[element] = CpuModel([s for curves in self.curves.values() if element in curves for s in curves[element].samples])
+
+    def get_calibration(self):
+        return self.content["calibration"]
+
+    def find_bar_ratios(self, element, without=None):
+        """Sorted largest bar over largest error of all samples that are neither all wrong nor rounding; `without`: a body that is left out."""
+        return sorted(s.bar / s.cents for body, curves in self.curves.items() if body != without and element in curves for s in curves[element].samples if 0.02 < s.cents < 300)
+
+    def find_usual_ratio(self, element="T10"):
+        return find_quantile(self.find_bar_ratios(element), 0.25)
+
+    def has_ranks(self, ranks):
+        row = self.content.get("ranks", {}).get(str(ranks))
+        return bool(row) and not row["crowded"] and row["wall"] < 0.9
+
+    def find_rank_cost(self, ranks):
+        """(CPU, wall clock) of so many ranks over those of one, as the study measured them."""
+        row = self.content.get("ranks", {}).get(str(ranks))
+        return (row["cpu"], row["wall"]) if row else (1.0, 1.0)
+
+
+def find_quantile(values, part):
+    """Of a sorted list, interpolated."""
+    place = part * (len(values) - 1)
+    low = math.floor(place)
+    high = min(low + 1, len(values) - 1)
+    return values[low] + (place - low) * (values[high] - values[low])
+
+
+def read_advice(text):
+    """Raises ValueError when this is no advice file of this version."""
+    content = json.loads(text)
+    if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("bodies"), dict):
+        raise ValueError(f"no advice of format {FORMAT}")
+    return Advice(content)
+
+
+@dataclasses.dataclass
+class Trial:
+    """One coarse solve of a body that the study does not have."""
+    nodes: int
+    unknowns: int
+    freq_hz: list
+    bars: list
+    cpu_s: float
+    mesh_s: float  # of these, meshing
+
+
+def find_fall(coarse_hz, fine_hz):
+    """The largest distance in cents between modes of the same number, counted from the lowest."""
+    return max((abs(1200 * math.log2(a / b)) for a, b in zip(coarse_hz, fine_hz)), default=0.0)
+
+
+class Probe:
+    """A body unknown to the study, by trials with T10 from coarse to fine, two at least."""
+
+    def __init__(self, advice, element):
+        self.element, self.model, self.trials = element, advice.models[element], []
+        ratios = advice.find_bar_ratios(element)
+        self.usual, self.least = find_quantile(ratios, 0.5), max(find_quantile(ratios, 0.02), 1.0)  # bars over errors
+
+    def find_slope(self, coarse, fine):
+        """The power of the nodes by which error bars fell between two trials, within what theory has, and a little less."""
+        count = min(len(coarse.bars), len(fine.bars))
+        bars = max(coarse.bars[:count], default=1.0), max(fine.bars[:count], default=1.0)
+        slope = DISTRUST * math.log(bars[0] / max(bars[1], 1e-9)) / math.log(fine.nodes / coarse.nodes)
+        return min(max(slope, LEAST_STEEP), STEEPEST)
+
+    def estimate(self, coarse, fine):
+        """Cents of the largest error of the fine one of two: what its frequencies fell by, continued at the rate of its bars, or what bars of that length usually mean, if that is more."""
+        bar = max(fine.bars)
+        by_fall = 0.0
+        if coarse.freq_hz and fine.nodes > 1.3 * coarse.nodes:
+            by_fall = find_fall(coarse.freq_hz, fine.freq_hz) / ((fine.nodes / coarse.nodes) ** self.find_slope(coarse, fine) - 1)
+        return min(max(by_fall, bar / self.usual), bar / self.least)
+
+    def predict_cpu(self, nodes):
+        """By the study's model at the pace of the finest trial, and by the power between the last two trials: their geometric mean."""
+        coarse, fine = self.trials[-2:]
+        factor, modes = nodes / fine.nodes, len(fine.freq_hz)
+        spent = fine.cpu_s - fine.mesh_s
+        by_model = spent / self.model.predict(fine.unknowns, modes) * self.model.predict(fine.unknowns * factor, modes)
+        grown = max(spent - START_S, 1e-3) / max(coarse.cpu_s - coarse.mesh_s - START_S, 1e-3)
+        power = min(max(math.log(grown) / math.log(fine.nodes / coarse.nodes), 1.0), STEEPEST_CPU)
+        by_power = START_S + max(spent - START_S, 0.0) * factor**power
+        return math.sqrt(by_model * by_power) + fine.mesh_s * factor
+
+    def make_curve(self):
+        """As if the study had it: the trials, and MOST_FINER_TRIAL times the nodes of the finest."""
+        coarse, fine = self.trials[-2:]
+        cents, slope, modes = self.estimate(coarse, fine), self.find_slope(coarse, fine), len(fine.freq_hz)
+        samples = [Sample(t.nodes, t.unknowns, len(t.freq_hz), cents + find_fall(t.freq_hz, fine.freq_hz), max(t.bars), t.cpu_s) for t in self.trials if t.freq_hz]
+        for factor in (1.5, 2.0, MOST_FINER_TRIAL):
+            nodes = round(fine.nodes * factor)
+            samples.append(Sample(nodes, round(fine.unknowns * factor), modes, cents * factor**-slope, max(fine.bars) * factor**-slope, self.predict_cpu(nodes)))
+        return Curve(self.element, samples, is_measured=False)
+
+    def judge(self, final):
+        """Cents of the largest error of the final solve, by its own bars and by how far it fell below the trial before."""
+        coarser = [trial for trial in self.trials if trial.nodes * 1.3 < final.nodes]
+        return self.estimate((coarser or self.trials)[-1 if coarser else 0], final)
