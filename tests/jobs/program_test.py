@@ -28,7 +28,7 @@ class Path(Bench):
         other = {**make_job(), "resources": {"ranks": 1}, "bank": "elsewhere.hdf", "element": "T10"}
         again = self.ask("submit", self.write("b/c/other.json", "// the same\n" + json.dumps(dict(reversed(other.items())), indent=3)))
         self.assertEqual([(entry["id"], entry["new"]) for entry in again["jobs"]], [(id_, False)])
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", "--no-pictures")
         self.assertEqual(self.ask("submit", job)["jobs"][0]["state"], "done")
         state = self.ask("status", id_[:8])["jobs"][0]
         self.assertEqual((state["state"], state["attempts"], state["percent"], state["phase"]), ("done", 1, 100.0, "done"))
@@ -73,7 +73,7 @@ class Path(Bench):
         file = self.write("bar.json", job)
         self.ask("submit", file)
         mesh.unlink()
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", "--no-pictures")
         self.assertEqual(self.ask("status")["jobs"][0]["state"], "done")
 
     def test_a_bad_mesh_fails_once_and_says_why_by_its_own_name(self):
@@ -82,7 +82,7 @@ class Path(Bench):
         (self.folder / "hole.msh").write_text("$MeshFormat\nno mesh\n")
         file = self.write("bar.json", job)
         self.ask("submit", file)
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", "--no-pictures")
         state = self.ask("status", file)["jobs"][0]
         self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
         self.assertIn(str(self.folder / "hole.msh"), state["reason"])
@@ -114,7 +114,7 @@ class Path(Bench):
         del mesh["body"]
         self.write("2.json", mesh)
         self.run_it("submit", done, failed)
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", "--no-pictures")
         self.run_it("submit", queued)
         wanted = {job["name"]: (job["id"], job["state"], job["reason"], job["bank"]) for job in self.ask("status")["jobs"]}
         self.assertEqual([state for _, state, *_ in wanted.values()], ["done", "failed", "queued"])
@@ -161,7 +161,7 @@ class Path(Bench):
 
     def test_more_ranks_than_cores_run_on_the_cores_and_it_is_said(self):
         self.run_it("submit", self.write("bar.json", make_job()), "--ranks", "1000")
-        events = [json.loads(line) for line in self.run_it("run", "--cores", "1").stdout.splitlines()]
+        events = [json.loads(line) for line in self.run_it("run", "--cores", "1", "--no-pictures").stdout.splitlines()]
         start = next(event for event in events if event["event"] == "start")
         self.assertEqual(start["ranks"], 1)
         self.assertIn("asks for 1000 ranks", start["reason"])
@@ -170,7 +170,7 @@ class Path(Bench):
     def test_explain_and_submit_agree_on_a_job_that_failed_before_it_ran(self):
         file = self.write("bar.json", make_job())
         self.run_it("submit", file, "--memory-gb", "1000000")
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", "--no-pictures")
         self.assertEqual(self.ask("status")["jobs"][0]["state"], "failed")
         said = self.ask("explain", file)
         self.assertTrue(said["would_run"])
@@ -217,7 +217,7 @@ class Path(Bench):
             self.assertEqual(process.returncode, 0, out + err)
         self.assertEqual(self.ask("status")["counts"]["queued"], 5)
         with concurrent.futures.ThreadPoolExecutor(3) as pool:
-            list(pool.map(lambda _: self.run_it("run", "--quiet", timeout=300), range(3)))
+            list(pool.map(lambda _: self.run_it("run", "--quiet", "--no-pictures", timeout=300), range(3)))
         jobs = self.ask("status")["jobs"]
         self.assertEqual([(job["state"], job["attempts"]) for job in jobs], [("done", 1)] * 5)
         self.assertEqual(list((self.store / "tmp").iterdir()), [])

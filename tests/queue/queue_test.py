@@ -19,7 +19,7 @@ def kills(service):
     """kill -9 of each kind of process while a job of two ranks runs: nothing is lost, nothing is left, nothing is solved twice."""
     service.mesh("bar.msh", LONG_NODES)
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000, resources={"ranks": 2}))
-    run = service.run()
+    run = service.run(has_pictures=True)
     for kind in ("rank", "mpirun", "attempt", "run"):
         service.wait_for(f"a {kind} to kill", lambda: len(service.processes()["rank"]) == 2 and service.processes()[kind])
         time.sleep(0.3)
@@ -32,7 +32,7 @@ def kills(service):
             run.wait()
             check(service.job(identity)["state"] in ("running", "done"), "an attempt does not go on without its run")
             check(any(is_alive(pid) for pid in victims["attempt"]) or service.bank(identity).exists(), "the attempt died with its run")
-            run = service.run()
+            run = service.run(has_pictures=True)
         else:
             state = service.wait_for("the end of the attempt to be seen", lambda: service.job(identity)["state"] != "running" and service.job(identity))
             check(state["state"] == "waiting", f"after the kill of a {kind}: {state}")

@@ -66,8 +66,9 @@ class Service:
     def job(self, identity):
         return self.jobs()[identity]
 
-    def run(self, *options, prefix=()):
-        """Starts `carillon run`; its JSON lines go to a file."""
+    def run(self, *options, prefix=(), has_pictures=False):
+        """Starts `carillon run`; its JSON lines go to a file. Pictures of a report take far longer than these jobs."""
+        options = options if has_pictures else ("--no-pictures", *options)
         log = self.path / f"run-{len(self.runs)}.jsonl"
         with open(log, "w") as out:
             process = subprocess.Popen([*prefix, self.bin / "carillon", "--store", self.store, "run", *options], cwd=self.path, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)

@@ -12,6 +12,7 @@ import time
 from service import OPEN, Service, check, choose_seed
 
 KINDS = ("run", "attempt", "mpirun", "rank")
+PICTURED = 0.25  # of the runs: whoever draws can be killed too, and takes his time
 
 
 def fill(service, count):
@@ -36,7 +37,7 @@ def main():
         finished = {}  # id -> the bank's inode when it was first seen
         done_kills = {kind: 0 for kind in KINDS}
         batches = 1
-        run = service.run()
+        run = service.run(has_pictures=random.random() < PICTURED)
         end = time.monotonic() + 60 + 12 * kills
         while time.monotonic() < end:
             for identity in good:
@@ -64,7 +65,7 @@ def main():
             if run.poll() is not None:
                 if run.returncode == 0 and sum(done_kills.values()) >= kills:
                     continue
-                run = service.run()
+                run = service.run(has_pictures=random.random() < PICTURED)
             elif sum(done_kills.values()) >= kills:
                 time.sleep(0.5)
         check(run.wait(timeout=60) is not None, "carillon run does not end")

@@ -20,8 +20,9 @@ MANY = [20, 250000]  # a band of 310 modes of 4000 nodes, found in several parts
 
 
 def check(holds, text):
+    """`text`: what to say when it does not hold, or what makes that."""
     if not holds:
-        print(f"{CASE}: {text}")
+        print(f"{CASE}: {text() if callable(text) else text}")
         print(subprocess.run(["squeue", "--states=all"], capture_output=True, text=True).stdout)
         sys.exit(1)
 
@@ -33,7 +34,7 @@ class Store:
         self.scratch = tempfile.TemporaryDirectory(prefix="carillon-slurm-")
         self.folder = pathlib.Path(self.scratch.name) / "it's a $HOME \"store\""
         self.folder.mkdir()
-        (self.folder / "profile.json").write_text(json.dumps({"store": "store", "on": "slurm", "slurm": {"poll_s": 0.5, "signal_before_s": 60}}))
+        (self.folder / "profile.json").write_text(json.dumps({"store": "store", "on": "slurm", "slurm": {"poll_s": 0.5, "signal_before_s": 60, "pictures": CASE == "submit"}}))
 
     def run(self, *words, code=0):
         done = subprocess.run([BIN / "carillon", "--profile", self.folder / "profile.json", "--json", *words], capture_output=True, text=True, timeout=120, cwd=self.folder)
@@ -57,8 +58,8 @@ class Store:
     def wait(self, job, state, seconds=100):
         deadline = time.monotonic() + seconds
         while (row := self.status(job))["state"] != state:
-            check(time.monotonic() < deadline, f"not {state} after {seconds} s: {row}\n{self.log(job)}")
-            check(row["state"] not in ("done", "failed", "cancelled"), f"ended as {row} instead of {state}\n{self.log(job)}")
+            check(time.monotonic() < deadline, lambda: f"not {state} after {seconds} s: {row}\n{self.log(job)}")
+            check(row["state"] not in ("done", "failed", "cancelled"), lambda: f"ended as {row} instead of {state}\n{self.log(job)}")
             time.sleep(0.5)
         return row
 
@@ -82,7 +83,7 @@ class Store:
             progress = self.work(job) / "progress.jsonl"
             if len(ranks) == count and progress.exists() and progress.stat().st_size > 0:
                 return ranks
-            check(time.monotonic() < deadline, f"no {count} ranks at work but {ranks}: {self.status(job)}\n{self.log(job)}")
+            check(time.monotonic() < deadline, lambda: f"no {count} ranks at work but {ranks}: {self.status(job)}\n{self.log(job)}")
             time.sleep(0.2)
 
 
@@ -152,7 +153,7 @@ def time_limit(store):
     store.wait_for_solver(job, 2)
     deadline = time.monotonic() + 100
     while not (store.status(job)["modes_done"] or 0) > 0:
-        check(time.monotonic() < deadline, f"nothing is found: {store.status(job)}\n{store.log(job)}")
+        check(time.monotonic() < deadline, lambda: f"nothing is found: {store.status(job)}\n{store.log(job)}")
         time.sleep(0.1)
     slurm_job = store.status(job)["slurm_job"]
     limit = subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout
@@ -162,7 +163,7 @@ def time_limit(store):
     check(row["slurm_job"] is None or row["slurm_job"] == slurm_job, f"another job of Slurm did it: {row}")
     check("Restarts=1" in subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout, "it was not queued again")
     for words in ("time limit", "queued again in Slurm", "goes on from"):
-        check(words in store.log(job), f"the log does not say '{words}':\n{store.log(job)}")
+        check(words in store.log(job), lambda: f"the log does not say '{words}':\n{store.log(job)}")
     store.check_bank(job)
 
 
@@ -171,7 +172,7 @@ def killed_rank(store):
     job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
     os.kill(store.wait_for_solver(job, 2)[0], signal.SIGKILL)
     store.wait(job, "done", 150)
-    check("queued again in Slurm" in store.log(job) and "killed" in store.log(job), f"the log does not say that a rank was killed:\n{store.log(job)}")
+    check("queued again in Slurm" in store.log(job) and "killed" in store.log(job), lambda: f"the log does not say that a rank was killed:\n{store.log(job)}")
     store.check_bank(job)
 
 
@@ -193,7 +194,7 @@ def killed_daemon(store):
     wait_until_saved(store.wait(job, "running", 20)["slurm_job"])
     cluster("kill", "slurmd")
     cluster("kill", "slurmctld")
-    check(store.status(job)["state"] == "running", f"a controller that does not answer changed the state: {store.status(job)}")
+    check(store.status(job)["state"] == "running", lambda: f"a controller that does not answer changed the state: {store.status(job)}")
     waiting = store.submit(store.write("quick.json", QUICK, 1), "--ranks", "1")[0]
     check(waiting["state"] == "queued" and waiting["slurm_job"] is None, f"handed over to nobody: {waiting}")
     cluster("revive", "slurmctld")

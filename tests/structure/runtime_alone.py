@@ -1,21 +1,29 @@
 #!/usr/bin/env python3
 """Builds and tests the runtime in a mount namespace in which MPI, PETSc, SLEPc, METIS, MUMPS, CGAL and OpenVDB do not exist.
 
-Where the machine allows no mount namespace (an ordinary container), the same build runs with everything in sight, and then no compiled file may have
-read, and no program may load, a file of those packages.
+The runtime is configured there anew, at the path of the whole build, and takes over what the whole build has made: ninja makes again whatever would be
+made by another command or of other files. What is taken over may have read, and its programs may load, no file of those packages. Every program
+is then tried by some of its tests; all of them run on the same bytes elsewhere.
 
-usage: runtime_alone.py SOURCE_DIR BUILD_DIR
+With --from-nothing everything is compiled there, and all tests of the runtime run there. So it is too where the machine allows no mount namespace
+(an ordinary container), with everything in sight and the same look at what was read and what is loaded.
+
+usage: runtime_alone.py SOURCE_DIR BUILD_DIR WORK_DIR [--from-nothing]        WORK_DIR is removed at the end
 """
+import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 
 HIDDEN = re.compile(r"^(libopenmpi|openmpi|mpi-default|libpetsc|petsc|libslepc|slepc|libmetis|libmumps|libptscotch|libscotch|libscalapack|libhypre|"
                     r"libhdf5-openmpi|libhdf5-mpi|libcgal|libopenvdb|libsuitesparse)")
 # An ordinary machine has these of some of the packages above as dependencies of light libraries; hiding them would not be fair.
 SHARED = re.compile(r"/lib(blas|lapack|openblas|hwloc|event|gomp)")
+LEFT_OUT = "structure|docs|bench"
 
 
 def installed():
@@ -47,34 +55,72 @@ def hide(packages):
     print(f"hidden: {len(roots)} folders and {hidden} files of {len(packages)} packages", flush=True)
 
 
-def build_and_test(source, build):
-    subprocess.run(["cmake", "-S", source, "-B", build, "-G", "Ninja", "-DCARILLON_PRECOMPUTE=OFF", "-DCMAKE_BUILD_TYPE=Release"], check=True,
-                   stdout=subprocess.DEVNULL)
-    subprocess.run(["cmake", "--build", build, "--", "--quiet"], check=True)
-    return subprocess.run(["ctest", "--test-dir", build, "-j2", "--output-on-failure", "-LE", "structure|docs"]).returncode
+def read_settings(build):
+    """What the whole build was configured with, as far as it reaches the compiler."""
+    kept = r"CMAKE_(BUILD_TYPE|(C|CXX)_(COMPILER|FLAGS|COMPILER_LAUNCHER)):[A-Z]+=.*"
+    return [f"-D{line}" for line in (build / "CMakeCache.txt").read_text().splitlines() if re.fullmatch(kept, line)]
+
+
+def configure(source, build, settings):
+    subprocess.run(["cmake", "-S", source, "-B", build, "-G", "Ninja", "-DCARILLON_PRECOMPUTE=OFF", "-DCARILLON_TESTS=ON", *settings], check=True, stdout=subprocess.DEVNULL)
+
+
+def take_over(whole, build):
+    """Copies what ninja would make here and finds there, with its moments and the log of how it was made. Returns the copies."""
+    lines = subprocess.run(["ninja", "-C", build, "-t", "targets", "all"], capture_output=True, text=True, check=True).stdout.splitlines()
+    outputs = [name for name, _, rule in (line.rpartition(": ") for line in lines) if rule not in ("phony", "RERUN_CMAKE")]
+    taken = [name for name in outputs if not name.startswith("/") and (whole / name).is_file()]
+    for name in [*taken, ".ninja_log", ".ninja_deps"]:
+        (build / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(whole / name, build / name, follow_symlinks=False)
+    return taken
+
+
+def find_sample(build):
+    """A regular expression of some tests of every program: one of each suite of GoogleTest, and every script."""
+    listed = json.loads(subprocess.run(["ctest", "--test-dir", build, "-LE", LEFT_OUT, "--show-only=json-v1"], capture_output=True, text=True, check=True).stdout)
+    sample = {}
+    for test in listed["tests"]:
+        program = test["command"][0]
+        is_case = any(word.startswith("--gtest_filter") for word in test["command"])
+        sample.setdefault((program, test["name"].rsplit(".", 1)[0]) if is_case else test["name"], test["name"])
+    return "^(" + "|".join(map(re.escape, sample.values())) + ")$", len(sample)
+
+
+def run_tests(build, *choice):
+    return subprocess.run(["ctest", "--test-dir", build, "-j2", "--output-on-failure", "--no-tests=error", "-LE", LEFT_OUT, *choice]).returncode
 
 
 def find_traces(build):
     """Files of hidden packages that a compile read or a program loads."""
     forbidden = re.compile(r"/(openmpi|petscdir|slepcdir|CGAL|openvdb|mumps_seq)/|/(mpi|metis|dmumps_c)\.h$|lib(mpi|petsc|slepc|metis|dmumps|openvdb|CGAL)[_.-]")
     read = subprocess.run(["ninja", "-C", build, "-t", "deps"], capture_output=True, text=True, check=True).stdout.split()
+    assert len(read) > 1000, "ninja does not tell what was read"
     loaded = []
-    for program in (pathlib.Path(build) / "bin").iterdir():
+    for program in (build / "bin").iterdir():
         loaded += subprocess.run(["ldd", program], capture_output=True, text=True).stdout.split()
     return sorted({name for name in read + loaded if forbidden.search(name)})
 
 
-def main():
-    source, build = sys.argv[1:3]
-    if os.environ.get("CARILLON_INSIDE") != "1":
-        flags = ["-m"] if os.geteuid() == 0 else ["-r", "-m"]
-        if subprocess.run(["unshare", *flags, "true"], capture_output=True).returncode == 0:
-            return subprocess.run(["unshare", *flags, "--propagation", "private", sys.executable, *sys.argv], env={**os.environ, "CARILLON_INSIDE": "1"}).returncode
-        print("no mount namespace can be made here: building in plain sight, and looking at what was read and what is loaded")
-        failed = build_and_test(source, build)
-        traces = find_traces(build)
-        print("\n".join(traces) if traces else "no compiled file read, and no program loads, a file of MPI, PETSc, SLEPc, METIS, MUMPS, CGAL or OpenVDB")
-        return 1 if failed or traces else 0
+def build_and_test(source, build, whole=None):
+    """In `build`; `whole` is the whole build to take over from."""
+    configure(source, build, read_settings(whole) if whole else ["-DCMAKE_BUILD_TYPE=Release"])
+    taken = take_over(whole, build) if whole else []
+    subprocess.run(["cmake", "--build", build, "--", "--quiet"], check=True)
+    if whole:
+        same = sum((build / name).stat().st_mtime_ns == (whole / name).stat().st_mtime_ns for name in taken)
+        print(f"{same} files of the whole build serve as they are, {len(taken) - same} were made again", flush=True)
+    traces = find_traces(build)
+    print("\n".join(traces) if traces else "no compiled file read, and no program loads, a file of MPI, PETSc, SLEPc, METIS, MUMPS, CGAL or OpenVDB", flush=True)
+    if traces or not whole:
+        return run_tests(build) or len(traces) > 0
+    pattern, count = find_sample(build)
+    print(f"{count} tests, one of each suite", flush=True)
+    return run_tests(build, "-R", pattern)
+
+
+def test_hidden(source, build, work, whole):
+    """Inside the namespace. `whole`: where the whole build is to be seen, while the runtime's own is at its path; None: from nothing."""
     hide(installed())
     # The tree is hidden for real: the compiler can use no type of these headers.
     for header, name in (("mpi.h", "MPI_Comm"), ("petsc.h", "PetscInt"), ("metis.h", "idx_t")):
@@ -83,7 +129,30 @@ def main():
         if probe.returncode == 0:
             print(f"{header} can still be used; the namespace proves nothing")
             return 1
-    return build_and_test(source, build)
+    if not whole:
+        return build_and_test(source, work)
+    subprocess.run(["mount", "--bind", build, whole], check=True)
+    subprocess.run(["mount", "--bind", work, build], check=True)
+    os.chdir(build)
+    return build_and_test(source, build, whole)
+
+
+def main():
+    source, build, work = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+    from_nothing = sys.argv[4:] == ["--from-nothing"]
+    if os.environ.get("CARILLON_INSIDE"):
+        return test_hidden(source, build, work, None if from_nothing else pathlib.Path(os.environ["CARILLON_INSIDE"]))
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    flags = ["-m"] if os.geteuid() == 0 else ["-r", "-m"]
+    try:
+        if subprocess.run(["unshare", *flags, "true"], capture_output=True).returncode != 0:
+            print("no mount namespace can be made here: building in plain sight, and looking at what was read and what is loaded")
+            return build_and_test(source, work)
+        with tempfile.TemporaryDirectory(prefix="carillon-whole-") as whole:
+            return subprocess.run(["unshare", *flags, "--propagation", "private", sys.executable, *sys.argv], env={**os.environ, "CARILLON_INSIDE": whole}).returncode
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
 
 
 sys.exit(main())
