@@ -50,7 +50,7 @@ class Body:
     modes: int
     round: bool  # has curved faces: a straight T10 is another body
     sizes: tuple = (400, 1000, 2500, 6000, 15000)
-    quick_sizes: tuple = (200, 500, 1200)
+    quick_sizes: tuple = (300, 900, 2700)
     change: tuple | None = None
     truth: known.Truth | None = None  # None: the finest curved T10 has to tell
     surface: bool = False
@@ -133,7 +133,7 @@ def shape(name, **lengths):
 def make_bodies():
     """{name: Body}, in the order of the report."""
     truths = known.read_known()
-    thin = {"sizes": (800, 2000, 5000, 12000, 30000), "quick_sizes": (400, 1000, 2500)}
+    thin = {"sizes": (800, 2000, 5000, 12000, 30000), "quick_sizes": (500, 1300, 3200)}
     bodies = [
         Body("bar", "aluminium bar, 300 x 30 x 12 mm", ALUMINIUM, shape("bar", length=0.3, width=0.03, thickness=0.012), 16, False),
         Body("tube", "aluminium chime, 505 mm long, radius 12.5 mm, wall 1 mm", CHIME, shape("tube", length=0.505, outer_radius=0.0125, wall=0.001), 7, True, **thin),

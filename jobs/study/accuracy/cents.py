@@ -103,21 +103,26 @@ class Cost:
         return f"{sign}{self.cpu_s:.2g}" if self.cpu_s < 100 else f"{sign}{self.cpu_s:.0f}"
 
 
+LEAST_GROWTH = 1.2  # of CPU seconds with the number of elements; on small meshes the start of the program hides it
+
+
 def find_cost(points, cents, find_error=lambda point: point.worst):
-    """What one kind of element costs for an error of no more than `cents`; None where it cannot be told: its errors do not fall, or the last meshes are too far away."""
+    """What one kind of element costs for an error of no more than `cents`, by straight lines in logarithms; beyond the finest mesh with the last error's slope, and seconds that grow at least as
+    the elements to the power LEAST_GROWTH. None where it cannot be told: errors do not fall, or are thirty times as large."""
     curve = []
     for point in sorted(points, key=lambda point: point.cpu_s):
-        if not curve or find_error(point) < curve[-1][1]:
-            curve.append((point.cpu_s, find_error(point)))
+        if not curve or find_error(point) < find_error(curve[-1]):
+            curve.append(point)
     if not curve:
         return None
-    if curve[0][1] <= cents:
-        return Cost(curve[0][0], "at most")
-    for (cheap, bad), (dear, good) in zip(curve, curve[1:]):
-        if good <= cents:
-            share = math.log(bad / cents) / math.log(bad / good)
-            return Cost(cheap * (dear / cheap) ** share, "measured")
-    if len(curve) < 3 or curve[-1][1] > 30 * cents:
+    if find_error(curve[0]) <= cents:
+        return Cost(curve[0].cpu_s, "at most")
+    for cheap, dear in zip(curve, curve[1:]):
+        if find_error(dear) <= cents:
+            share = math.log(find_error(cheap) / cents) / math.log(find_error(cheap) / find_error(dear))
+            return Cost(cheap.cpu_s * (dear.cpu_s / cheap.cpu_s) ** share, "measured")
+    if len(curve) < 3 or find_error(curve[-1]) > 30 * cents:
         return None
-    (cheap, bad), (dear, good) = curve[-2:]
-    return Cost(dear * (dear / cheap) ** (math.log(good / cents) / math.log(bad / good)), "extrapolated")
+    cheap, dear = curve[-2:]
+    growth = max(math.log(dear.cpu_s / cheap.cpu_s), LEAST_GROWTH * math.log(dear.elements / cheap.elements))
+    return Cost(dear.cpu_s * math.exp(growth * math.log(find_error(dear) / cents) / math.log(find_error(cheap) / find_error(dear))), "extrapolated")

@@ -2,13 +2,14 @@
 import math
 import statistics
 
-from accuracy import cents, elements, plots
+from accuracy import banks, cents, elements, plots
 from accuracy.bodies import find_kind, make_bodies
 from accuracy.section import Section
 
-PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
+PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank", "carillon-render")
 AUDIBLE_CENTS = 5  # about what a trained ear hears
 DENSE_NODES, DENSE_NODES_QUICK = (105, 140, 210, 350, 512, 729, 1000), (105, 140, 210, 350)
+ALWAYS_DENSE = 300  # unknowns up to which the program takes LAPACK whatever it is told
 EIGEN_PHASES = ("factor", "solve", "orthogonalise")
 
 
@@ -103,6 +104,14 @@ def study_lumping(section, results):
         section.conclude(text)
 
 
+def study_modes(section, lab):
+    """What is lost of the sound at the numbers of modes that the papers name; as the section on banks measures it."""
+    rows, sentence = banks.measure_papers(lab)
+    section.add_table("modes", [("modes", *banks.CELLS), *((row.modes, *banks.to_cells(row)) for row in rows)], "A body of many modes with the loudest of them only: three hard blows, heard at 1 m.",
+                      [("modes", *banks.DATA), *((row.modes, *banks.to_data(row)) for row in rows)], lab.make_command("papers"))
+    section.conclude(f"**800 modes or fewer suffice**: {sentence[0].lower()}{sentence[1:]}")
+
+
 def calc_eigen_s(solve):
     """CPU seconds of the eigensolver alone."""
     return sum(solve.record["effort"][phase]["cpu_seconds"] for phase in EIGEN_PHASES)
@@ -132,17 +141,20 @@ def study_dense(section, lab):
     rows = [("unknowns", "nodes", "dense: eigensolver, CPU s", "sparse", "dense / sparse", "dense: whole run", "sparse", "differ by at most, cents")]
     rows += [(f"{n:,}", f"{nodes:,}", f"{a:.3f}", f"{b:.3f}", f"{a / b:.1f}", f"{c:.2f}", f"{d:.2f}", f"{gap:.1g}") for n, nodes, a, b, c, d, gap in lines]
     data = [("unknowns", "nodes", "dense_eigen_cpu_s", "sparse_eigen_cpu_s", "dense_cpu_s", "sparse_cpu_s", "largest_difference_cents"), *lines]
-    section.add_table("dense", rows, f"LAPACK on dense matrices (`\"method\": \"dense\"`) against block Lanczos on a sparse factor, {body.modes} modes of a cube of T4. Up to 300 unknowns the program solves densely whatever it is "
+    section.add_table("dense", rows, f"LAPACK on dense matrices (`\"method\": \"dense\"`) against block Lanczos on a sparse factor, {body.modes} modes of a cube of T4. Up to {ALWAYS_DENSE} unknowns the program solves densely whatever it is "
                       "told, so that both columns are the same there.", data, lab.make_command("papers"))
-    unknowns = [line[0] for line in lines]
     curves = {"dense, LAPACK": [(line[0], line[2]) for line in lines], "sparse, block Lanczos": [(line[0], line[3]) for line in lines]}
     panel = plots.Panel("eigensolver alone", "unknowns", "CPU seconds", curves, guides={"slope 3": plots.draw_slope(curves["dense, LAPACK"][-2:], 3)})
     section.add_chart("dense-time", plots.draw_panels([panel], "Dense and sparse today", f"{body.modes} modes of a cube of T4"), "Where dense and sparse cross.", data, lab.make_command("papers"))
-    apart = [line for line in lines if line[0] > 300]
-    crossing = find_crossing(unknowns, [line[2] for line in lines], [line[3] for line in lines])
+    apart = [line for line in lines if line[0] > ALWAYS_DENSE]
+    crossing = find_crossing(*([line[column] for line in apart] for column in (0, 2, 3)))
     largest = lines[-1]
-    where = f"they cross at about {crossing:.0f} unknowns" if crossing else (f"dense takes longer on every size above 300 unknowns, {apart[0][2] / apart[0][3]:.1f} times at {apart[0][0]:,}" if apart and
-                                                                             all(line[2] > line[3] for line in apart) else "they do not cross on these sizes")
+    if crossing:
+        where = f"they cross at about {crossing:.0f} unknowns"
+    elif all(line[2] > line[3] for line in apart):
+        where = f"dense takes longer on every size above the {ALWAYS_DENSE} unknowns at which the program goes over, {apart[0][2] / apart[0][3]:.1f} times at {apart[0][0]:,} ({apart[0][1]} nodes)"
+    else:
+        where = "dense takes no longer on any of these sizes"
     section.conclude(f"**Dense up to 1,000 nodes**: today {where}; at {largest[1]:,} nodes ({largest[0]:,} unknowns) dense takes {largest[2] / largest[3]:.0f} times the CPU of the sparse eigensolver ({largest[2]:.2g} s against {largest[3]:.2g} s).")
 
 
@@ -151,5 +163,6 @@ def study(lab, bodies):
     results = find_points(lab, bodies)
     study_density(section, lab, results)
     study_lumping(section, results)
+    study_modes(section, lab)
     study_dense(section, lab)
     return section
