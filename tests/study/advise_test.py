@@ -37,12 +37,15 @@ def make_samples(error, cpu, sizes=(500, 1000, 2000, 4000)):
 
 class Forecasts(unittest.TestCase):
     def test_curve_of_a_power_is_followed_between_and_beyond_its_samples(self):
-        curve = forecast.Curve("T10", make_samples(lambda n: 100 * (n / 500) ** -1.5, lambda n: 0.2 * (n / 500) ** 1.2))
+        error = lambda n: 100 * (n / 500) ** -1.2
+        curve = forecast.Curve("T10", make_samples(error, lambda n: 0.2 * (n / 500) ** 1.2))
         for nodes in (300, 500, 700, 3000, 16000):
-            self.assertAlmostEqual(curve.predict_cents(nodes) / (100 * (nodes / 500) ** -1.5) if nodes >= 500 else 1, 1, 9)
             self.assertAlmostEqual(curve.predict_cpu(nodes) / (0.2 * (nodes / 500) ** 1.2), 1, 9)
-        nodes = curve.find_nodes(0.5)
-        self.assertAlmostEqual(100 * (nodes / 500) ** -1.5, 0.5 * forecast.GOAL, delta=0.002)
+        for nodes in (300, 500, 700, 3000, 4000):
+            self.assertAlmostEqual(curve.predict_cents(nodes) / error(nodes), 1, 9)
+        self.assertTrue(error(16000) < curve.predict_cents(16000) < 1.5 * error(16000))  # no better than the power beyond the samples
+        nodes = curve.find_nodes(18)
+        self.assertAlmostEqual(error(nodes), 18 * forecast.GOAL, delta=0.05)
         self.assertEqual(curve.find_nodes(1000), 500)
         self.assertIsNone(curve.find_nodes(1e-4))
         self.assertAlmostEqual(0.2 * (curve.find_affordable(3.0) / 500) ** 1.2, 3.0, delta=0.01)

@@ -4,13 +4,17 @@ import json
 import statistics
 import time
 
-from accuracy import cents, elements, forecast, solver
+from accuracy import banks, cents, elements, forecast, playing, solver, sounds
 from accuracy.bodies import Kind, find_kind
 from accuracy.lab import Case, write_whole
 from accuracy.section import Section
 
 PROGRAMS = solver.PROGRAMS
-DEFAULT_NODES = 10000  # of carillon-mesh and of a job's "body"
+# A job that leaves all to the program; its resolved form says what today's defaults are.
+PLAIN = {"body": {"shape": "bar"}, "material": {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {}}}}
+# Why a default is dearer than what this study can tell from it.
+REASONS = {"silence_pa": "a scene may be played with any gain, and what sleeps costs nothing from then on: the saving is that of the last of a decay", "contact_step_s": "it holds where bodies bounce and tumble, where another step is "
+           "another fall (section playing)", "modes": "a limit is the scene's to set: what may be left out depends on what else sounds", "sample_rate_hz": "it is that of sound cards"}
 TRAINED_EAR, SEMITONE = 5.0, 100.0  # cents
 START_DECIDES = 1.25  # the same on meshes so small that starting weighs as much as solving
 LITTLE = 1.1  # times the CPU seconds: what is not worth a choice
@@ -87,7 +91,7 @@ def find_costs(results, level):
     return costs
 
 
-def recommend_element(results):
+def recommend_element(results, today):
     ear, semitone, one = (find_costs(results, level) for level in (TRAINED_EAR, SEMITONE, 1.0))
     linear = {body: min(values) for body in (body.name for body, _, _ in results) if (values := [ear[kind][body] for kind in ("T4 consistent", "T4 lumped") if body in ear.get(kind, {})])}
     t10 = ear.get("T10", {})
@@ -99,7 +103,7 @@ def recommend_element(results):
     rough = [min(semitone[kind][body] for kind in ("T4 consistent", "T4 lumped") if body in semitone.get(kind, {})) / semitone["T10"][body]
              for body in semitone.get("T10", {}) if any(body in semitone.get(kind, {}) for kind in ("T4 consistent", "T4 lumped"))]
     looser = f"T4 for a semitone: {say_times(median(rough))} of T10" if rough else "T4 for a semitone: out of reach"
-    return ("element", "T10", figure, f"T10 to 1 cent: {say_times(stricter)} of {TRAINED_EAR:g} cents", looser, 2 * len(wins) > len(results))
+    return ("element", today["element"], figure, f"T10 to 1 cent: {say_times(stricter)} of {TRAINED_EAR:g} cents", looser, (today["element"] == "T10") == (2 * len(wins) > len(results)))
 
 
 def recommend_sides(results):
@@ -115,7 +119,7 @@ def recommend_sides(results):
             "none", f"straight: {1 / median(prices):.2f} times the CPU time", median(gains) > 1 and median(prices) < 1.5)
 
 
-def recommend_mass(lab, bodies, results):
+def recommend_mass(lab, bodies, results, today):
     linear = []
     for _, points, _ in results:
         own = {mass: [point for point in points if point.kind == f"T4 {mass}"] for mass in ("consistent", "lumped")}
@@ -123,7 +127,7 @@ def recommend_mass(lab, bodies, results):
     quadratic = []
     for body in solver.choose_bodies(bodies)[: 1 if lab.quick else 2]:
         kind = find_kind(find_best_t10(body))
-        sizes = body.get_sizes(lab)[1:3]
+        sizes = body.get_sizes(lab)[-3:-1]
         full = [body.make_case(lab, kind, nodes) for nodes in sizes]
         lumped = [body.make_case(lab, Kind("T10 lumped", "T10", "lumped", kind.curved), nodes) for nodes in sizes]
         solves = lab.measure(full + lumped)
@@ -132,11 +136,20 @@ def recommend_mass(lab, bodies, results):
         quadratic += [(worst(solves[b.name]) / worst(solves[a.name]), solves[b.name].cpu / solves[a.name].cpu) for a, b in zip(full, lumped)]
     errors, prices = [median(column) for column in zip(*quadratic)]
     t4_errors, t4_prices = [median(column) for column in zip(*linear)]
-    return ("mass", "consistent", f"with T10 a lumped mass is {errors:.2g} times as wrong on the same mesh", "none",
-            f"lumped: {prices:.2f} times the CPU time with T10; with T4 {t4_prices:.2f} times, and {t4_errors:.2g} times the error, as its own has the other sign", errors > 1)
+    return ("mass", today["mass"], f"with T10 a lumped mass is {errors:.2g} times as wrong on the same mesh", "none",
+            f"lumped: {prices:.2f} times the CPU time with T10; with T4 {t4_prices:.2f} times, and {t4_errors:.2g} times the error, as its own has the other sign", today["mass"] == "consistent" and errors > 1 / LITTLE)
 
 
-def recommend_nodes(results):
+def find_today(lab):
+    """{"element", "mass", "tolerance", "method", "factorisation", "nodes"}: what the program takes where a job says nothing."""
+    solve = lab.measure([Case("a job that says nothing", PLAIN)], 1)["a job that says nothing"]
+    job = json.loads(solve.bank.with_name(solve.bank.name + ".resolved.json").read_text())
+    return {"element": job["element"], "mass": job["mass"], "nodes": round(solve.nodes, -3), **job["solver"]}
+
+
+def recommend_nodes(results, today):
+    usual = today["nodes"]
+
     def look(nodes):
         errors, seconds = [], []
         for body, points, _ in results:
@@ -146,40 +159,71 @@ def recommend_nodes(results):
             seconds.append(curve.predict_cpu(nodes))
         return errors, seconds
 
-    (errors, seconds), (coarse, few), (fine, many) = look(DEFAULT_NODES), look(DEFAULT_NODES // 2), look(2 * DEFAULT_NODES)
+    (errors, seconds), (coarse, few), (fine, many) = look(usual), look(usual // 2), look(2 * usual)
     inside = sum(error <= TRAINED_EAR for error in errors)
-    return ("nodes of a body", f"{DEFAULT_NODES:,}", f"the worst mode is within {TRAINED_EAR:g} cents on {inside} of {len(errors)} bodies, median {median(errors):.2g}, at most {max(errors):.3g}, for {median(seconds):.2g} CPU s",
-            f"{2 * DEFAULT_NODES:,}: median {median(fine):.2g}, at most {max(fine):.3g} cents, {median(many):.2g} CPU s", f"{DEFAULT_NODES // 2:,}: median {median(coarse):.2g}, at most {max(coarse):.3g} cents, {median(few):.2g} CPU s",
+    return ("nodes of a body", f"{usual:,}", f"the worst mode is within {TRAINED_EAR:g} cents on {inside} of {len(errors)} bodies, median {median(errors):.2g}, at most {max(errors):.3g}, for {median(seconds):.2g} CPU s",
+            f"{2 * usual:,}: median {median(fine):.2g}, at most {max(fine):.3g} cents, {median(many):.2g} CPU s", f"{usual // 2:,}: median {median(coarse):.2g}, at most {max(coarse):.3g} cents, {median(few):.2g} CPU s",
             2 * inside >= len(errors))
 
 
-def recommend_tolerance(facts):
+def recommend_tolerance(facts, today):
     fact = facts["tolerance"]
     tight = min(fact["cpu"])
     loose = max(fact["cpu"])
     stricter = fact["cpu"].get(1e-10, fact["cpu"][tight])
-    return ("solver.tolerance", "1e-8", f"it leaves bars of {fact['bars'][1e-8]:.1e} cents, where the best of these meshes is {fact['mesh']:.2g} cents wrong; frequencies move by {fact['moved'][loose]:.1e} cents from {tight:g} to {loose:g}",
+    return ("solver.tolerance", f"{today['tolerance']:g}", f"it leaves bars of {fact['bars'][1e-8]:.1e} cents, where the best of these meshes is {fact['mesh']:.2g} cents wrong; frequencies move by {fact['moved'][loose]:.1e} cents from {tight:g} to {loose:g}",
             f"1e-10: {stricter:.2f} times the CPU time" if 1e-10 in fact["cpu"] else f"{tight:g}: {stricter:.2f} times the CPU time", f"{loose:g}: {fact['cpu'][loose]:.2f} times the CPU time",
-            fact["cpu"][loose] > 1 / LITTLE and fact["bars"][1e-8] < 0.01)
+            today["tolerance"] == 1e-8 and fact["cpu"][loose] > 1 / LITTLE and fact["bars"][1e-8] < 0.01)
 
 
-def recommend_method(facts):
+def recommend_method(facts, today):
     fact = facts["method"]
     dense = f"dense costs over a tenth more from {fact['dense_from']:,} unknowns on" if fact["dense_from"] else "dense never cost over a tenth more"
-    return ("solver.method", "automatic: block Lanczos; dense up to 300 unknowns", f"{dense}; Krylov-Schur takes {fact['krylov']:.1f} times the CPU time of block Lanczos", "none: all give the same frequencies", "none",
-            fact["krylov"] > 1 / START_DECIDES and (fact["dense_from"] or 1e9) > 300)
+    return ("solver.method", f"{today['method']}: block Lanczos; dense up to 300 unknowns", f"{dense}; Krylov-Schur takes {fact['krylov']:.1f} times the CPU time of block Lanczos", "none: all give the same frequencies", "none",
+            today["method"] == "automatic" and fact["krylov"] > 1 / START_DECIDES and (fact["dense_from"] or 1e9) > 300)
 
 
-def recommend_factorisation(facts):
+def recommend_factorisation(facts, today):
     fact = facts["ordering"]
     is_ours = fact["best"].startswith("L D L^T")
-    return ("solver.factorisation", "automatic: L D L^T of Carillon, METIS", f"the quickest of {fact['count']}; the next takes {fact['next']:.2f} times as long" if is_ours else f"{fact['best']} takes {fact['over_ours']:.2f} times as long",
-            "none: all give the same frequencies", "none", is_ours or fact["over_ours"] > 1 / LITTLE)
+    return ("solver.factorisation", f"{today['factorisation']}: L D L^T of Carillon, METIS", f"the quickest of {fact['count']}; the next takes {fact['next']:.2f} times as long" if is_ours else f"{fact['best']} takes {fact['over_ours']:.2f} times as long",
+            "none: all give the same frequencies", "none", today["factorisation"] == "automatic" and (is_ours or fact["over_ours"] > 1 / LITTLE))
 
 
 def recommend_ranks(facts):
     two = facts["ranks"][2]
     return ("ranks", "1 (mpirun says more)", f"two take {two['cpu']:.2f} times the CPU time and {two['wall']:.2f} times the wall clock", "none: the frequencies are the same", "none", two["cpu"] > 1)
+
+
+def recommend_knob(knob, turns):
+    """A default of the runtime, by what the section on it measured."""
+    index = next(i for i, turn in enumerate(turns) if turn.setting == knob.default)
+    usual = turns[index]
+    tell = lambda turn: "leaves nothing out" if turn.difference is None else playing.describe_difference(turn.difference).replace("from it", "from the strictest")
+    price = lambda turn: f"{playing.format_setting(turn.setting)}: {turn.cpu_ms:.2f} ms for a second, not {usual.cpu_ms:.2f}"
+    stricter = price(turns[index - 1]) if index else "none"
+    looser = f"{price(turns[index + 1])}; {tell(turns[index + 1])}" if index + 1 < len(turns) else "none"
+    spare = [turn for turn in turns[index + 1 :] if not turn.difference.is_told and turn.cpu_ms * LITTLE < usual.cpu_ms]
+    agrees = not (usual.difference and usual.difference.is_told) and not spare
+    return (knob.key, playing.format_setting(knob.default), tell(usual), stricter, looser, agrees)
+
+
+def recommend_modes(results):
+    """All modes of the band in a bank, and 16 bits of a shape's component."""
+    rows = []
+    counts = [row for modes, _ in results.values() for row in modes[1:] if row.kept == "loudest"]
+    fewest = {name: found for name, (modes, _) in results.items() if (found := banks.find_fewest(modes, "loudest"))}
+    if counts and fewest:
+        figure = "; ".join(f"{name}: {row.modes} of {results[name][0][0].modes} are not told from all where it is struck" for name, row in fewest.items())
+        saving = median(results[name][0][0].played.cpu_ms / max(row.played.cpu_ms, 1e-9) for name, row in fewest.items())
+        rows.append(("modes of a bank", "all of the band", figure + "; struck elsewhere other modes are the loudest, so the bank keeps all", "none", f"those alone: all take {saving:.2g} times their CPU time", True))
+    bits = [row for _, tried in results.values() for row in tried[1:]]
+    if bits:
+        byte = [row for row in bits if row.bits == 8]
+        shipped = max(banks.estimate_shipped_db(tried) for _, tried in results.values())
+        looser = f"8: {max(row.difference.error_db for row in byte):.0f} dB(A), told apart on {sum(row.difference.is_told for row in byte)} of {len(byte)}" if byte else "none was measured"
+        rows.append(("bits of a shape", str(banks.SHIPPED_BITS), f"an error of {shipped:.0f} dB(A) at most", "floats: twice the bytes", looser, shipped < sounds.ERROR_LIMIT_DB))
+    return rows
 
 
 def find_results(lab, bodies):
@@ -191,14 +235,24 @@ def find_results(lab, bodies):
     return results
 
 
+def add_defaults(page, name, caption, rows):
+    page.add_table(name, [HEAD] + [(*row[:5], "yes" if row[5] else "no" + (f": {REASONS[row[0]]}" if row[0] in REASONS else "")) for row in rows], caption)
+    against = [f"{row[0]} ({row[1]}{', kept: ' + REASONS[row[0]] if row[0] in REASONS else ''})" for row in rows if not row[5]]
+    page.conclude(f"**Defaults, {name}**: {len(rows) - len(against)} of {len(rows)} agree with this study" + (f"; not {', '.join(against)}." if against else "."))
+
+
 def study(lab, bodies):
-    page = Section("advice", "Recommendation: the defaults of the program", lab.make_command("advice"))
+    page = Section("advice", "Recommendation: the defaults of the program", lab.make_command("banks", "playing", "advice"))
     facts, results = solver.find_facts(lab, bodies), find_results(lab, bodies)
-    rows = [recommend_element(results), recommend_sides(results), recommend_mass(lab, bodies, results), recommend_nodes(results), recommend_tolerance(facts), recommend_method(facts),
-            recommend_factorisation(facts), recommend_ranks(facts)]
-    rows = [row for row in rows if row]
-    page.add_table("defaults", [HEAD] + [(*row[:5], "yes" if row[5] else "no") for row in rows], "Every default of the solver with the figure that chose it.")
-    against = [row[0] for row in rows if not row[5]]
-    page.conclude(f"**Defaults**: {len(rows) - len(against)} of {len(rows)} agree with this study" + (f"; not {', '.join(against)}." if against else "."))
+    today = find_today(lab)
+    rows = [recommend_element(results, today), recommend_sides(results), recommend_mass(lab, bodies, results, today), recommend_nodes(results, today), recommend_tolerance(facts, today),
+            recommend_method(facts, today), recommend_factorisation(facts, today), recommend_ranks(facts)]
+    add_defaults(page, "solver", "Defaults of the solver, each with the figure that chose it.", [row for row in rows if row])
+    if banks.NAME in lab.found:
+        add_defaults(page, "bank", "Defaults of the bank (section banks).", recommend_modes(lab.found[banks.NAME]))
+    if playing.NAME in lab.found:
+        add_defaults(page, "runtime", "Defaults of the runtime (section playing).", [recommend_knob(knob, turns) for knob, turns in lab.found[playing.NAME]])
+    else:
+        page.say("Defaults of bank and runtime: `--only banks playing advice`.")
     page.say("`carillon study advise BODY --cents 5` chooses by these measurements and says afterwards what it came to.")
     return page

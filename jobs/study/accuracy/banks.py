@@ -282,6 +282,7 @@ def study(lab, bodies):
         results[one.name] = add_body(lab, section, one, banks[one.name])
     if results:
         add_charts(section, results)
+    lab.found[NAME] = results
     return section
 
 

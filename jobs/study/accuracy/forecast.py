@@ -13,6 +13,7 @@ GOAL = 0.8  # of what was asked: aimed at, for meshes come in steps and rates ar
 MOST_FINER = 6.0  # times the nodes of the finest mesh that was measured: no prediction goes further
 MOST_FINER_TRIAL = 4.0  # times those of a body's finest trial
 START_S, STEEPEST_CPU = 0.1, 1.8  # CPU seconds of starting, and the power of the nodes by which what follows grows at most
+TRUST, STEEPEST_BEYOND = 0.85, 4 / 3  # of the power at the end of a curve, beyond it: meshes that are coarse for their walls gain faster than those that follow
 DISTRUST = 0.9  # of a power that coarse meshes show: the next step is seldom as steep
 LEAST_STEEP, STEEPEST = 0.3, 4 / 2  # powers of the nodes by which errors fall: order four, and bodies that are refined in two directions
 LOOSEST_TOLERANCE, STRICTEST_TOLERANCE = 1e-6, 1e-12
@@ -50,15 +51,15 @@ class Sample:
     cpu_s: float  # of one rank, on the machine of the study
 
 
-def interpolate(points, x, least_slope, most_slope):
-    """points: [(x, y)] by x, both positive: y as powers of x between them; beyond them the slope at the end, held between two limits."""
+def interpolate(points, x, least_slope, most_slope, trust=1.0):
+    """points: [(x, y)] by x, both positive: y as powers of x between them; beyond the last the slope there times `trust`, before the first the slope there; both held between two limits."""
     if len(points) == 1:
         return points[0][1]
     index = next((i for i in range(1, len(points) - 1) if x < points[i][0]), len(points) - 1)
     (x_0, y_0), (x_1, y_1) = points[index - 1], points[index]
     slope = math.log(y_1 / y_0) / math.log(x_1 / x_0)
     if x > points[-1][0]:
-        x_0, y_0 = points[-1]
+        (x_0, y_0), slope = points[-1], trust * slope
     if not x_0 <= x <= x_1:
         slope = min(max(slope, least_slope), most_slope)
     return y_0 * (x / x_0) ** slope
@@ -84,7 +85,7 @@ class Curve:
         return self.samples[-1].nodes * (MOST_FINER if self.is_measured else 1.0)
 
     def predict_cents(self, nodes):
-        return interpolate(self.errors, nodes, -STEEPEST, 0.0)
+        return interpolate(self.errors, nodes, -STEEPEST_BEYOND, 0.0, TRUST)
 
     def predict_cpu(self, nodes):
         return interpolate([(s.nodes, s.cpu_s) for s in self.samples], nodes, 0.3, 1.7)

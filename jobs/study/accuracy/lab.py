@@ -105,6 +105,7 @@ class Lab:
             raise InputError(f"{out}: the folder cannot be made: {error.strerror}; give another one with -o") from None
         self.start, self.load_start = time.monotonic(), os.getloadavg()[0]
         self.measured_s = 0.0  # CPU seconds of this call
+        self.found = {}  # by section: what it measured, for the sections after it
 
     def say(self, text):
         print(text, file=sys.stderr, flush=True)

@@ -270,6 +270,7 @@ def study(lab, bodies):
     add_effects(section, measure_effects(lab, scenes["chute"], contacts))
     add_chart(section, measured)
     section.say(describe_defaults(measured))
+    lab.found[NAME] = measured
     return section
 
 

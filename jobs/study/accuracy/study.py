@@ -37,6 +37,7 @@ def run(options):
     for name in chosen:
         if name not in SECTIONS:
             raise InputError(f"--only {name}: there is no such section; choose among {', '.join(SECTIONS)}")
+    chosen.sort(key=SECTIONS.index)  # the recommendation rests on what the others found
     on = bodies.choose(options.on, options.surface)
     modules = {name: importlib.import_module(f"accuracy.{name}") for name in chosen}
     found = programs.find_all(options.bin, [program for module in modules.values() for program in module.PROGRAMS])
