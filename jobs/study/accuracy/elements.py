@@ -155,8 +155,8 @@ def add_costs(section, lab, results):
         least = [min(values) for name in names if (values := [table[key] for key in table if key[0] == name and key[2] == level])]
         if least:
             order = ", ".join(f"{kind} on {count}" for kind, count in cheapest[level].most_common())
-            section.conclude(f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {min(least):.2g} to {max(least):.2g} CPU s (median {statistics.median(least):.2g} s over {len(least)} "
-                             f"bod{'ies' if len(least) > 1 else 'y'}); cheapest is {order}.")
+            spread = f"{min(least):.2g} to {max(least):.2g} CPU s (median {statistics.median(least):.2g} s over {len(least)} bodies)" if len(least) > 1 else f"{least[0]:.2g} CPU s"
+            section.conclude(f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {spread}; cheapest is {order}.")
 
 
 def study(lab, bodies):

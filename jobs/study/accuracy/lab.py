@@ -181,7 +181,7 @@ class Lab:
                 done, left = done + 1, left - weights[case.name]
                 spent = time.monotonic() - begin
                 seconds = kept[case.name]["cpu_s"][-1:] or [0.0]
-                minutes = spent / max(all_weight - left, 1e-9) * left / 60
+                minutes = spent / max(all_weight - left, 1e-9) * max(left, 0.0) / 60
                 self.say(f"{done}/{todo} {case.name}: {seconds[0]:.2f} CPU s; about {minutes:.1f} min left of these")
         return {case.name: self.make_solve(kept[case.name], keys[case.name], repeats) for case in cases}
 
