@@ -267,6 +267,22 @@ TEST(SolveModes, agrees_between_block_lanczos_and_krylov_schur) {
   expect_eigenvalues(single, pick(get_block_eigenvalues(), options.low_hz, options.high_hz));
 }
 
+// Dense matrices pay where most of the spectrum is wanted: a wide band of which max_modes wants a few is no reason (docs/accuracy.md).
+TEST(SolveModes, goes_dense_by_the_modes_wanted_and_not_by_the_band) {
+  const test::System system = test::make_system(get_block());
+  Options options = make_options();
+  options.high_hz = 2 * to_hz(get_block_eigenvalues().back());
+  options.max_modes = 20;
+  const Modes few = solve_modes(system.problem, options);
+  EXPECT_EQ(few.factor.solver.find("dense"), std::string::npos) << few.factor.solver;
+  expect_eigenvalues(few, {get_block_eigenvalues().begin() + 6, get_block_eigenvalues().begin() + 26});
+  EXPECT_EQ(few.band_count, 744);
+  options.max_modes.reset();
+  const Modes all = solve_modes(system.problem, options);
+  EXPECT_NE(all.factor.solver.find("dense"), std::string::npos) << all.factor.solver;
+  expect_eigenvalues(all, {get_block_eigenvalues().begin() + 6, get_block_eigenvalues().end()});
+}
+
 TEST(SolveModes, solves_densely_when_asked_to) {
   const test::System system = test::make_system(get_block());
   Options options = make_options();
