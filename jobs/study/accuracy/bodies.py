@@ -42,7 +42,8 @@ CERAMIC = {"lame_lambda_pa": 3.99e9, "lame_mu_pa": 2.05e9, "density_kg_m3": 2700
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """words: for carillon-mesh; change: (name, function of a MeshFile that moves its nodes) or None. sizes, quick_sizes: nodes asked for, coarse to fine."""
+    """words: for carillon-mesh; change: (name, function of a MeshFile that moves its nodes) or None. sizes, quick_sizes: nodes asked for, coarse to fine; quadratic_sizes: those of T10
+    (all, quick) where a thin wall asks for more."""
     name: str
     summary: str
     material: dict
@@ -51,6 +52,7 @@ class Body:
     round: bool  # has curved faces: a straight T10 is another body
     sizes: tuple = (400, 1000, 2500, 6000, 15000)
     quick_sizes: tuple = (300, 900, 2700)
+    quadratic_sizes: tuple = ()
     change: tuple | None = None
     truth: known.Truth | None = None  # None: the finest curved T10 has to tell
     surface: bool = False
@@ -59,7 +61,9 @@ class Body:
         """On flat bodies straight and curved T10 are the same."""
         return [kind for kind in KINDS if self.round or kind.name != "T10 curved"]
 
-    def get_sizes(self, lab):
+    def get_sizes(self, lab, kind):
+        if self.quadratic_sizes and kind.element == "T10":
+            return self.quadratic_sizes[lab.quick]
         return self.quick_sizes if lab.quick else self.sizes
 
     def make_mesh(self, lab, kind, nodes):
@@ -146,7 +150,7 @@ def make_bodies():
         Body("vibraphone", "undercut aluminium bar, 360 x 50 mm, bending modes 1 : 4 : 10", ALUMINIUM,
              shape("bar", length=0.36, width=0.05, thickness=VIBRAPHONE_H0), 16, True, change=("undercut", undercut)),
         Body("bunny", "hollow ceramic bunny, 130 mm tall, wall 5 mm", CERAMIC, ("--height", "0.13", "--wall", "0.005"), 15, True, sizes=(5000, 10000, 20000, 40000, 80000),
-             quick_sizes=(3000, 5000, 9000), surface=True),
+             quick_sizes=(3000, 5000, 9000), quadratic_sizes=((18500, 26000, 37000, 55000, 80000), (18500, 21000, 24000)), surface=True),
     ]
     return {body.name: dataclasses.replace(body, truth=truths.get(body.name)) for body in bodies}
 
