@@ -155,7 +155,8 @@ TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
   expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/bank/pinned/version_1_0.hdf"), example::make_first_bank(1, 2));
   expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/bank/pinned/version_1_1.hdf"), example::make_bank(1, 2));
   // carillon-bank edit version_1_1.hdf version_1_2.hdf --shape-bits 8
-  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/bank/pinned/version_1_2.hdf"), calc_reduced(example::make_bank(1, 2), {.shape_bits = 8}));
+  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/bank/pinned/version_1_2.hdf"),
+               calc_reduced(example::make_bank(1, 2), {.shape_bits = 8}));
 }
 
 TEST_F(BankFile, MayHoldNoModes) {
