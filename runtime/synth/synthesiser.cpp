@@ -19,6 +19,7 @@
 namespace carillon::synth {
 namespace {
 
+constexpr double kMostModes = 1 << 24;
 constexpr int kMostBodies = 1 << 20;
 constexpr std::int64_t kGiveBackEvery = 8;  // periods: 21 ms at 48 kHz
 constexpr int kMostMicrophones = 256;
@@ -344,10 +345,13 @@ void Synthesiser::finish_changes() noexcept {
   });
 }
 
-/// The floor for strikes in this period, whether the body is awake since its beginning or not.
+/// The floor for strikes in this period, whether the body is awake since its beginning or not; and no body wakes more modes than the whole
+/// budget has room for: they would have to go at once, and take others with them for the work that they were.
 void Synthesiser::give_floor(Body& body) noexcept {
   Voice* voice = body.get_voice();
   if (!limited_ || voice == nullptr) return;
+  const double modes = allowed_.load(std::memory_order_relaxed) / options_.rate_hz;
+  voice->set_limit(modes > 0.0 ? static_cast<int>(std::min(modes, kMostModes)) : 0);
   const std::int64_t begin = sample_ / kPeriod * kPeriod;
   voice->set_floor(budget_.get_floor_pa() / body.calc_nearness(listener_, begin));
 }
@@ -364,6 +368,7 @@ void Synthesiser::keep_budget() noexcept {
     for (Body* body : playing_)
       if (body != nullptr && body->get_voice() != nullptr) {
         body->get_voice()->set_floor(0.0F);
+        body->get_voice()->set_limit(static_cast<int>(kMostModes));
         body->get_voice()->allow_driven(body->get_voice()->get_group_count());
       }
     return;

@@ -193,6 +193,22 @@ TEST(Budget, MoreOfItIsNearerToAll) {
   EXPECT_EQ(std::memcmp(play_hail(1e12, 20.0, 0.5).sound.data(), all.sound.data(), all.sound.size() * sizeof(float)), 0);
 }
 
+TEST(Budget, OneBodyOfManyModesKeepsAsManyAsThereIsRoomFor) {
+  // A thousand modes, one strike, room for 208: no fewer may stay, whatever it took to wake them.
+  const bank::Bank bank = make_bank(1000, 200.0, 20000.0, 3.0, 1e-3);
+  const auto model = Model::make(bank, {.rate_hz = kRate});
+  Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}, .budget = 208.0 * kRate});
+  const int body = synthesiser.add_body(model, {.position_m = {0, 1, 0}, .effects = {Effect::kModal, Effect::kHertzPulse}});
+  synthesiser.push(stream::Impulse{
+      .time_s = 0.001, .body = body, .triangle = 0, .barycentric = {1, 0, 0}, .impulse_n_s = {0, 0, 1}, .duration_s = 1e-4});
+  std::vector<float> block(4800);
+  float* out = block.data();
+  synthesiser.process(&out, 1, 4800);
+  const std::int64_t before = synthesiser.get_counters().mode_samples;
+  synthesiser.process(&out, 1, 4800);
+  EXPECT_NEAR(static_cast<double>(synthesiser.get_counters().mode_samples - before), 208.0 * 4800, 16.0 * 4800);
+}
+
 TEST(Budget, GivesTheSameBitsInBlocksOfAnySize) {
   const double budget = 3e7;
   const Played whole = play_hail(budget, 50.0, 0.4, {4096});
