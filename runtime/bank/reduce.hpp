@@ -16,8 +16,8 @@ inline constexpr double kEarS = 0.2;
 /// A-weighting as a factor of the amplitude, 1 at 1 kHz (IEC 61672-1:2013, E.4.2). 0 <= freq_hz.
 double calc_a_weight(double freq_hz) noexcept;
 
-/// How much of each mode is heard, (m) [Pa^2 s]: the A-weighted exposure at 1 m, within the ear's own time, of a blow of 1 N s along the
-/// normal, averaged over all places of the surface. By the bank's own gains. The bank is sane.
+/// How much of each mode is heard, (m) [Pa^2 s]: the A-weighted exposure at 1 m, within the ear's own time, of a hard blow (1 N s, 0.1 ms)
+/// along the normal, averaged over all places of the surface. By the bank's own gains. The bank is sane.
 std::vector<double> calc_audibility(const Bank& bank);
 
 /// Modes that a reduced bank keeps: the most audible ones by calc_audibility(), or the lowest ones as `max_modes` of a job does.

@@ -59,7 +59,15 @@ TEST(Reduce, TheLoudestModesAreThoseOfTheMostExposureWithinTheEarsTime) {
       area += twice;
     }
     // The exposure by quadrature of p(t)^2 e^(-t / 0.2 s) over whole periods: half of that of the envelope.
-    const double pressure = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m];
+    // A Gaussian pulse of the variance of sin^1.5 over 0.1 ms, by quadrature: its spectrum is exp(-(omega sigma)^2 / 2).
+    double weight = 0.0, second = 0.0;
+    for (int n = 0; n < 10000; ++n) {
+      const double x = (n + 0.5) / 10000.0, force = std::pow(std::sin(3.14159265358979 * x), 1.5);
+      weight += force;
+      second += force * (x - 0.5) * (x - 0.5);
+    }
+    const double sigma_s = 1e-4 * std::sqrt(second / weight), omega = std::sqrt(bank.eigenvalue_rad2_s2[m]);
+    const double pressure = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m] * std::exp(-0.5 * omega * omega * sigma_s * sigma_s);
     double exposure = 0.0;
     constexpr double kStep = 1e-4;
     for (int n = 0; n < 20000; ++n) exposure += 0.5 * std::exp(-(2.0 * bank.decay_per_s[m] + 5.0) * (n + 0.5) * kStep) * kStep;
