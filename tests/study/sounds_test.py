@@ -53,19 +53,28 @@ class Distance(unittest.TestCase):
         noise = np.random.default_rng(5).standard_normal(RATE)
         for gain_db in (0.5, 3.0, -6.0):
             other = noise * 10 ** (gain_db / 20)
-            self.assertAlmostEqual(sounds.calc_distance_db(make(noise), make(other)), abs(gain_db), delta=1e-6)
+            self.assertAlmostEqual(sounds.calc_distance(make(noise), make(other))[0], abs(gain_db), delta=1e-6)
 
     def test_one_of_two_equal_sines_is_lost(self):
         # Two steady sines in bands of their own: half the cells fall to the floor, 60 dB below, the other half stay. sqrt((60^2 + 0) / 2).
         time = np.arange(8 * RATE) / RATE
         soft = np.minimum(1.0, np.minimum(time, 8 - time) / 0.1)  # what begins at once is in all bands
         low, high = soft * np.sin(2 * np.pi * 1000 * time), soft * np.sin(2 * np.pi * 8000 * time)
-        distance = sounds.calc_distance_db(make(low + high), make(low))
+        distance, outliers = sounds.calc_distance(make(low + high), make(low))
         self.assertAlmostEqual(distance, 60 / np.sqrt(2), delta=0.8)
+        self.assertGreater(outliers, 0.98)
+
+    def test_frames_that_are_off_are_counted(self):
+        # 3 dB louder in a tenth of the time: as much of the frames, and 3 sqrt(0.1) dB on the whole.
+        noise = np.random.default_rng(7).standard_normal(10 * RATE)
+        other = noise * np.where((np.arange(len(noise)) >= 3 * RATE) & (np.arange(len(noise)) < 4 * RATE), 10 ** (3 / 20), 1.0)
+        distance, outliers = sounds.calc_distance(make(noise), make(other))
+        self.assertAlmostEqual(outliers, 0.1, delta=0.005)
+        self.assertAlmostEqual(distance, 3 * np.sqrt(0.1), delta=0.02)
 
     def test_phases_do_not_count(self):
         a, b = np.sin(2 * np.pi * 1000 * TIME) * np.hanning(len(TIME)), np.cos(2 * np.pi * 1000 * TIME) * np.hanning(len(TIME))
-        self.assertLess(sounds.calc_distance_db(make(a), make(b)), 0.01)
+        self.assertLess(sounds.calc_distance(make(a), make(b))[0], 0.01)
         self.assertGreater(sounds.calc_error_db(make(a), make(b)), 2.9)
 
 
@@ -121,6 +130,7 @@ class Verdict(unittest.TestCase):
         self.assertFalse(sounds.Difference(-10.0, 0.9, 0.9).is_told)
         self.assertTrue(sounds.Difference(-10.0, 1.1, 0.0).is_told)
         self.assertTrue(sounds.Difference(-10.0, 0.1, -1.1).is_told)
+        self.assertTrue(sounds.Difference(-10.0, 0.9, 0.0, 0.03).is_told)
 
 
 if __name__ == "__main__":

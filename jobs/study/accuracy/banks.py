@@ -143,7 +143,7 @@ def describe_verdict(difference):
 
 
 def to_cells(row):
-    apart = row.difference.to_cells() if row.difference else ("-", "-", "-")
+    apart = row.difference.to_cells() if row.difference else sounds.NO_CELLS
     return (f"{row.bank_bytes / 1e6:.2f}", f"{row.played.cpu_ms:.2f}", f"{100 * row.played.spread:.0f} %", *apart, describe_verdict(row.difference))
 
 
@@ -151,11 +151,10 @@ CELLS = ("bank, MB", "CPU, ms for 1 s", "spread", *sounds.HEAD, "by ear")
 
 
 def to_data(row):
-    apart = dataclasses.astuple(row.difference) if row.difference else (-300.0, 0.0, 0.0)
-    return (row.bank_bytes, row.played.cpu_ms, row.played.spread, *apart, "" if row.difference is None else int(row.difference.is_told))
+    return (row.bank_bytes, row.played.cpu_ms, row.played.spread, *(row.difference.to_data() if row.difference else sounds.NO_DATA))
 
 
-DATA = ("bank_bytes", "cpu_ms_per_s", "cpu_spread", "error_dba", "log_spectral_distance_db", "loudness_change_dba", "told_apart")
+DATA = ("bank_bytes", "cpu_ms_per_s", "cpu_spread", *sounds.DATA)
 
 
 def find_fewest(rows, kept):
@@ -288,5 +287,5 @@ def study(lab, bodies):
 
 def describe_measures():
     return (f"error, the A-weighted exposure of the difference below that of the reference (IEC 61672-1; it knows phases; below {sounds.ERROR_LIMIT_DB:.0f} dB nothing is told apart); log-spectral distance, root mean "
-            f"square of level differences in third-octave bands and frames of 43 ms, down to {sounds.RANGE_DB:.0f} dB below the loudest (below {sounds.DISTANCE_LIMIT_DB:.0f} dB not told apart, Paliwal & Atal 1993); change of "
+            f"square of level differences in third-octave bands and frames of 43 ms, down to {sounds.RANGE_DB:.0f} dB below the loudest (below {sounds.DISTANCE_LIMIT_DB:.0f} dB, with no more than {100 * sounds.OUTLIER_LIMIT:.0f} % of the frames more than {sounds.OUTLIER_DB:.0f} dB off, not told apart, Paliwal & Atal 1993); change of "
             f"loudness, of the loudest A-weighted level within 0.2 s (10 dB are twice as many sones, ISO 131; {sounds.LOUDNESS_LIMIT_DB:.0f} dB is just heard, Jesteadt, Wier & Green 1977).")

@@ -162,17 +162,16 @@ def measure_kernels(lab, bank):
 
 
 HEAD = ("CPU, ms for 1 s", "spread", *sounds.HEAD, "by ear")
-DATA = ("cpu_ms_per_s", "cpu_spread", "error_dba", "log_spectral_distance_db", "loudness_change_dba", "told_apart")
+DATA = ("cpu_ms_per_s", "cpu_spread", *sounds.DATA)
 
 
 def to_cells(one):
-    apart = one.difference.to_cells() if one.difference else ("-", "-", "-")
+    apart = one.difference.to_cells() if one.difference else sounds.NO_CELLS
     return (f"{one.cpu_ms:.2f}", f"{100 * one.spread:.0f} %", *apart, banks.describe_verdict(one.difference))
 
 
 def to_data(one):
-    apart = dataclasses.astuple(one.difference) if one.difference else (-300.0, 0.0, 0.0)
-    return (one.cpu_ms, one.spread, *apart, "" if one.difference is None else int(one.difference.is_told))
+    return (one.cpu_ms, one.spread, *(one.difference.to_data() if one.difference else sounds.NO_DATA))
 
 
 def format_setting(setting):

@@ -4,7 +4,7 @@ Three measures, each of the whole of two sounds at the same places:
   error_db      exposure of the difference over that of the reference, both A-weighted (IEC 61672-1:2013, E.4.2) from 20 Hz to 20 kHz, all channels. It knows phases: below -40 dB nothing is told apart;
                 of two sounds that run out of step it says nothing.
   distance_db   log-spectral distance: root mean square, over third-octave bands (IEC 61260-1) and frames of 43 ms, of the difference of levels in dB. Cells count that either sound lifts above a floor:
-                60 dB below the reference's loudest cell of all and not below 0 dB re 20 uPa; what is softer counts as the floor. It knows no phases. Averages below 1 dB are not told apart (Paliwal & Atal 1993).
+                60 dB below the reference's loudest cell of all and not below 0 dB re 20 uPa; what is softer counts as the floor. It knows no phases. Below 1 dB, with no more than 2 % of the frames more than 2 dB off (outliers), nothing is told apart (Paliwal & Atal 1993).
   loudness_db   change of the loudest A-weighted level within the ear's own time, 0.2 s (Zwislocki 1969), in dB(A): the model of loudness is ISO 131's, sones = 2^((L - 40 dB) / 10) with L the A-weighted level,
                 so that 10 dB double the loudness. 1 dB is just heard (Jesteadt, Wier & Green 1977).
 """
@@ -31,6 +31,7 @@ GAIN_PER_PA = 1e-6
 # Below these nobody tells two sounds apart (above).
 NONE_DB = -200.0  # the same but for the rounding of these sums
 ERROR_LIMIT_DB, DISTANCE_LIMIT_DB, LOUDNESS_LIMIT_DB = -40.0, 1.0, 1.0
+OUTLIER_DB, OUTLIER_LIMIT = 2.0, 0.02
 
 
 def find_spread(values):
@@ -76,17 +77,24 @@ class Difference:
     error_db: float
     distance_db: float
     loudness_db: float
+    outliers: float = 0.0  # share of the frames that are more than OUTLIER_DB off
 
     @property
     def is_told(self):
         """Whether anybody would tell the two apart: by the waveform not below -40 dB, else by bands and loudness."""
-        return self.error_db > ERROR_LIMIT_DB and (self.distance_db > DISTANCE_LIMIT_DB or abs(self.loudness_db) > LOUDNESS_LIMIT_DB)
+        bands = self.distance_db > DISTANCE_LIMIT_DB or self.outliers > OUTLIER_LIMIT
+        return self.error_db > ERROR_LIMIT_DB and (bands or abs(self.loudness_db) > LOUDNESS_LIMIT_DB)
 
     def to_cells(self):
-        return format_db(self.error_db), f"{self.distance_db:.2f}", format_change(self.loudness_db)
+        return format_db(self.error_db), f"{self.distance_db:.2f}", f"{100 * self.outliers:.0f} %", format_change(self.loudness_db)
+
+    def to_data(self):
+        return self.error_db, self.distance_db, self.outliers, self.loudness_db, int(self.is_told)
 
 
-HEAD = ("error, dB(A)", "log-spectral distance, dB", "loudness, dB(A)")
+HEAD = ("error, dB(A)", "log-spectral distance, dB", "frames off", "loudness, dB(A)")
+DATA = ("error_dba", "log_spectral_distance_db", "frames_off", "loudness_change_dba", "told_apart")
+NO_CELLS, NO_DATA = ("-",) * len(HEAD), (-300.0, 0.0, 0.0, 0.0, "")  # of the reference itself
 
 
 def format_db(value):
@@ -243,17 +251,19 @@ def calc_bands(pressure, rate):
     return out * 2 / (size * np.square(window).sum())
 
 
-def calc_distance_db(reference, other):
+def calc_distance(reference, other):
+    """(dB, share of the frames that are more than OUTLIER_DB off)."""
     rate, a, b = match(reference, other)
     first, second = calc_bands(a, rate), calc_bands(b, rate)
     if first.size == 0 or not first.max() > 0:
-        return 0.0
+        return 0.0, 0.0
     floor = max(first.max() * 10 ** (-RANGE_DB / 10), REFERENCE_PA**2)
     counts = (first > floor) | (second > floor)
     if not counts.any():
-        return 0.0
-    gap = 10 * np.log10(np.maximum(first, floor) / np.maximum(second, floor))[counts]
-    return float(np.sqrt(np.mean(np.square(gap))))
+        return 0.0, 0.0
+    squares = np.square(10 * np.log10(np.maximum(first, floor) / np.maximum(second, floor)))
+    of_frames = np.sqrt(squares.sum(axis=1, where=counts) / np.maximum(counts.sum(axis=1), 1))[counts.any(axis=1)]
+    return float(np.sqrt(np.mean(squares[counts]))), float(np.mean(of_frames > OUTLIER_DB))
 
 
 def calc_loudest_db(sound):
@@ -277,4 +287,5 @@ def compare(reference, other):
     rate, a, b = match(reference, other)
     a, b = Sound(rate, a), Sound(rate, b)
     loudness = calc_loudest_db(b) - calc_loudest_db(a)
-    return Difference(calc_error_db(a, b), calc_distance_db(a, b), loudness)
+    distance, outliers = calc_distance(a, b)
+    return Difference(calc_error_db(a, b), distance, loudness, outliers)
