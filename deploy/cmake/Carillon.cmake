@@ -31,7 +31,7 @@ endfunction()
 
 # carillon_test(NAME SOURCES ... LINK libs... [RANKS 1 2 3] [LABELS ...] [TIMEOUT s])
 # GoogleTest binary. Without RANKS every test case is a CTest test NAME.Suite.Case; with RANKS the whole binary runs under mpirun as
-# NAME.npN (its main is tests/support/mpi_main.cpp). Every test has a TIMEOUT.
+# NAME.npN (its main is tests/support/mpi_main.cpp). Every test has a TIMEOUT, by which CTest also takes the longest first (COST).
 function(carillon_test name)
   cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINK;RANKS;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
@@ -48,13 +48,13 @@ function(carillon_test name)
     foreach(ranks ${arg_RANKS})
       carillon_mpi_command(command ${ranks})
       add_test(NAME ${name}.np${ranks} COMMAND ${command} $<TARGET_FILE:${target}>)
-      set_tests_properties(${name}.np${ranks} PROPERTIES PROCESSORS ${ranks} TIMEOUT ${arg_TIMEOUT} LABELS "mpi;${arg_LABELS}"
+      set_tests_properties(${name}.np${ranks} PROPERTIES PROCESSORS ${ranks} TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT} LABELS "mpi;${arg_LABELS}"
         ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
     endforeach()
   else()
     target_link_libraries(${target} PRIVATE ${arg_LINK} GTest::gtest_main)
     gtest_discover_tests(${target} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60
-      PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+      PROPERTIES TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT} LABELS "${arg_LABELS}")
   endif()
 endfunction()
 
@@ -72,7 +72,7 @@ function(carillon_script_test name)
     set(arg_TIMEOUT 120)
   endif()
   add_test(NAME ${name} COMMAND ${arg_COMMAND})
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}"
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT} LABELS "${arg_LABELS}"
     ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT};CARILLON_BIN_DIR=${CMAKE_BINARY_DIR}/bin;CARILLON_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
 endfunction()
 

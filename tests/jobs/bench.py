@@ -20,9 +20,10 @@ def make_job(**changes):
 
 class Bench(unittest.TestCase):
     wrapper = []  # words before carillon
+    parent = None  # of the folder; none: where temporary files go
 
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="carillon-jobs-"))
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="carillon-jobs-", dir=self.parent))
         self.addCleanup(self.clean)
         self.store = self.folder / "store"
         self.environment = {**os.environ, "XDG_DATA_HOME": str(self.folder / "data"), "XDG_CONFIG_HOME": str(self.folder / "config"), "PATH": "/usr/bin:/bin"}
