@@ -8,6 +8,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -18,7 +19,7 @@ import xml.dom.minidom
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "jobs/study"))
-from accuracy import bodies, cents, gmsh, known, plots
+from accuracy import bodies, cents, gmsh, known, papers, plots
 
 
 def call(folder, *words, seconds=200):
@@ -124,6 +125,25 @@ class Study(unittest.TestCase):
         self.assertEqual(before, {run: (run / "kept.json").stat().st_mtime_ns for run in runs[1:]})
         self.assertEqual(len(json.loads((runs[0] / "kept.json").read_text())["cpu_s"]), 1)
 
+    def test_page_of_the_docs_is_renewed_from_a_report_and_a_second_time_changes_nothing(self):
+        docs = self.folder / "docs"
+        (docs / "images").mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / "docs/accuracy.md", docs)
+        update = [ROOT / "tests/bench/accuracy/update", self.out, docs]
+        first = subprocess.run(update, capture_output=True, text=True)
+        self.assertEqual(first.returncode, 0, first.stderr)
+        text = (docs / "accuracy.md").read_text()
+        self.assertIn("| cube | T10 straight |", text)
+        for picture in re.findall(r"\((images/accuracy-elements[^)]*)\)", text):
+            self.assertTrue((docs / picture).is_file() or (ROOT / "docs" / picture).is_file(), picture)
+        self.assertTrue((docs / "images/accuracy-elements-cube.svg").is_file())
+        subprocess.run(update, check=True, capture_output=True)
+        self.assertEqual((docs / "accuracy.md").read_text(), text)
+        (docs / "accuracy.md").write_text("no place\n")
+        third = subprocess.run(update, capture_output=True, text=True)
+        self.assertEqual((third.returncode, len(third.stderr.splitlines())), (2, 1), third.stderr)
+        self.assertEqual((docs / "accuracy.md").read_text(), "no place\n")
+
     def test_bad_input_is_one_clear_error_and_starts_nothing(self):
         (self.folder / "file").write_text("")
         empty = self.folder / "empty"
@@ -172,6 +192,36 @@ class Parts(unittest.TestCase):
         self.assertIsNone(cents.find_cost(points, 0.1))
         slow_start = [cents.Point("x", 1, 1, elements, 1.0 + elements * 1e-6, 0, [1000.0 / elements]) for elements in (10, 100, 1000)]
         self.assertGreater(cents.find_cost(slow_start, 0.1).cpu_s, 15)  # ten times the elements: more than ten times the seconds
+
+    def test_dense_and_sparse_cross_where_their_times_are_equal(self):
+        sizes = [100, 200, 400, 800]
+        self.assertAlmostEqual(papers.find_crossing(sizes, [1e-9 * n**3 for n in sizes], [9e-5 * n for n in sizes]), 300, 6)
+        self.assertIsNone(papers.find_crossing(sizes, [2, 3, 4, 5], [1, 1, 1, 1]))
+        self.assertAlmostEqual(papers.find_nodes_below([(100, 80.0), (200, 20.0), (400, 5.0)], 40), 140, delta=5)
+        self.assertIsNone(papers.find_nodes_below([(100, 80.0), (200, 20.0)], 10))
+
+    def test_density_shifts_all_modes_alike(self):
+        """Mode 1 becomes right, and differences between modes stay."""
+        class Collect:
+            def __init__(self):
+                self.tables, self.words = {}, []
+
+            def add_table(self, name, rows, caption, data=None, command=None):
+                self.tables[name] = data
+
+            def add_chart(self, *_):
+                pass
+
+            def conclude(self, text):
+                self.words.append(text)
+
+        section = Collect()
+        cube = bodies.make_bodies()["cube"]
+        papers.study_density(section, None, [(cube, None, {"T4 consistent": [cents.Point("T4 consistent", 500, 1500, 2000, 1.0, None, [120.0, 150.0, 90.0])]})])
+        rows = section.tables["density"][1:]
+        self.assertEqual([round(row[5], 9) for row in rows], [0.0, 30.0, -30.0])
+        self.assertAlmostEqual(rows[0][2], 2**0.2, 12)  # the frequency is 2^(120/1200) too high, and goes with the root of one over the density
+        self.assertIn("25 to 25 %", section.words[0])
 
     def test_mapped_bodies_have_the_volume_of_the_true_ones(self):
         """Bowl: 2 pi/3 (R^3 - r^3) (cos 5 - cos 90); bar: width times the integral of its thickness, by the trapezoidal rule."""

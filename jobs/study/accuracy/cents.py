@@ -20,7 +20,7 @@ class Point:
     unknowns: int
     elements: int
     cpu_s: float
-    spread: float
+    spread: float | None  # None: one run
     cents: list
 
     @property
@@ -45,7 +45,7 @@ def make_point(kind, solve, truth):
     """None when the mesh is so coarse that it has fewer modes than are known."""
     if len(solve.freq_hz) < len(truth.freq_hz):
         return None
-    return Point(kind, solve.nodes, solve.unknowns, solve.elements, solve.cpu, solve.spread, [to_cents(f, true) for f, true in zip(solve.freq_hz, truth.freq_hz)])
+    return Point(kind, solve.nodes, solve.unknowns, solve.elements, solve.cpu, solve.spread if len(solve.cpu_s) > 1 else None, [to_cents(f, true) for f, true in zip(solve.freq_hz, truth.freq_hz)])
 
 
 def extrapolate(edges, freq_hz):

@@ -8,6 +8,7 @@ import os
 import pathlib
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -123,7 +124,7 @@ class Lab:
     # --- meshes
 
     def make_mesh(self, words, change=None, name="", inputs=()):
-        """carillon-mesh with these words, kept by their hash. change(path): alters the file afterwards, `name` says how; inputs: files that the words name."""
+        """carillon-mesh with these words, kept by their hash. change(path): alters a copy of that file, `name` says how; inputs: files that the words name."""
         program = self.find_program("carillon-mesh")
         words = [str(word) for word in words]
         key = calc_key([calc_digest(program), words, name, [calc_digest(path) for path in inputs]])
@@ -132,16 +133,20 @@ class Lab:
         if not (kept and mesh.is_file()):
             part = self.meshes / f"{key}.{os.getpid()}.part.msh"
             try:
-                cost = self.call([program, *words, "--quiet", "--json", part.with_suffix(".json"), "-o", part], "carillon-mesh")
-                made = json.loads(part.with_suffix(".json").read_text())
                 if change:
+                    base = self.make_mesh(words, inputs=inputs)
+                    shutil.copyfile(base.path, part)
                     change(part)
+                    kept = {"nodes": base.nodes, "elements": base.elements, "cpu_s": base.cpu_s}
+                else:
+                    cost = self.call([program, *words, "--quiet", "--json", part.with_suffix(".json"), "-o", part], "carillon-mesh")
+                    made = json.loads(part.with_suffix(".json").read_text())
+                    kept = {"nodes": made["nodes"], "elements": made["tets"], "cpu_s": cost.cpu_s}
                 os.replace(part, mesh)
             finally:
                 part.unlink(missing_ok=True)
                 part.with_suffix(".json").unlink(missing_ok=True)
-            kept = {"words": words, "change": name, "nodes": made["nodes"], "elements": made["tets"], "cpu_s": cost.cpu_s}
-            write_whole(note, json.dumps(kept, indent=1) + "\n")
+            write_whole(note, json.dumps({"words": words, "change": name} | kept, indent=1) + "\n")
         return Mesh(mesh, kept["nodes"], kept["elements"], kept["cpu_s"])
 
     def call(self, command, what, environment=None, cwd=None):

@@ -38,12 +38,13 @@ def run(options):
         if name not in SECTIONS:
             raise InputError(f"--only {name}: there is no such section; choose among {', '.join(SECTIONS)}")
     chosen.sort(key=SECTIONS.index)  # the recommendation rests on what the others found
-    on = bodies.choose(options.on, options.surface)
+    on = bodies.choose(options.on, options.surface, options.quick)
     modules = {name: importlib.import_module(f"accuracy.{name}") for name in chosen}
     found = programs.find_all(options.bin, [program for module in modules.values() for program in module.PROGRAMS])
     lab = Lab(options.out, found, options.quick, options.repeats, options.surface, options.timeout)
     if not options.on and len(on) < len(bodies.make_bodies()):
-        lab.say(f"{options.surface} is not there: the study goes without the bunny; install glmark2-data, or give the surface with --surface")
+        lab.say("--quick goes without the bunny, whose thin wall takes many nodes; --on bunny has it" if options.quick else
+                f"{options.surface} is not there: the study goes without the bunny; install glmark2-data, or give the surface with --surface")
     sections = []
     for number, (name, module) in enumerate(modules.items()):
         lab.say(f"section {number + 1} of {len(modules)}: {name}")
