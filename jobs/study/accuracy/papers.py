@@ -172,7 +172,7 @@ def study_dense(section, lab):
 
 
 def study(lab, bodies):
-    section = Section("papers", "The papers' own trade-offs", lab.make_command("papers", *(["--on", *(body.name for body in bodies)] if len(bodies) < 9 else [])))
+    section = Section("papers", "The papers' own trade-offs", lab.make_command("papers", *(["--on", *(body.name for body in bodies)] if len(bodies) < len(make_bodies()) - 1 else [])))
     results = find_points(lab, bodies)
     study_density(section, lab, results)
     study_lumping(section, results)
