@@ -143,7 +143,7 @@ Html make_modes_section(const Subject& subject) {
   Html out =
       html("<p>{} modes from {} to {}; the band is {} Hz to {} Hz{}.</p>\n", format_count(static_cast<std::int64_t>(bank.mode_count())),
            format_hz(bank.freq_hz(0)), format_hz(bank.freq_hz(bank.mode_count() - 1)), format_plain(bank.band_hz[0]),
-           format_plain(bank.band_hz[1]), bank.complete ? "" : ", and the job limited their number");
+           format_plain(bank.band_hz[1]), bank.complete ? "" : ", and not all of its modes are here");
   out += draw_modes(bank);
   if (!bank.discretisation_error_cents.empty() || !bank.algebraic_error_cents.empty())
     out += html("<p class=\"remark\">Whiskers along the frequency: both error bars together.</p>\n");
@@ -154,11 +154,11 @@ Html make_modes_section(const Subject& subject) {
 Html make_proof_section(const Subject& subject) {
   const bank::Bank& bank = subject.bank;
   if (!bank.proof) {
+    const bool is_first = subject.version[0] == 1 && subject.version[1] == 0;
     return leave_out("proof", "Proof that no mode is missing",
-                     subject.version[0] == 1 && subject.version[1] == 0
-                         ? "banks of version 1.0 and the loudest modes of another bank carry none; nothing shows that the band holds no "
-                           "more modes than these."
-                         : "the bank carries none; nothing shows that the band holds no more modes than these.");
+                     !bank.complete ? "the bank carries none: of the band's modes the most audible ones were kept."
+                     : is_first     ? "banks of version 1.0 carry none; nothing shows that the band holds no more modes than these."
+                                    : "the bank carries none; nothing shows that the band holds no more modes than these.");
   }
   const bank::Proof& proof = *bank.proof;
   Html out;

@@ -245,6 +245,32 @@ def check_bad(folder):
     assert done.returncode == 0 and "format 1.7" in done.stdout, done.stderr
 
 
+def check_reduced(path, small):
+    """Fewer modes and coarser shapes by `carillon-bank edit`, in the eyes of h5py."""
+    def edit(*words):
+        done = bank_program("edit", path, small, *words)
+        assert done.returncode == 0 and done.stdout == "" == done.stderr, done
+        assert bank_program("check", small).returncode == 0
+        return bank_program("info", small).stdout
+
+    assert "the lowest 7 of 30 modes" in edit("--modes", "7", "--keep", "lowest", "--shape-bits", "8")
+    with h5py.File(path) as whole, h5py.File(small) as bank:
+        assert bank["modes/shape"].dtype == np.int8 and bank["modes/shape"].shape[1] == 7 and bank["solve/complete"][()] == 0
+        assert bank.attrs["version"] == "1.2" and np.array_equal(bank["modes/eigenvalue"][:], whole["modes/eigenvalue"][:7])
+        phi, coarse = (b["modes/shape"][:, :7] * b["modes/shape_scale"][:7][:, None] for b in (whole, bank))
+        assert np.all(np.abs(coarse - phi) <= 0.5001 * (bank["modes/shape_scale"][:] + whole["modes/shape_scale"][:7])[:, None])
+        assert np.array_equal(bank["VTKHDF/PointData"][list(bank["VTKHDF/PointData"])[3]][:], bank["modes/shape"][:, 3].astype("f4"))
+        assert json.loads(bank["provenance"][()])["reduced"] == {"modes": 7, "of_modes": 30, "keep": "lowest", "shape_bits": 8}
+    assert "5 modes of the band were kept, not all" in edit("--modes", "5")
+    with h5py.File(small) as bank:
+        assert "proof" not in bank and bank["modes/shape"].dtype == np.int16 and bank.attrs["version"] == "1.1"
+    assert "30 modes in 20 .. 20000 Hz and no more" in edit("--modes", "30", "--size", "1.0")
+    os.remove(small)
+    for words in (["--modes", "0"], ["--modes", "-3"], ["--modes", "x"], ["--keep", "lowest"], ["--modes", "3", "--keep", "best"], ["--shape-bits", "1"], ["--shape-bits", "17"]):
+        done = bank_program("edit", path, small, *words)
+        assert done.returncode == 2 and done.stderr and not os.path.exists(small), (words, done)
+
+
 def check_program(folder):
     path = f"{folder}/a.hdf"
     make_bank(path, 2, 30)
@@ -272,6 +298,8 @@ def check_program(folder):
                   "6 of the one component, and nothing else below", "phi_i^T M phi_j = delta_ij to 2.0e-13", "discretisation at most 30 cent",
                   "seal", "version", "arrays", "worst 3.00e-09", "closed, outward", "ascending from 574.44", "20 to 20000 Hz", "whole and sane"):
         assert words in check.stdout, words
+
+    check_reduced(path, f"{folder}/small.hdf")
 
     # Over-damped and undamped modes, and provenance that is no JSON or hostile to a terminal.
     def spoil(change):
