@@ -49,7 +49,7 @@ class KnownTarget:
     """A body of the study."""
 
     def __init__(self, body, advice):
-        self.body, self.name, self.kind, self.has_surface = body, body.name, "study", body.surface
+        self.body, self.name, self.kind, self.has_surface, self.is_round = body, body.name, "study", body.surface, body.round
         self.notes = [f"the study's {body.name}: {body.summary}; its lowest {body.modes} modes"]
         self.truth_hz = list(body.truth.freq_hz) if body.truth else advice.content.get("truths", {}).get(body.name, {}).get("freq_hz", [])
         self.truth_text = body.truth.source if body.truth else "the study's finest curved T10, extrapolated"
@@ -66,7 +66,7 @@ class OwnTarget:
 
     def __init__(self, target):
         self.target, self.name, self.kind, self.notes, self.truth_hz = target, target.name, target.kind, target.notes, []
-        self.has_surface = target.kind == "surface"
+        self.has_surface, self.is_round = target.kind == "surface", target.kind != "mesh"
 
     def make_case(self, lab, setting, name):
         return Case(f"{self.name}, {name}", self.target.make_job(setting), setting.ranks)
@@ -268,10 +268,11 @@ def show(cents):
     return f"{cents:.2g}" if cents < 10 else f"{cents:.0f}"
 
 
-def describe_setting(setting, kind):
+def describe_setting(setting, target):
     element, _, mass = setting.element.partition(" ")
-    size = "" if kind == "mesh" else f", {setting.nodes:,} nodes"
-    return (f"{element}{' with curved sides' if element == 'T10' and kind != 'mesh' else ''}, {mass or 'consistent'} mass{size}, tolerance {setting.tolerance:g}, {setting.ranks} rank{'s' if setting.ranks > 1 else ''}")
+    size = "" if target.kind == "mesh" else f", {setting.nodes:,} nodes"
+    sides = " with curved sides" if element == "T10" and target.is_round else ""
+    return f"{element}{sides}, {mass or 'consistent'} mass{size}, tolerance {setting.tolerance:g}, {setting.ranks} rank{'s' if setting.ranks > 1 else ''}"
 
 
 def describe_prediction(adviser, found, remark):
@@ -284,17 +285,22 @@ def describe_prediction(adviser, found, remark):
         tried = "both elements" if adviser.target.kind == "mesh" else "coarse meshes of this body, up to {:,} nodes".format(adviser.probe.trials[-1].nodes)
         lines.append(f"tried:     {tried}, {adviser.probe_cpu_s:.2f} CPU s")
     wall = f", {found.wall_s:.2g} s by the clock" if found.setting.ranks > 1 else ""
-    lines.append(f"use:       {describe_setting(found.setting, adviser.target.kind)}")
+    lines.append(f"use:       {describe_setting(found.setting, adviser.target)}")
     lines.append(f"predicted: at most {show(found.cents)} cents, {found.cpu_s:.2g} CPU s{wall} (this machine takes {adviser.pace:.2f} times the study's seconds)")
     return lines
 
 
+def is_met(outcome, options):
+    return (options.cents is None or outcome.cents <= options.cents) and (options.seconds is None or outcome.cpu_s <= options.seconds)
+
+
 def describe_outcome(outcome, options, found):
-    is_met = options.cents is None or outcome.cents <= options.cents
     lines = [f"reached:   {show(outcome.cents)} cents (mode {outcome.mode} of {outcome.modes}), {HOW[outcome.how]}; error bars up to {show(outcome.bar)} cents",
              f"           {outcome.cpu_s:.2f} CPU s, {outcome.cpu_s / found.cpu_s:.2f} times the prediction, {outcome.wall_s:.2f} s by the clock, {outcome.nodes:,} nodes"]
-    if not is_met:
+    if options.cents is not None and outcome.cents > options.cents >= found.cents:
         lines.append(f"           more than was asked; ask for {show(0.7 * options.cents * options.cents / outcome.cents)} to be sure")
+    if options.seconds is not None and outcome.cpu_s > options.seconds:
+        lines.append("           more CPU seconds than were asked for")
     return lines
 
 
@@ -306,7 +312,7 @@ def make_document(adviser, found, remark, outcome, job, bank):
                 "predicted": {"cents": found.cents, "cpu_seconds": found.cpu_s, "wall_seconds": found.wall_s}, "probe_cpu_seconds": adviser.probe_cpu_s, "machine_pace": adviser.pace, "reached": None}
     if outcome:
         document["reached"] = {"cents": outcome.cents, "mode": outcome.mode, "how": outcome.how, "worst_bar_cents": outcome.bar, "cpu_seconds": outcome.cpu_s, "wall_seconds": outcome.wall_s,
-                               "nodes": outcome.nodes, "modes": outcome.modes, "is_met": options.cents is None or outcome.cents <= options.cents}
+                               "nodes": outcome.nodes, "modes": outcome.modes, "is_met": is_met(outcome, options)}
         document |= {"job": str(job), "bank": str(bank)}
     return document
 
