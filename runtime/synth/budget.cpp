@@ -52,6 +52,10 @@ bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int a
     if (threshold_pa_ < kInaudible) threshold_pa_ = 0.0F;
     return false;
   }
+  if (live_groups <= awake_bodies) {  // only first groups ring, and they stay: nothing to choose among
+    threshold_pa_ *= kRelease;
+    return false;
+  }
   room_ = std::max<std::int64_t>(static_cast<std::int64_t>(room / kGroupCost) - awake_bodies, 0);
   count_.fill(0);
   return true;

@@ -3,7 +3,6 @@ import dataclasses
 import os
 import pathlib
 
-import measuring
 from accuracy import bodies as known_bodies
 from accuracy import plots, sounds
 from accuracy.lab import Case, calc_digest, calc_key
@@ -259,11 +258,11 @@ def add_charts(section, results):
         curves = {}
         for label, group in (("loudest modes", [r for r in modes if r.kept == "loudest"]), ("lowest modes", [r for r in modes if r.kept == "lowest"]), ("coarser shapes", bits[1:])):
             if group:
-                curves[label] = sorted((row.bank_bytes / 1e6, row.difference.distance_db) for row in group)
+                curves[label] = [(row.bank_bytes / 1e6, row.difference.distance_db) for row in group]
                 rows += [(name, label, r.modes, r.bits, r.bank_bytes, r.played.cpu_ms, r.difference.error_db, r.difference.distance_db) for r in group]
         panels.append(plots.Panel(f"{name}: what is heard against bytes", "bank, MB", "log-spectral distance, dB", curves, levels=[(sounds.DISTANCE_LIMIT_DB, "1 dB: told apart above")], y_log=False))
-        cpu = {label: sorted((row.played.cpu_ms, row.difference.distance_db) for row in modes if row.kept == kept) for label, kept in (("loudest modes", "loudest"), ("lowest modes", "lowest"))}
-        panels.append(plots.Panel(f"{name}: what is heard against CPU", "CPU, ms for a second of sound", "log-spectral distance, dB", {k: v for k, v in cpu.items() if v}, levels=[(sounds.DISTANCE_LIMIT_DB, "1 dB")], y_log=False))
+        cpu = {label: [(row.played.cpu_ms, row.difference.distance_db) for row in modes if row.kept == kept] for label, kept in (("loudest modes", "loudest"), ("lowest modes", "lowest"))}
+        panels.append(plots.Panel(f"{name}: what is heard against CPU", "CPU, ms for a second of sound", "log-spectral distance, dB", {k: v for k, v in cpu.items() if v}, levels=[(sounds.DISTANCE_LIMIT_DB, "1 dB")], x_log=False, y_log=False))
     svg = plots.draw_panels(panels, "Fewer modes, coarser shapes", "against the whole bank; three hard blows, heard at 1 m")
     section.add_chart("size", svg, "Log-spectral distance to the sound of the whole bank against the size of the bank and the CPU of its sound.", rows)
 
