@@ -21,8 +21,8 @@ void add_validate(CLI::App& app, Shared& shared, Run& run) {
 }
 
 void add_study(CLI::App& app, Shared& shared, Run& run) {
-  CLI::App* command =
-      app.add_subcommand("study", "Scaling studies: carillon study scaling JOB.json; carillon study --help lists them and their options");
+  CLI::App* command = app.add_subcommand(
+      "study", "Studies: scaling JOB.json, accuracy -o REPORT, advise BODY --cents 5; carillon study --help lists them and their options");
   command->prefix_command();
   command->set_help_flag();
   command->callback([&shared, &run, command] {
