@@ -23,7 +23,7 @@ from accuracy.lab import Case, Lab
 from errors import InputError, RunError
 
 RANKS_FROM_S = 4.0  # CPU seconds from which a second rank saves more of the clock than its start takes
-PROBE_NODES, PROBE_GROWTH, MOST_PROBE_NODES = {"shape": 1000, "surface": 6000}, {"shape": 3, "surface": 2}, 60000
+PROBE_NODES, PROBE_GROWTH, MOST_PROBE_NODES = {"shape": 1000, "surface": 2500}, {"shape": 3, "surface": 2}, 60000
 TRIAL_TOLERANCE = 1e-6
 START_S = 0.15  # CPU seconds of starting, which no station of a run's record claims
 BUDGET_MARGIN = 0.85  # of --seconds: what is aimed at

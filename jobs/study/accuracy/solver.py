@@ -4,7 +4,7 @@ import math
 import os
 
 from accuracy import plots
-from accuracy.bodies import find_kind
+from accuracy.bodies import find_kind, make_bodies
 from accuracy.section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
@@ -41,8 +41,9 @@ def draw_curves(curves, title, subtitle, x_label, y_label):
 
 
 def choose_bodies(bodies):
+    """Those preferred, or the first that coarse meshes can have: a thin wall takes none."""
     chosen = [body for name in PREFERRED for body in bodies if body.name == name]
-    return chosen or list(bodies[:1])
+    return chosen or [body for body in bodies if not body.quadratic_sizes][:1] or [make_bodies()[PREFERRED[0]]]
 
 
 class Solver:
@@ -220,7 +221,7 @@ class Solver:
 
 def run(lab, bodies):
     solver = Solver(lab, bodies)
-    solver.page.say("Every knob alone, the others at their defaults.")
+    solver.page.say(f"Every knob alone, the others at their defaults; bodies: {', '.join(body.name for body in solver.bodies)}.")
     for part in (solver.study_tolerance, solver.study_modes, solver.study_ranks, solver.study_ordering, solver.study_method):
         part()
     return solver
