@@ -10,7 +10,7 @@ import math
 
 FORMAT = 1
 GOAL = 0.8  # of what was asked: aimed at, for meshes come in steps and rates are not quite steady
-MOST_FINER = 6.0  # times the nodes of the finest mesh that was measured: no prediction goes further
+MOST_FINER = 10.0  # times the nodes of the finest mesh that was measured: no prediction goes further
 MOST_FINER_TRIAL = 4.0  # times those of a body's finest trial
 START_S, STEEPEST_CPU = 0.1, 1.8  # CPU seconds of starting, and the power of the nodes by which what follows grows at most
 TRUST, STEEPEST_BEYOND = 0.85, 4 / 3  # of the power at the end of a curve, beyond it: meshes that are coarse for their walls gain faster than those that follow
