@@ -4,6 +4,7 @@ import functools
 import json
 import os
 import pathlib
+import signal
 import statistics
 import subprocess
 import sys
@@ -74,14 +75,17 @@ def run_measured(command, cwd, environment=None, timeout_s=3600):
         start = time.monotonic()
         child = subprocess.Popen([str(word) for word in command], cwd=cwd, stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
                                  env=make_environment() | (environment or {}), start_new_session=True)
-        status = 0
-        while True:
-            pid, status, usage = os.wait4(child.pid, os.WNOHANG)
-            if pid:
-                break
-            if time.monotonic() - start > timeout_s:
-                os.killpg(child.pid, 9)
-            time.sleep(0.005)
+        try:
+            while True:
+                pid, status, usage = os.wait4(child.pid, os.WNOHANG)
+                if pid:
+                    break
+                if time.monotonic() - start > timeout_s:
+                    os.killpg(child.pid, signal.SIGKILL)
+                time.sleep(0.005)
+        except BaseException:  # who stops the study stops what it runs
+            os.killpg(child.pid, signal.SIGKILL)
+            raise
         wall = time.monotonic() - start
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode != 0:

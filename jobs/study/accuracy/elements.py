@@ -143,7 +143,7 @@ def add_costs(section, lab, results):
             for (level, _), cost in zip(LEVELS, costs):
                 if cost:
                     data.append((body.name, kind.name, level, cost.cpu_s, cost.how))
-                    table[body.name, kind.name, level] = cost.cpu_s
+                    table[body.name, kind.name, level] = cost
                     if level not in best or cost.cpu_s < best[level][0]:
                         best[level] = (cost.cpu_s, kind.name)
         for level, (_, name) in best.items():
@@ -152,11 +152,18 @@ def add_costs(section, lab, results):
                       "as wrong, or errors that do not fall).", data, lab.make_command("elements"))
     names = [body.name for body, _, _ in results]
     for level, text in LEVELS:
-        least = [min(values) for name in names if (values := [table[key] for key in table if key[0] == name and key[2] == level])]
+        least = [min(costs, key=lambda cost: cost.cpu_s) for name in names if (costs := [cost for key, cost in table.items() if key[0] == name and key[2] == level])]
         if least:
-            order = ", ".join(f"{kind} on {count}" for kind, count in cheapest[level].most_common())
-            spread = f"{min(least):.2g} to {max(least):.2g} CPU s (median {statistics.median(least):.2g} s over {len(least)} bodies)" if len(least) > 1 else f"{least[0]:.2g} CPU s"
-            section.conclude(f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {spread}; cheapest is {order}.")
+            section.conclude(describe_level(text, least, cheapest[level], len(names)))
+
+
+def describe_level(text, least, cheapest, count):
+    """What so many cents cost, over all bodies. least: the lowest Cost of each body that has one; cheapest: how often each element has it."""
+    seconds = [cost.cpu_s for cost in least]
+    spread = f"{min(seconds):.2g} to {max(seconds):.2g} CPU s (median {statistics.median(seconds):.2g} s over {len(seconds)} of {count} bodies)" if len(seconds) > 1 else f"{seconds[0]:.2g} CPU s"
+    by_trend = sum(cost.how == "extrapolated" for cost in least)
+    trend = f", {by_trend} of them by the trend of the finest meshes" if by_trend else ""
+    return f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {spread}{trend}; cheapest is {', '.join(f'{kind} on {number}' for kind, number in cheapest.most_common())}."
 
 
 def study(lab, bodies):
