@@ -132,6 +132,18 @@ class Program(unittest.TestCase):
         self.assertIn("0.05 cents", both["remark"])
         self.assertGreater(both["predicted"]["cents"], 0.05)
 
+    def test_study_writes_what_advise_foresees_from(self):
+        done = subprocess.run([str(BIN / "carillon-study"), "accuracy", "--quick", "--on", "cube", "--only", "advice", "-o", "report"], cwd=self.folder, capture_output=True, text=True, timeout=250)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        made = json.loads((self.folder / "report/advice.json").read_text())
+        self.assertTrue(made["is_quick"])
+        rows = [row for row in made["bodies"]["cube"] if row["element"] == "T10"]
+        told = self.ask("cube", "--cents", math.ceil(rows[-1]["worst_cents"]), "--dry-run", "--advice", "report/advice.json")
+        self.assertLessEqual(told["setting"]["nodes"], rows[-1]["nodes"])
+        text = (self.folder / "report/report.md").read_text()
+        for default in ("element", "mass", "nodes of a body", "solver.tolerance", "solver.method", "solver.factorisation", "ranks"):
+            self.assertRegex(text, rf"\| {default} +\|")
+
     def test_bad_input_is_one_clear_error(self):
         os.mkfifo(self.folder / "pipe.json")
         (self.folder / "both.json").write_text(json.dumps({"body": {}, "mesh": "a.msh"}))

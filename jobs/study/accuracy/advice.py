@@ -8,6 +8,7 @@ from accuracy import banks, cents, elements, forecast, playing, solver, sounds
 from accuracy.bodies import Kind, find_kind
 from accuracy.lab import Case, write_whole
 from accuracy.section import Section
+from errors import InputError
 
 PROGRAMS = solver.PROGRAMS
 # A job that leaves all to the program; its resolved form says what today's defaults are.
@@ -48,7 +49,7 @@ def make_content(lab, bodies, facts):
     """advice.json: raw measurements; what follows from them is calculated when they are read (forecast.Advice)."""
     solves = elements.measure(lab, bodies)
     calibration = lab.measure([Case("calibration", CALIBRATION)], 3)["calibration"]
-    content = {"format": forecast.FORMAT, "made_by": "carillon study accuracy --write-advice FILE", "machine": lab.describe_machine(), "date": time.strftime("%Y-%m-%d"),
+    content = {"format": forecast.FORMAT, "made_by": "carillon study accuracy --write-advice FILE", "machine": lab.describe_machine(), "date": time.strftime("%Y-%m-%d"), "is_quick": lab.quick,
                "calibration": {"job": CALIBRATION, "cpu_s": min(calibration.cpu_s)}, "ranks": {str(ranks): row for ranks, row in facts["ranks"].items() if ranks > 1}, "truths": {}, "bodies": {}}
     for body in bodies:
         content["bodies"][body.name], truth = list_samples(body, solves[body.name])
@@ -61,8 +62,11 @@ def make_content(lab, bodies, facts):
 def write(lab, bodies, path):
     """Writes what `carillon study advise --advice FILE` reads; what the sections measured is kept, so this runs little more than the calibration."""
     facts = solver.find_facts(lab, bodies)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, json.dumps(make_content(lab, bodies, facts), indent=1) + "\n")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, json.dumps(make_content(lab, bodies, facts), indent=1) + "\n")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 # --- the recommendation
@@ -254,5 +258,6 @@ def study(lab, bodies):
         add_defaults(page, "runtime", "Defaults of the runtime (section playing).", [recommend_knob(knob, turns) for knob, turns in lab.found[playing.NAME]])
     else:
         page.say("Defaults of bank and runtime: `--only banks playing advice`.")
+    write(lab, bodies, lab.out / "advice.json")
     page.say("`carillon study advise BODY --cents 5` chooses by these measurements and says afterwards what it came to.")
     return page
