@@ -11,6 +11,9 @@ EFFECTS = ("modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "a
 INSTRUCTIONS = ("plain", "sse2", "avx2", "avx512")
 # The strictest that a scene may ask of the planner, and the most accurate of all: the reference of what a planner leaves out.
 STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15, "lead_s": 0.2}
+SOFT_DB = 40.0  # a blow that is just heard in a living room
+BALL = {"body": {"shape": "sphere", "radius_m": 0.05}, "element": "T10", "band_hz": [20, 30000],
+        "material": {"young_modulus_pa": 3e9, "poisson_ratio": 0.35, "density_kg_m3": 1200, "damping": {"internal_friction": {"tan_phi": 0.02}}}}
 TILE = {"body": {"shape": "plate", "length_m": 0.1, "width_m": 0.1, "thickness_m": 0.008}, "element": "T10", "band_hz": [20, 16000],
         "material": {"young_modulus_pa": 60e9, "poisson_ratio": 0.22, "density_kg_m3": 2400, "damping": {"internal_friction": {"tan_phi": 0.004}}}}
 SHELF = {"body": {"shape": "plate", "length_m": 0.24, "width_m": 0.2, "thickness_m": 0.01}, "element": "T10", "band_hz": [20, 12000], "fixed": "y-max",
@@ -30,13 +33,13 @@ class Knob:
 
 
 KNOBS = (
-    Knob("silence_pa", "Culling: below this pressure at 1 m a body sleeps", (1e-15, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1), 1e-10, "hang"),
+    Knob("silence_pa", "Culling: below this pressure at 1 m a body sleeps", (1e-15, 1e-10, 1e-8, "planned", 1e-6, 1e-5, 1e-4, 1e-3, 1e-2), "planned", "soft"),
     Knob("modes", "Budget: modes that may ring at once", (None, 400, 200, 100, 48, 16), None, "hang"),
     Knob("sample_rate_hz", "Sample rate", (192000, 96000, 48000, 44100, 32000, 22050), 48000, "hang"),
     Knob("planner_db", "Planner: what changes a body's sound by less is left out", (-150, -100, -70, -50, -40, -30, -20, -10), -50, "chute"),
     Knob("quiet_db", "Planner: what is so far below the loudest strike is not heard", (250, 120, 90, 70, 50, 40, 30), 70, "chute"),
     Knob("lead_s", "Planner: look-ahead, by which an effect is on before it is needed", (0.2, 0.1, 0.05, 0.02, 0.01, 0.001), 0.05, "chute"),
-    Knob("contact_step_s", "Physics: longest step while bodies touch and move", (5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3), 5e-4, "slide", True),
+    Knob("contact_step_s", "Physics: longest step while bodies touch and move", (1e-4, 2e-4, 5e-4, 1e-3, 2e-3), 5e-4, "roll", True),
 )
 
 
@@ -52,7 +55,7 @@ class Turn:
 def find_jobs(lab):
     """{name: job} of the bodies that move."""
     grow = lambda job, nodes: job | {"body": job["body"] | {"nodes": nodes // 2 if lab.quick else nodes}}
-    return {"tile": grow(TILE, 2000), "shelf": grow(SHELF, 1500)}
+    return {"tile": grow(TILE, 2000), "shelf": grow(SHELF, 1500), "ball": grow(BALL, 1500)}
 
 
 def make_hang(lab, bank):
@@ -60,12 +63,21 @@ def make_hang(lab, bank):
     return banks.make_scene(lab, bank)
 
 
-def make_slide(lab, paths):
-    """The tile slides to rest over a floor whose friction stops it within 0.3 s, and is struck meanwhile and afterwards: what rings is damped by the floor. Roughness is left out: it is random, and
-    begins anew with every contact, so that another step would be another draw."""
-    return {"duration_s": 0.4 if lab.quick else 0.8, "ground": {"friction": 0.35}, "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0]},
-            "strikes": banks.make_strikes(paths["tile"], (0.05, 0.15, 0.25), "tile", impulse_n_s=0.01), "effects": [name for name in EFFECTS if name not in ("roughness", "rolling")],
-            "bodies": [{"name": "tile", "bank": str(paths["tile"]), "position_m": [-0.15, 0, 0.004], "velocity_m_s": [1, 0.2, 0], "friction": 0.35, "roughness_m": 5e-6}]}
+def make_soft(lab, bank):
+    """The same so softly that its loudest is SOFT_DB, and with the planner at work: what is culled is what is not heard of a soft sound; of a loud one anything could be."""
+    scene = banks.make_scene(lab, bank)
+    level = sounds.calc_loudest_db(sounds.play(lab, "soft-level", scene).sound)
+    factor = 10 ** ((SOFT_DB - level) / 20)
+    return scene | {"effects": "auto", "strikes": [strike | {"impulse_n_s": [factor * x for x in strike["impulse_n_s"]]} for strike in scene["strikes"]]}
+
+
+def make_roll(lab, paths):
+    """A ball of plastic rolls up a slope (gravity is turned, the floor is level), and is struck meanwhile. Roughness is left out: it is random, and begins anew with every contact, so that another
+    step would be another draw."""
+    seconds = 0.5 if lab.quick else 0.8
+    return {"duration_s": seconds, "gravity_m_s2": [-1.0, 0, -9.76], "ground": {"friction": 0.6}, "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0]},
+            "strikes": banks.make_strikes(paths["ball"], [seconds * share for share in (0.12, 0.44, 0.75)], "ball"), "effects": [name for name in EFFECTS if name not in ("roughness", "rolling")],
+            "bodies": [{"name": "ball", "bank": str(paths["ball"]), "position_m": [-0.2, 0, 0.05], "velocity_m_s": [0.6, 0.1, 0], "angular_velocity_rad_s": [-2, 12, 0], "friction": 0.6}]}
 
 
 def make_chute(lab, paths):
@@ -76,11 +88,11 @@ def make_chute(lab, paths):
 
 
 def turn(scene, key, setting):
-    """The scene with a knob at a setting; None: not given."""
+    """The scene with a knob at a setting; None and "planned": not given."""
     if key == "sample_rate_hz":
         return scene | {key: setting}
     quality = dict(scene.get("quality", {}))
-    if setting is None:
+    if setting is None or setting == "planned":
         quality.pop(key, None)
     else:
         quality[key] = setting
@@ -175,7 +187,7 @@ def to_data(one):
 
 
 def format_setting(setting):
-    return "all" if setting is None else f"{setting:g}"
+    return "all" if setting is None else setting if isinstance(setting, str) else f"{setting:g}"
 
 
 def find_turn(turns, setting):
@@ -251,10 +263,10 @@ def study(lab, bodies):
     soundings = banks.find_soundings(lab, bodies)
     paths = banks.solve(lab, soundings + [banks.Sounding(name, name, job) for name, job in find_jobs(lab).items()])
     hung = max(paths, key=lambda name: banks.count_modes(paths[name]))
-    scenes = {"hang": make_hang(lab, paths[hung]), "slide": make_slide(lab, paths), "chute": make_chute(lab, paths)}
+    scenes = {"hang": make_hang(lab, paths[hung]), "soft": make_soft(lab, paths[hung]), "roll": make_roll(lab, paths), "chute": make_chute(lab, paths)}
     contacts = lab.out / "work/sounds/chute.jsonl"
     sounds.play(lab, "record", scenes["chute"] | {"effects": list(EFFECTS)}, record=contacts)
-    section.say(f"Three scenes. hang: the {hung} hangs still, struck three times. slide: a tile slides over a floor to rest, struck three times. chute: a tile falls on a slanting shelf, slides off it and onto the floor; what happens is "
+    section.say(f"Four scenes. hang: the {hung} hangs still, struck three times; soft: so softly that it is {SOFT_DB:.0f} dB(A). roll: a ball rolls up a slope, struck three times. chute: a tile falls on a slanting shelf, slides off it and onto the floor; what happens is "
                 "recorded once, and each setting plays the same contacts. Each knob is turned by itself; the reference is its most accurate setting.")
     add_kernels(section, measure_kernels(lab, paths[hung]))
     measured = []
