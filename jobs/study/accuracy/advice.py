@@ -18,6 +18,7 @@ REASONS = {"silence_pa": "a scene may be played with any gain, and what sleeps c
            "another fall (section playing)", "modes": "a limit is the scene's to set: what may be left out depends on what else sounds", "sample_rate_hz": "it is that of sound cards"}
 TRAINED_EAR, SEMITONE = 5.0, 100.0  # cents
 START_DECIDES = 1.25  # the same on meshes so small that starting weighs as much as solving
+WORTH_MS = 10.0  # of CPU for a second of sound: a hundredth of a core
 LITTLE = 1.1  # times the CPU seconds: what is not worth a choice
 HEAD = ("default", "today", "the figure that chose it", "the next stricter", "the next looser", "does today's agree")
 CALIBRATION = {"body": {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 4000}, "element": "T10", "band_hz": [20, 40000],
@@ -200,15 +201,16 @@ def recommend_ranks(facts):
 
 
 def recommend_knob(knob, turns):
-    """A default of the runtime, by what the section on it measured."""
+    """A default of the runtime, by what the section on it measured. One looser setting that nobody tells apart is the distance that a default keeps, since other scenes are more sensitive; of more,
+    those count that would save a hundredth of a core."""
     index = next(i for i, turn in enumerate(turns) if turn.setting == knob.default)
     usual = turns[index]
     tell = lambda turn: "leaves nothing out" if turn.difference is None else playing.describe_difference(turn.difference).replace("from it", "from the strictest")
     price = lambda turn: f"{playing.format_setting(turn.setting)}: {turn.cpu_ms:.2f} ms for a second, not {usual.cpu_ms:.2f}"
     stricter = price(turns[index - 1]) if index else "none"
     looser = f"{price(turns[index + 1])}; {tell(turns[index + 1])}" if index + 1 < len(turns) else "none"
-    spare = [turn for turn in turns[index + 1 :] if not turn.difference.is_told and turn.cpu_ms * LITTLE < usual.cpu_ms]
-    agrees = not (usual.difference and usual.difference.is_told) and not spare
+    spare = [turn for turn in turns[index + 1 :] if not turn.difference.is_told and usual.cpu_ms - turn.cpu_ms > WORTH_MS]
+    agrees = not (usual.difference and usual.difference.is_told) and len(spare) <= 1
     return (knob.key, playing.format_setting(knob.default), tell(usual), stricter, looser, agrees)
 
 
