@@ -149,6 +149,7 @@ class Program(unittest.TestCase):
         (self.folder / "both.json").write_text(json.dumps({"body": {}, "mesh": "a.msh"}))
         (self.folder / "list.json").write_text("[]")
         (self.folder / "a.txt").write_text("hello")
+        (self.folder / "a.msh").write_text("$MeshFormat")
         (self.folder / "empty.json").write_text("{}")
         (self.folder / "old.json").write_text('{"format": 0}')
         (self.folder / "wrong.json").write_text(json.dumps(CUBE | {"bnad_hz": [1, 2]}))
@@ -157,7 +158,7 @@ class Program(unittest.TestCase):
                  ("both.json", "--cents", "5"): "both", ("list.json", "--cents", "5"): "object", ("empty.json", "--cents", "5"): "neither", ("a.txt", "--cents", "5"): "ending",
                  ("bar", "--cents", "5", "--wall", "0.1"): "--wall", ("bar", "--cents", "5", "--advice", "old.json"): "--write-advice", ("bar", "--cents", "5", "--advice", "nothing.json"): "nothing.json",
                  ("bar", "--cents", "5", "--bin", "nowhere"): "--bin", ("box", "--cents", "5", "--band", "5,2"): "20,20000", ("bar", "--cents", "1e-7"): "give --cents", ("bar", "--seconds", "0.001"): "give --seconds",
-                 ("wrong.json", "--cents", "5"): "bnad_hz", (".", "--cents", "5"): "regular file"}
+                 ("a.msh", "--cents", "5", "--check"): "--check", ("wrong.json", "--cents", "5"): "bnad_hz", (".", "--cents", "5"): "regular file"}
         for words, expected in cases.items():
             done = call(self.folder, *words)
             self.assertEqual(done.returncode, 2, f"{words}: {done.stdout}{done.stderr}")

@@ -83,6 +83,12 @@ class Adviser:
         self.pace = 1.0  # CPU seconds of this machine over those of the study's
 
     def find_target(self, word):
+        target = self.name_target(word)
+        if self.options.check and target.kind == "mesh":
+            raise InputError(f"{word}: --check needs a finer mesh, and none can be made of a mesh file here")
+        return target
+
+    def name_target(self, word):
         known = bodies.make_bodies()
         if word in known:
             if self.options.wall or self.options.height or self.options.band:
@@ -165,7 +171,7 @@ class Adviser:
         """Whether the trials tell enough: the cents, or all that the seconds buy, are no more than a step away."""
         trials, options = self.probe.trials, self.options
         if len(trials) < 2 or not trials[-2].freq_hz:
-            return False
+            return len(trials) > 2  # three times none: there is none
         curve = self.probe.make_curve()
         if options.cents is not None and curve.find_nodes(options.cents) is not None:
             return True
