@@ -44,6 +44,8 @@ class NodeMatrix {
  private:
   enum class Kind { kDiagonal, kScalars, kBlocks };
   void read(Mat matrix);
+  /// The sums of the rows of blocks, zero where they are no more than rounding.
+  void sum_rows();
   void plan_exchange(Mat matrix, const std::vector<PetscInt>& ghosts);
 
   Kind kind_ = Kind::kDiagonal;
@@ -53,6 +55,7 @@ class NodeMatrix {
   std::vector<std::int64_t> start_;      // (nodes + 1) into neighbour_
   std::vector<std::int32_t> neighbour_;  // own nodes first, then ghosts
   std::vector<double> values_;           // one or nine (row by row) per neighbour
+  std::vector<double> rest_;             // (nodes, 9), kBlocks: sum of the row's blocks
   petsc::Handle<PetscSF, PetscSFDestroy> exchange_;
 };
 

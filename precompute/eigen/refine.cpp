@@ -1,9 +1,14 @@
 // Method:     A few bad modes go through the operator at hand once more, (K - sigma M)^-1 M phi, and are made orthogonal to the others:
 // that
-//             mends what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration, (K -
-//             sigma M)^-1 M phi with sigma just below the group, damps everything farther from sigma than the group is; Rayleigh-Ritz
-//             within the group parts its members; Gram-Schmidt from the lowest mode up makes the whole set M-orthonormal again. What is
-//             still bad is tried again in narrower groups, whose shifts are nearer; the narrowest hold a single mode.
+//             mends what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration with
+//             sigma just below the group damps everything farther from sigma than the group is. It is written as a correction, phi - (K -
+//             sigma M)^-1 (K phi - lambda M phi), so that it ends at the modes of K and M and not at those of the factors' rounding, which
+//             differ for thin bodies. Rayleigh-Ritz within the group parts its members; Gram-Schmidt from the lowest mode up makes the
+//             whole set M-orthonormal again. What is still bad is tried again in narrower groups, whose shifts are nearer; the narrowest
+//             hold a single mode.
+//             The stiffness against fast motions multiplies the rounding of a slow mode's entries: its residual is large though the mode
+//             is right. The inverse takes that out again: with d = (K - sigma M)^-1 r there is an eigenvalue within |lambda - sigma|
+//             ||d||_M, relative to itself, of lambda - sigma, as for any residual of the inverse.
 // Source:     Parlett, The symmetric eigenvalue problem, 1998, sections 4.2 (inverse iteration), 11.3 (Rayleigh-Ritz).
 // Deviations: none.
 #include "precompute/eigen/refine.hpp"
@@ -89,9 +94,8 @@ void normalise(const Operators& operators, const Columns& x, const Columns& work
   scale_all(norm);
 }
 
-// Replaces the group's modes by better ones. `nearness` is the distance of the shift below the group, relative to lambda.
-void improve_group(const RefineRequest& request, const Group& group, double nearness, std::vector<double>& lambda, Mat shapes,
-                   RefineCost& cost) {
+// The factor at a shift below the group, `nearness` away relative to lambda. Returns the shift.
+double stand_below(const RefineRequest& request, const Group& group, double nearness, const std::vector<double>& lambda, RefineCost& cost) {
   ShiftedFactor& factor = request.get_factor();
   double sigma = lambda[group.front()] * (1 - nearness);
   constexpr int kNudges = 5;
@@ -100,24 +104,65 @@ void improve_group(const RefineRequest& request, const Group& group, double near
     sigma -= 1e-2 * nearness * lambda[group.front()];
   }
   ++cost.factorisations;
-  cost.solves += static_cast<std::int64_t>(group.size());
+  return sigma;
+}
+
+// The modes of a group, and what they have to be mended by: (K - sigma M)^-1 (K phi - lambda M phi), with the factor that stands.
+struct Corrections {
+  Corrections(const RefineRequest& request, const Group& group, const std::vector<double>& lambda, const Columns& all, RefineCost& cost)
+      : rows(static_cast<std::size_t>(all.rows)),
+        space(3 * rows * group.size()),
+        phi{space.data(), all.rows, all.rows, static_cast<int>(group.size())},
+        d{space.data() + rows * group.size(), all.rows, all.rows, phi.count},
+        work{space.data() + 2 * rows * group.size(), all.rows, all.rows, phi.count} {
+    for (std::size_t j = 0; j < group.size(); ++j)
+      std::copy_n(all.column(static_cast<int>(group[j])), rows, phi.column(static_cast<int>(j)));
+    request.operators->stiffness.multiply(phi, d);
+    request.operators->mass.multiply(phi, work);
+    for (std::size_t j = 0; j < group.size(); ++j) {
+      const double* m_phi = work.column(static_cast<int>(j));
+      double* residual = d.column(static_cast<int>(j));
+      for (std::size_t i = 0; i < rows; ++i) residual[i] -= lambda[group[j]] * m_phi[i];
+    }
+    request.get_factor().solve(d.values, d.stride, d.count);
+    cost.solves += d.count;
+  }
+  Corrections(const Corrections&) = delete;
+  Corrections& operator=(const Corrections&) = delete;
+
+  /// ||d||_M of each.
+  std::vector<double> calc_norms(const RefineRequest& request) {
+    request.operators->mass.multiply(d, work);
+    std::vector<double> norms;
+    for (int c = 0; c < d.count; ++c) norms.push_back(std::inner_product(d.column(c), d.column(c) + rows, work.column(c), 0.0));
+    MPI_Allreduce(MPI_IN_PLACE, norms.data(), d.count, MPI_DOUBLE, MPI_SUM, request.operators->comm);
+    for (double& norm : norms) norm = std::sqrt(norm);
+    return norms;
+  }
+
+  /// The group's modes become Ritz vectors in the span of what is left of them, lambda their values.
+  void apply(const RefineRequest& request, const Group& group, std::vector<double>& lambda, const Columns& all) {
+    for (std::size_t i = 0; i < rows * group.size(); ++i) phi.values[i] -= d.values[i];
+    normalise(*request.operators, phi, work);
+    const std::vector<double> ritz = calc_ritz(*request.operators, phi, work);
+    for (std::size_t j = 0; j < group.size(); ++j) {
+      lambda[group[j]] = ritz[j];
+      std::copy_n(phi.column(static_cast<int>(j)), rows, all.column(static_cast<int>(group[j])));
+    }
+  }
+
+  std::size_t rows = 0;
+  std::vector<double> space;
+  Columns phi, d, work;
+};
+
+// Replaces the group's modes by better ones. `nearness` is the distance of the shift below the group, relative to lambda.
+void improve_group(const RefineRequest& request, const Group& group, double nearness, std::vector<double>& lambda, Mat shapes,
+                   RefineCost& cost) {
+  stand_below(request, group, nearness, lambda, cost);
   const LocalColumns access(shapes);
   const Columns all = access.view();
-  const auto rows = static_cast<std::size_t>(all.rows);
-  std::vector<double> space(2 * rows * group.size());
-  const Columns x{space.data(), all.rows, all.rows, static_cast<int>(group.size())};
-  const Columns work{space.data() + rows * group.size(), all.rows, all.rows, x.count};
-  for (std::size_t j = 0; j < group.size(); ++j) {
-    const Columns phi = all.part(static_cast<int>(group[j]), 1);
-    request.operators->mass.multiply(phi, x.part(static_cast<int>(j), 1));
-  }
-  factor.solve(x.values, x.stride, x.count);
-  normalise(*request.operators, x, work);
-  const std::vector<double> ritz = calc_ritz(*request.operators, x, work);
-  for (std::size_t j = 0; j < group.size(); ++j) {
-    lambda[group[j]] = ritz[j];
-    std::copy_n(x.column(static_cast<int>(j)), rows, all.column(static_cast<int>(group[j])));
-  }
+  Corrections(request, group, lambda, all, cost).apply(request, group, lambda, all);
 }
 
 // The modes once through the operator at hand, whatever its shift; what that brings in of the others is taken out again. Modes that it does
@@ -191,6 +236,44 @@ ModeErrors measure_orthonormal(const RefineRequest& request, std::vector<double>
 
 bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance) {
   return errors.residual[j] <= std::max(tolerance, errors.floor[j]);
+}
+
+RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
+  // A mode below the shift that is nearer to it than the group's upper end is would grow: groups are narrow and their shifts near, though
+  // not so near that the rounding of the factors decides.
+  constexpr std::array<std::array<double, 2>, 4> kRounds{{{1.2, 0.1}, {1.02, 0.01}, {1.005, 0.01}, {1.005, 0.01}}};  // spread, nearness
+  RefineCost cost;
+  for (std::size_t round = 0;; ++round) {
+    const auto [spread, nearness] = kRounds[round];
+    Group above;
+    for (std::size_t j = 0; j < lambda.size(); ++j) {
+      if (errors.residual[j] > request.tolerance) above.push_back(j);
+    }
+    std::vector<double> certified = errors.residual;
+    bool is_mended = false;
+    for (const Group& group : group_neighbours(above, lambda, spread)) {
+      const double sigma = stand_below(request, group, nearness, lambda, cost);
+      const LocalColumns access(shapes);
+      const Columns all = access.view();
+      Corrections mend(request, group, lambda, all, cost);
+      const std::vector<double> size = mend.calc_norms(request);
+      double worst = 0;
+      for (std::size_t c = 0; c < group.size(); ++c) {
+        const std::size_t j = group[c];
+        certified[j] = std::min(certified[j], size[c] * (lambda[j] - sigma) / lambda[j]);
+        worst = std::max(worst, certified[j]);
+      }
+      if (worst <= request.tolerance || round + 1 == kRounds.size()) continue;
+      mend.apply(request, group, lambda, all);
+      is_mended = true;
+    }
+    if (!is_mended) {
+      errors.residual = certified;
+      for (const std::size_t j : above) errors.floor[j] = std::min(errors.floor[j], certified[j]);
+      return cost;
+    }
+    errors = measure_orthonormal(request, lambda, shapes);
+  }
 }
 
 RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {

@@ -31,6 +31,13 @@ struct RefineCost {
 /// linearly dependent.
 RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
 
+/// Measures the modes whose residual is above the tolerance once more, through the inverse, where the rounding of their entries is not
+/// multiplied by the stiffness against fast motions: with d = (K - sigma M)^-1 (K phi - lambda M phi) and sigma below lambda,
+/// errors.residual becomes ||d||_M (lambda - sigma) / lambda where that is less, and errors.floor no more than it. It bounds the distance
+/// of lambda from an eigenvalue, relative to lambda, as the residual does. Modes that are still above are corrected by d, three times at
+/// most. shapes: M-orthonormal, and so afterwards. Collective. Throws as refine_modes does.
+RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
+
 /// True if mode j is good: its residual is within the tolerance, or within what rounding explains.
 bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance);
 

@@ -73,6 +73,8 @@ class BandSolver {
   Modes solve();
 
  private:
+  Modes solve_band();
+  std::string explain() const;
   void solve_dense_band();
   void make_counter();
   void solve_sparse_band();
@@ -93,8 +95,13 @@ class BandSolver {
   void take_found();
   void collect(const DensePairs& dense);
   void check_range(std::vector<std::size_t>& order, const std::vector<double>& lambda);
+  void measure_margins();
   void drop_beyond_limit();
   void finish();
+  RefineRequest make_refine_request(double tolerance);
+  template <class Step>
+  void add_cost(Step&& step);
+  void certify(ModeErrors& errors);
   void refine(double tolerance, ModeErrors& errors);
   void choose_basis(ModeErrors& errors);
   void report(Phase phase, std::int64_t done, std::int64_t more_solves = 0) const;
@@ -112,7 +119,8 @@ class BandSolver {
   Scaling scaling_;
   double low_ = 0;  // scaled lambda, the band's ends
   double high_ = 0;
-  double sought_to_ = 0;  // the end of the last slice
+  double sought_to_ = 0;        // the end of the last slice
+  std::vector<double> others_;  // modes found and not taken: outside the band, or beyond max_modes
   std::vector<petsc::VecHandle> rigid_;
   std::unique_ptr<Operators> operators_;
   std::unique_ptr<InertiaCounter> counter_;
@@ -140,7 +148,32 @@ void BandSolver::report(Phase phase, std::int64_t done, std::int64_t more_solves
                      factor.factorisations, factor.solves + more_solves});
 }
 
+/// What makes an error of the solve likely, as a sentence for the user: rounding in K moves squared frequencies by about its epsilon times
+/// the greatest.
+std::string BandSolver::explain() const {
+  double fastest = 0;  // about the greatest eigenvalue
+  for (std::size_t i = 0; i < operators_->stiffness_diagonal.size(); ++i)
+    fastest = std::max(fastest, operators_->stiffness_diagonal[i] / operators_->mass_diagonal[i]);
+  MPI_Allreduce(MPI_IN_PLACE, &fastest, 1, MPI_DOUBLE, MPI_MAX, comm_);
+  constexpr double kSafe = 30;  // times that rounding, squared frequencies keep their digits
+  const double rounding = PETSC_MACHINE_EPSILON * fastest;
+  if (low_ > kSafe * rounding) return {};
+  return fmt::format(
+      " The body is so thin, or its elements so small, that rounding in K alone moves its squared frequencies by ({:.2g} Hz)^2: let the "
+      "band begin "
+      "at {:.2g} Hz or above.",
+      to_hz(rounding), to_hz(kSafe * rounding));
+}
+
 Modes BandSolver::solve() {
+  try {
+    return solve_band();
+  } catch (const SolveError& error) {
+    throw SolveError(error.what() + explain());
+  }
+}
+
+Modes BandSolver::solve_band() {
   {
     const Timer total(modes_.seconds.total);
     {
@@ -491,6 +524,20 @@ void BandSolver::check_range(std::vector<std::size_t>& order, const std::vector<
     order.resize(kept);
   }
   for (const std::size_t i : order) modes_.lambda.push_back(lambda[i]);
+  std::vector<char> is_taken(lambda.size(), 0);
+  for (const std::size_t i : order) is_taken[i] = 1;
+  for (std::size_t i = 0; i < lambda.size(); ++i)
+    if (is_taken[i] == 0) others_.push_back(lambda[i]);
+}
+
+/// The counts stood where they were; refining may have moved the modes beside them by some digits.
+void BandSolver::measure_margins() {
+  for (Count& count : modes_.proof.counts) {
+    const double cut = scaling_.to_scaled(std::pow(2 * std::numbers::pi * count.freq_hz, 2));
+    count.margin = std::numeric_limits<double>::infinity();
+    for (const std::vector<double>* lambdas : {&modes_.lambda, &others_})
+      for (const double lambda : *lambdas) count.margin = std::min(count.margin, std::abs(lambda - cut) / cut);
+  }
 }
 
 void BandSolver::take_found() {
@@ -519,21 +566,38 @@ void BandSolver::collect(const DensePairs& dense) {
   check(MatAssemblyEnd(modes_.shapes, MAT_FINAL_ASSEMBLY));
 }
 
-/// Until every residual is below `tolerance`, or no better can be had; throws where that is not within the tolerance of the options.
-void BandSolver::refine(double tolerance, ModeErrors& errors) {
+RefineRequest BandSolver::make_refine_request(double tolerance) {
   RefineRequest request;
   request.operators = operators_.get();
   request.tolerance = tolerance;
   if (counter_ != nullptr) request.at_hand = counter_->find_standing();
-  request.get_factor = [&]() -> ShiftedFactor& {
+  request.get_factor = [this]() -> ShiftedFactor& {
     if (counter_ == nullptr) make_counter();
     return counter_->get_factor();
   };
-  const FactorStatistics before = modes_.factor;  // Mending has a factor of its own, which is not the story of the solve.
-  const RefineCost cost = refine_modes(request, modes_.lambda, modes_.shapes, errors);
+  return request;
+}
+
+/// Mending has a factor of its own, which is not the story of the solve; its work counts.
+template <class Step>
+void BandSolver::add_cost(Step&& step) {
+  const FactorStatistics before = modes_.factor;
+  const RefineCost cost = step();
   modes_.factor = before;
   modes_.factor.factorisations += cost.factorisations;
   modes_.factor.solves += cost.solves;
+}
+
+/// Modes whose residual is above the tolerance because of rounding alone are measured through the inverse.
+void BandSolver::certify(ModeErrors& errors) {
+  const RefineRequest request = make_refine_request(options_.tolerance);
+  add_cost([&] { return certify_modes(request, modes_.lambda, modes_.shapes, errors); });
+}
+
+/// Until every residual is below `tolerance`, or no better can be had; throws where that is not within the tolerance of the options.
+void BandSolver::refine(double tolerance, ModeErrors& errors) {
+  const RefineRequest request = make_refine_request(tolerance);
+  add_cost([&] { return refine_modes(request, modes_.lambda, modes_.shapes, errors); });
   for (std::size_t j = 0; j < errors.residual.size(); ++j) {
     if (is_accepted(errors, j, options_.tolerance)) continue;
     throw SolveError(
@@ -573,6 +637,7 @@ void BandSolver::finish() {
   if (modes_.lambda.empty()) return;
   ModeErrors errors;
   refine(options_.tolerance, errors);
+  certify(errors);
   choose_basis(errors);
   // In a basis of equal modes their residuals meet, and many that were within the tolerance may add up to one that is not.
   double aim = options_.tolerance;
@@ -585,7 +650,9 @@ void BandSolver::finish() {
     refine(aim, errors);
     choose_basis(errors);
   }
+  certify(errors);
   counter_.reset();
+  measure_margins();
   modes_.residual = errors.residual;
   modes_.orthonormality_error = errors.orthonormality;
   orient_shapes(modes_.shapes, problem_.nodes.position);

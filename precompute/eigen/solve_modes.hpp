@@ -131,7 +131,7 @@ struct Modes {
   /// (modes) ||K phi - lambda M phi||_2 / (lambda ||M phi||_2), calculated from K and M after the solve. A mode above the tolerance is
   /// refined once; it is then accepted within the tolerance or within 10 epsilon ||diag(K) phi||_2 / (lambda ||M phi||_2), which the
   /// rounding of K phi alone may come to (low modes of thin bodies); beyond both it is refined again, and the solve fails if that does not
-  /// help.
+  /// help. Accepted above the tolerance, it is measured through the inverse as well (certify_modes), and the less of the two stands here.
   std::vector<double> residual;
   std::int64_t above_tolerance_count = 0;  // modes accepted above the tolerance, because rounding explains their residual
   /// (3n, modes) dense, the row distribution of K; column j is phi_j [kg^-1/2], phi^T M phi = 1. The entry of largest magnitude is positive

@@ -157,7 +157,22 @@ void keep(Run& run, const eigen::Modes& modes) {
   if (wish.stop) throw eigen::Stopped();
 }
 
-void warn_of_oddities(Run& run, const eigen::Modes& modes) {
+double calc_diagonal(const mesh::CheckReport& check) {
+  return std::hypot(check.box_high[0] - check.box_low[0], check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2]);
+}
+
+/// A body of which the fundamental is not heard is seldom what was meant; most often its mesh is in millimetres.
+void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
+  const std::int64_t below = modes.count_below_low - modes.rigid_count - modes.mechanism_count;
+  if (below <= 0) return;
+  run.stations.warn(
+      fmt::format("the fundamental is out of the band: {} mode{} below the band, which begins at {:g} Hz; the body measures {:.3g} m "
+                  "across: if its mesh is in millimetres, scale it by 0.001",
+                  below, below == 1 ? " lies" : "s lie", run.job.band_hz[0], calc_diagonal(body.check)));
+}
+
+void warn_of_oddities(Run& run, const Body& body, const eigen::Modes& modes) {
+  warn_of_low_modes(run, body, modes);
   if (modes.mechanism_count > 0)
     run.stations.warn(fmt::format(
         "the body has {} motions without stiffness besides the rigid ones (parts that hang on a point or an edge)", modes.mechanism_count));
@@ -231,7 +246,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   begin_checkpoint(run, setting, body);
   solved.modes = solve_named(run, setting, body, system, make_layout(body.pieces));
   keep(run, solved.modes);
-  warn_of_oddities(run, solved.modes);
+  warn_of_oddities(run, body, solved.modes);
 
   run.stations.begin("errors", "error bars and decays");
   solved.decay_per_s =

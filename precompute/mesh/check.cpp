@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "precompute/mesh/check_parts.hpp"
 #include "precompute/mesh/faces.hpp"
@@ -235,7 +236,7 @@ void find_components(const TetMesh& mesh, CheckReport& report) {
 }
 
 void collect_warnings(CheckReport& report) {
-  warn_of_size_and_slivers(report);
+  warn_of_elements(report);
   const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
   if (report.welded > 0) add(fmt::format("{} repeated nodes were joined with their twins, closing cracks in the mesh", report.welded));
   if (report.touching_nodes > 0)
@@ -251,7 +252,7 @@ void collect_warnings(CheckReport& report) {
 
 }  // namespace
 
-void warn_of_size_and_slivers(CheckReport& report) {
+void warn_of_elements(CheckReport& report) {
   const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
   const double diagonal =
       std::hypot(report.box_high[0] - report.box_low[0], report.box_high[1] - report.box_low[1], report.box_high[2] - report.box_low[2]);
@@ -259,9 +260,25 @@ void warn_of_size_and_slivers(CheckReport& report) {
   if (diagonal < 1e-3) add(fmt::format("the body measures only {:.3g} m across: coordinates are taken as metres", diagonal));
   if (report.slivers > 0)
     add(
-        fmt::format("{} slivers (a dihedral angle under 5 or over 175 degrees; the worst {:.2f} and {:.2f}): frequencies near them are too "
+        fmt::format("{} slivers (a dihedral angle under 5 or over 175 degrees; the worst {:.2g} and {:.6g}): frequencies near them are too "
                     "high, and the solver may lose digits",
                     report.slivers, report.min_dihedral_deg, report.max_dihedral_deg));
+  if (report.unreferenced > 0)
+    add(fmt::format("{} belong{} to no element and {} dropped",
+                    report.unreferenced == 1 ? "1 node" : fmt::format("{} nodes", report.unreferenced), report.unreferenced == 1 ? "s" : "",
+                    report.unreferenced == 1 ? "was" : "were"));
+  if (report.reoriented > 0 && report.reoriented < report.tets)
+    add(fmt::format("{} of {} elements were numbered inside out and have been turned: if others overlap them, mesh the body again",
+                    report.reoriented, report.tets));
+  double farthest = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) farthest = std::max({farthest, std::abs(report.box_low[k]), std::abs(report.box_high[k])});
+  constexpr double kLost = 1e-6;  // of the shortest edge: what rounding its ends does to an element's stiffness
+  const double rounding = farthest * std::numeric_limits<double>::epsilon();
+  if (rounding > kLost * report.shortest_edge_m)
+    add(fmt::format(
+        "the body lies {:.3g} m from the origin, where coordinates are rounded to {:.1g} m, {:.1g} of the shortest edge: move it to "
+        "the origin where it is made",
+        farthest, rounding, rounding / report.shortest_edge_m));
 }
 
 std::string list_elements(const std::vector<std::int64_t>& elements) {

@@ -43,6 +43,7 @@ struct CheckReport {
   double mean_ratio_min = 0.0;
   double mean_ratio_1_percent = 0.0;  // one element in a hundred is worse
   double mean_ratio_mean = 0.0;
+  double shortest_edge_m = 0.0;
   std::int64_t slivers = 0;  // elements with a dihedral angle under 5 or over 175 degrees
 
   std::vector<std::string> warnings;  // sentences for the user
@@ -76,10 +77,14 @@ TetMesh to_quadratic(const TetMesh& mesh);
 /// The same body with the corners only; node sets keep those. A linear mesh is returned as it is.
 TetMesh to_linear(const TetMesh& mesh);
 
+/// How far apart two places in the box `low` .. `high` [m] may be and still be meant as one: 1e-9 of its diagonal, and not less than
+/// coordinates of that size are rounded by when they are written and read.
+double calc_place_tolerance(const Vec3& low, const Vec3& high);
+
 /// The nodes of a named set. Throws InputError for an unknown name (listing those there are, and the nearest) and for an empty set.
 std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const std::string& set);
 
-/// The nodes in the closed box low <= x <= high [m], widened by 1e-9 of the mesh's diagonal so that nodes meant to lie on its faces count.
+/// The nodes in the closed box low <= x <= high [m], widened by calc_place_tolerance so that nodes meant to lie on its faces count.
 /// Throws InputError when there are none.
 std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const Vec3& low, const Vec3& high);
 

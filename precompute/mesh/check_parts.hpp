@@ -18,8 +18,8 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
 /// Volume, box, dihedral angles and mean ratios of the straight-sided elements.
 void calc_quality(const TetMesh& mesh, CheckReport& report);
 
-/// Warns of a body of unlikely size and of slivers.
-void warn_of_size_and_slivers(CheckReport& report);
+/// Warns of a body of unlikely size or far from the origin, of slivers, nodes that were dropped and elements that were turned.
+void warn_of_elements(CheckReport& report);
 
 /// Counts curved quadratic elements and straightens those that fold (curved.hpp).
 void straighten_folded(TetMesh& mesh, CheckReport& report);

@@ -2,12 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "precompute/mesh/check.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::mesh {
+
+double calc_place_tolerance(const Vec3& low, const Vec3& high) {
+  double largest = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) largest = std::max({largest, std::abs(low[k]), std::abs(high[k])});
+  constexpr double kRoundings = 4 * std::numeric_limits<double>::epsilon();
+  return std::max(1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]), kRoundings * largest);
+}
 
 std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const std::string& set) {
   const auto found = mesh.node_sets.find(set);
@@ -44,7 +52,7 @@ std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const Vec3& low,
       mesh_low[k] = std::min(mesh_low[k], x[k]);
       mesh_high[k] = std::max(mesh_high[k], x[k]);
     }
-  const double slack = 1e-9 * std::hypot(mesh_high[0] - mesh_low[0], mesh_high[1] - mesh_low[1], mesh_high[2] - mesh_low[2]);
+  const double slack = calc_place_tolerance(mesh_low, mesh_high);
   std::vector<std::int32_t> inside;
   for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
     bool in = true;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "precompute/mesh/check_parts.hpp"
@@ -35,7 +36,8 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
     }
   const std::int64_t count = mesh.tet_count();
   std::vector<double> ratios(static_cast<std::size_t>(count));
-  double greatest = -1.0, least = 1.0, sum = 0.0;  // of the cosines of the dihedral angles
+  double shortest = std::numeric_limits<double>::infinity();  // of the squared edges
+  double greatest = -1.0, least = 1.0, sum = 0.0;             // of the cosines of the dihedral angles
   for (std::int64_t e = 0; e < count; ++e) {
     const auto tet = mesh.tet(e);
     std::array<Vec3, 4> x{};
@@ -62,6 +64,7 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
     for (const auto& [i, j] : kEdges) {
       const Vec3 edge = minus(x[static_cast<std::size_t>(j)], x[static_cast<std::size_t>(i)]);
       squares += dot(edge, edge);
+      shortest = std::min(shortest, dot(edge, edge));
     }
     const double root = std::cbrt(3.0 * volume);
     ratios[static_cast<std::size_t>(e)] = 12.0 * root * root / squares;
@@ -72,6 +75,7 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
       report.volume_m3 += calc_curved_volume(mesh, e);
     }
   }
+  report.shortest_edge_m = std::sqrt(shortest);
   const double degrees = 180.0 / std::numbers::pi;
   report.min_dihedral_deg = degrees * std::acos(std::clamp(greatest, -1.0, 1.0));
   report.max_dihedral_deg = degrees * std::acos(std::clamp(least, -1.0, 1.0));

@@ -2,7 +2,8 @@
 // welded
 //   only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart.
 // Source: own.
-// Deviations: the tolerance is 1e-9 of the diagonal of the box of the nodes in use.
+// Deviations: the tolerance is 1e-6 of the diagonal of the box of the nodes in use, but 0.01 of the shortest edge at most, and
+//   calc_place_tolerance at least.
 
 #include <fmt/format.h>
 
@@ -151,6 +152,20 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
   }
 }
 
+/// Between the corners of an element [m].
+double find_shortest_edge(const TetMesh& mesh) {
+  double shortest = HUGE_VAL;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+    const auto tet = mesh.tet(e);
+    for (const auto& [i, j] : kEdges) {
+      const Vec3 &a = mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])],
+                 &b = mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(j)])];
+      shortest = std::min(shortest, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]));
+    }
+  }
+  return shortest;
+}
+
 }  // namespace
 
 std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, CheckReport& report) {
@@ -163,9 +178,12 @@ std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, Ch
       low[k] = std::min(low[k], mesh.nodes[i][k]);
       high[k] = std::max(high[k], mesh.nodes[i][k]);
     }
-  const double tolerance = 1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-  if (!std::isfinite(tolerance))
+  if (!std::isfinite(std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2])))
     throw InputError(fmt::format("{}: the coordinates are too large to compute with; give them in metres", name));
+  // Coordinates of single precision differ by 1e-7 of the body; nodes that close on the scale of an element are no twins all the same.
+  constexpr double kSingle = 1e-6, kOfEdge = 1e-2;
+  const double diagonal = std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  const double tolerance = std::max(calc_place_tolerance(low, high), std::min(kSingle * diagonal, kOfEdge * find_shortest_edge(mesh)));
   Parts twins(count);
   const bool any = tolerance > 0.0 && join_twins(mesh, used, low, tolerance, twins);
   std::vector<std::int32_t> identity(count), twin_of(count);

@@ -89,7 +89,7 @@ void find_held_boxes(MPI_Comm comm, const std::string& name, const Wish& wish, S
   MPI_Allreduce(MPI_IN_PLACE, high.data(), 3, MPI_DOUBLE, MPI_MAX, comm);
   report.box_low = low;
   report.box_high = high;
-  const double slack = 1e-9 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+  const double slack = mesh::calc_place_tolerance(low, high);
   for (const Hold& hold : wish.hold) {
     if (!hold.box_m) continue;
     const auto& [from, to] = *hold.box_m;

@@ -81,21 +81,22 @@ void find_quality(MPI_Comm comm, const fem::LocalMesh& local, mesh::CheckReport&
     piece.tets = local.tets;
     mesh::calc_quality(piece, own);
   });
-  std::array<double, 3> least{own.min_dihedral_deg, own.mean_ratio_min, own.mean_ratio_1_percent};
+  std::array<double, 4> least{own.min_dihedral_deg, own.mean_ratio_min, own.mean_ratio_1_percent, own.shortest_edge_m};
   std::array<double, 3> sum{own.volume_m3, own.mean_ratio_mean * local.tet_count(), static_cast<double>(own.slivers)};
-  MPI_Allreduce(MPI_IN_PLACE, least.data(), 3, MPI_DOUBLE, MPI_MIN, comm);
+  MPI_Allreduce(MPI_IN_PLACE, least.data(), 4, MPI_DOUBLE, MPI_MIN, comm);
   MPI_Allreduce(MPI_IN_PLACE, sum.data(), 3, MPI_DOUBLE, MPI_SUM, comm);
   MPI_Allreduce(&own.max_dihedral_deg, &report.max_dihedral_deg, 1, MPI_DOUBLE, MPI_MAX, comm);
   report.min_dihedral_deg = least[0];
   report.mean_ratio_min = least[1];
   report.mean_ratio_1_percent = least[2];
+  report.shortest_edge_m = least[3];
   report.volume_m3 = sum[0];
   report.mean_ratio_mean = sum[1] / static_cast<double>(report.tets);
   report.slivers = static_cast<std::int64_t>(sum[2]);
 }
 
 void collect_warnings(mesh::CheckReport& report) {
-  mesh::warn_of_size_and_slivers(report);
+  mesh::warn_of_elements(report);
   if (report.touching_nodes > 0)
     report.warnings.push_back(
         fmt::format("{} nodes of the boundary lie in the place of another: cracks are not closed in meshes that are read in parallel, so "
