@@ -178,10 +178,18 @@ class Parts(unittest.TestCase):
     def test_extrapolation_finds_the_limit_of_a_power_law(self):
         edges = [0.4, 0.27, 0.2]
         truth, power = cents.extrapolate(edges, [[100 + 3 * h**3, 250 + 11 * h**3] for h in edges])
-        self.assertAlmostEqual(power, 3, 6)
-        self.assertAlmostEqual(truth.freq_hz[0], 100, 9)
-        self.assertAlmostEqual(truth.freq_hz[1], 250, 9)
+        self.assertAlmostEqual(power, 3, 4)
+        self.assertAlmostEqual(truth.freq_hz[0], 100, 5)
+        self.assertAlmostEqual(truth.freq_hz[1], 250, 5)
         self.assertTrue(all(doubt > 0 for doubt in truth.uncertainty))
+
+    def test_uncertainty_of_a_limit_holds_where_meshes_scatter(self):
+        edges = [0.4, 0.36, 0.33, 0.3, 0.27]
+        scatter = [1.1, 0.85, 1.2, 0.9, 1.05]  # of the error; the two finest alone would put the limit elsewhere
+        for order in (2.0, 3.0, 4.0):
+            truth, _ = cents.extrapolate(edges, [[1000 + 400 * s * h**order, 2000 + 900 * s * h**order] for h, s in zip(edges, scatter)])
+            for found, exact, doubt in zip(truth.freq_hz, (1000, 2000), truth.uncertainty):
+                self.assertLess(abs(found / exact - 1), doubt)
 
     def test_cost_of_a_cent_is_read_off_the_curve(self):
         points = [cents.Point("x", 1, 1, elements, seconds, 0, [-error]) for elements, seconds, error in ((10, 1.0, 100.0), (20, 4.0, 25.0), (40, 16.0, 6.25))]

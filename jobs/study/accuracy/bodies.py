@@ -150,7 +150,7 @@ def make_bodies():
         Body("vibraphone", "undercut aluminium bar, 360 x 50 mm, bending modes 1 : 4 : 10", ALUMINIUM,
              shape("bar", length=0.36, width=0.05, thickness=VIBRAPHONE_H0), 16, True, change=("undercut", undercut)),
         Body("bunny", "hollow ceramic bunny, 130 mm tall, wall 5 mm", CERAMIC, ("--height", "0.13", "--wall", "0.005"), 15, True, sizes=(6000, 10500, 18000, 32000, 60000),
-             quick_sizes=(3000, 5000, 9000), quadratic_sizes=((18500, 25000, 34000, 46000, 64000), (18500, 21000, 24000)), surface=True),
+             quick_sizes=(3000, 5000, 9000), quadratic_sizes=((18500, 27000, 40000, 64000, 105000), (18500, 21000, 24000)), surface=True),
     ]
     return {body.name: dataclasses.replace(body, truth=truths.get(body.name)) for body in bodies}
 

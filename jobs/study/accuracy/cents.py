@@ -48,40 +48,40 @@ def make_point(kind, solve, truth):
     return Point(kind, solve.nodes, solve.unknowns, solve.elements, solve.cpu, solve.spread if len(solve.cpu_s) > 1 else None, [to_cents(f, true) for f, true in zip(solve.freq_hz, truth.freq_hz)])
 
 
+def fit_line(x, y):
+    """(intercept, slope) of least squares."""
+    mean_x, mean_y = statistics.fmean(x), statistics.fmean(y)
+    slope = sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y)) / sum((a - mean_x) ** 2 for a in x)
+    return mean_y - slope * mean_x, slope
+
+
 def extrapolate(edges, freq_hz):
-    """(truth, order): the limit of three meshes, coarse to fine, edges: their mean edge lengths, freq_hz: [mesh][mode].
+    """(Truth, order): the limit of three or more meshes, edges: their mean edge lengths, freq_hz: [mesh][mode].
 
-    f(h) = f0 + c h^p with one p for all modes (their median), kept between 2 and 4; the uncertainty of a mode is the distance to what p - 1
-    and p + 1 would give, and at least a quarter of the step from the finest mesh to the limit. Richardson 1911."""
-    powers = [power for modes in zip(*freq_hz) if (power := find_power(edges, modes)) is not None]
-    power = min(max(statistics.median(powers) if powers else 2.0, 2.0), 4.0)
+    f(h) = f0 + c h^p by least squares, f0 and c for each mode, one p from 2 to 4 for all (that with the least relative residuals): meshes without a common pattern scatter, and two of them say little of a
+    limit. The uncertainty of a mode is the most of: the distance to the limits by p - 1 and p + 1, the largest residual, the whole way from the finest mesh to the limit. After Richardson 1911."""
+    modes = list(zip(*freq_hz))
 
-    def find_limit(modes, p):
-        return modes[2] - (modes[1] - modes[2]) * edges[2] ** p / (edges[1] ** p - edges[2] ** p)
+    def fit(power):
+        """[(limit, largest residual)] of all modes."""
+        x = [edge**power for edge in edges]
+        lines = [fit_line(x, y) for y in modes]
+        return [(limit, max(abs(limit + slope * a - b) for a, b in zip(x, y))) for (limit, slope), y in zip(lines, modes)]
 
+    def find_misfit(power):
+        return sum((residual / limit) ** 2 for limit, residual in fit(power))
+
+    low, high = 2.0, 4.0
+    for _ in range(80):  # the misfit has one minimum
+        third = (high - low) / 3
+        low, high = (low, high - third) if find_misfit(low + third) < find_misfit(high - third) else (low + third, high)
+    power = (low + high) / 2
+    finest = min(range(len(edges)), key=lambda i: edges[i])
     limits, doubts = [], []
-    for modes in zip(*freq_hz):
-        limit = find_limit(modes, power)
-        doubt = max(abs(find_limit(modes, power - 1) - limit), abs(find_limit(modes, power + 1) - limit), abs(modes[2] - limit) / 4)
+    for (limit, residual), (less, _), (more, _), values in zip(fit(power), fit(power - 1), fit(power + 1), modes):
         limits.append(limit)
-        doubts.append(doubt / limit)
+        doubts.append(max(abs(less - limit), abs(more - limit), residual, abs(values[finest] - limit)) / limit)
     return Truth(tuple(limits), tuple(doubts), "extrapolated"), power
-
-
-def find_power(edges, values):
-    """p of v(h) = v0 + c h^p through three meshes; None where the values do not come in steps of one direction that get smaller."""
-    first, second = values[0] - values[1], values[1] - values[2]
-    if second == 0 or first / second <= 0:
-        return None
-    ratio = first / second
-    find_ratio = lambda p: (edges[0] ** p - edges[1] ** p) / (edges[1] ** p - edges[2] ** p)
-    low, high = 0.2, 8.0
-    if not find_ratio(low) < ratio < find_ratio(high):
-        return None
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if find_ratio(middle) < ratio else (low, middle)
-    return (low + high) / 2
 
 
 def find_rate(points, truth, find_error=lambda point: point.median):

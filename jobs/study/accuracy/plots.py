@@ -88,7 +88,8 @@ def draw_panel(panel, left, top, colours):
         if len(guide) > 1:
             out.append(axes.draw_curve(guide, "#888888", 1.3, True))
             x, y = guide[-1] if inside(*guide[-1]) else guide[0]
-            out.append(f'<text x="{axes.place_x(x) - 4:.1f}" y="{axes.place_y(y) - 6:.1f}" text-anchor="end" fill="#666" font-size="11">{measuring.escape(text)}</text>')
+            side, shift = ("end", -4) if axes.place_x(x) > left + WIDTH / 2 else ("start", 8)
+            out.append(f'<text x="{axes.place_x(x) + shift:.1f}" y="{axes.place_y(y) - 6:.1f}" text-anchor="{side}" fill="#666" font-size="11">{measuring.escape(text)}</text>')
     for name, curve in curves.items():
         out.append(axes.draw_curve(curve, colours[name]))
         out += [axes.draw_point(x, y, colours[name], f"{name}: {x:.4g}, {y:.3g}", radius=3.2) for x, y in curve]
@@ -102,9 +103,9 @@ def draw_panels(panels, title, subtitle, columns=2):
     columns = min(columns, len(panels))
     lines = -(-len(panels) // columns)
     width = columns * (LEFT + WIDTH) + 40
-    out = charts.start(max(width, 40 + 9 * len(subtitle)), TOP + lines * (HEIGHT + GAP) - GAP + FOOT, title, subtitle)
-    x = 16.0
     entries = [(name, colours[name]) for name in names] + ([("Pareto front", "#cfcfcf")] if any(panel.front for panel in panels) else [])
+    out = charts.start(max(width, 40 + 9 * len(subtitle), 20 + round(sum(40 + 7.4 * len(name) for name, _ in entries))), TOP + lines * (HEIGHT + GAP) - GAP + FOOT, title, subtitle)
+    x = 16.0
     for name, colour in entries:
         out.append(f'<rect x="{x:.0f}" y="62" width="13" height="13" fill="{colour}"/><text x="{x + 18:.0f}" y="73">{measuring.escape(name)}</text>')
         x += 40 + 7.4 * len(name)
