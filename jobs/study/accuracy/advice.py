@@ -242,6 +242,8 @@ def find_results(lab, bodies):
 
 
 def add_defaults(page, name, caption, rows):
+    if not rows:
+        return page.say(f"Of the {name}'s defaults nothing could be told on these bodies.")
     page.add_table(name, [HEAD] + [(*row[:5], "yes" if row[5] else "no" + (f": {REASONS[row[0]]}" if row[0] in REASONS else "")) for row in rows], caption)
     against = [f"{row[0]} ({row[1]}{', kept: ' + REASONS[row[0]] if row[0] in REASONS else ''})" for row in rows if not row[5]]
     page.conclude(f"**Defaults, {name}**: {len(rows) - len(against)} of {len(rows)} agree with this study" + (f"; not {', '.join(against)}." if against else "."))
