@@ -59,7 +59,7 @@ def extrapolate(edges, freq_hz):
     """(Truth, order): the limit of three or more meshes, edges: their mean edge lengths, freq_hz: [mesh][mode].
 
     f(h) = f0 + c h^p by least squares, f0 and c for each mode, one p from 2 to 4 for all (that with the least relative residuals): meshes without a common pattern scatter, and two of them say little of a
-    limit. The uncertainty of a mode is the most of: the distance to the limits by p - 1 and p + 1, the largest residual, the whole way from the finest mesh to the limit. After Richardson 1911."""
+    limit. The uncertainty of a mode is the most of: the distance to the limits by p - 1/2 and p + 1/2, the largest residual, the whole way from the finest mesh to the limit. After Richardson 1911."""
     modes = list(zip(*freq_hz))
 
     def fit(power):
@@ -78,7 +78,7 @@ def extrapolate(edges, freq_hz):
     power = (low + high) / 2
     finest = min(range(len(edges)), key=lambda i: edges[i])
     limits, doubts = [], []
-    for (limit, residual), (less, _), (more, _), values in zip(fit(power), fit(power - 1), fit(power + 1), modes):
+    for (limit, residual), (less, _), (more, _), values in zip(fit(power), fit(power - 0.5), fit(power + 0.5), modes):
         limits.append(limit)
         doubts.append(max(abs(less - limit), abs(more - limit), residual, abs(values[finest] - limit)) / limit)
     return Truth(tuple(limits), tuple(doubts), "extrapolated"), power
