@@ -5,8 +5,8 @@ The runtime is configured there anew, at the path of the whole build, and takes 
 made by another command or of other files. What is taken over may have read, and its programs may load, no file of those packages. Every program
 is then tried by some of its tests; all of them run on the same bytes elsewhere.
 
-With --from-nothing everything is compiled there, and all tests of the runtime run there. So it is too where the machine allows no mount namespace
-(an ordinary container), with everything in sight and the same look at what was read and what is loaded.
+With --from-nothing, or where the whole build is none of ninja's, everything is compiled there, and all tests of the runtime run there. So it is too where
+the machine allows no mount namespace (an ordinary container), with everything in sight and the same look at what was read and what is loaded.
 
 usage: runtime_alone.py SOURCE_DIR BUILD_DIR WORK_DIR [--from-nothing]        WORK_DIR is removed at the end
 """
@@ -139,7 +139,7 @@ def test_hidden(source, build, work, whole):
 
 def main():
     source, build, work = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-    from_nothing = sys.argv[4:] == ["--from-nothing"]
+    from_nothing = sys.argv[4:] == ["--from-nothing"] or not (build / "build.ninja").exists()
     if os.environ.get("CARILLON_INSIDE"):
         return test_hidden(source, build, work, None if from_nothing else pathlib.Path(os.environ["CARILLON_INSIDE"]))
     shutil.rmtree(work, ignore_errors=True)
