@@ -26,12 +26,20 @@ using SimTK::Transform;
 using Point = SimTK::Vec3;
 
 constexpr double kSink = 2e-5;         // m; how far a resting body sinks into its contact under its own weight
+constexpr double kHeld = 1e-3;          // of the size; a point that holds a body up is held so far from where it was found last
+constexpr double kSettling = 0.1;      // s; in which the share of a load that a point takes may double, and a spring that begins deeper comes up
 constexpr double kRolling = 2e-3;      // rolling resistance arm over the size of the smaller body; hard bodies on hard floors: 1e-3 to 5e-3
 constexpr double kLongestStep = 2e-3;  // s
 constexpr double kTurn = 0.02;         // rad; of one Runge-Kutta step of a flight, which is then right to 1e-10 of it
 constexpr double kSlowTouch = 0.01;    // m/s; of bodies in touch that move slower, steps get longer in proportion
 
 Point to_vec(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
+
+/// What the spring of a point holds [J] at the depth of its touch when it begins at that depth.
+double calc_spring_j(const RestingPoint& p, double offset_m) {
+  const double pressed = std::max(0.0, p.touch.depth_m - offset_m);
+  return 0.5 * p.stiffness_n_m * pressed * pressed;
+}
 
 Transform make_pose(const Pose& pose) {
   const auto& q = pose.rotation;
@@ -61,6 +69,7 @@ Engine::Engine(const WorldModel& world, SurfaceSet& surfaces, double time_s, con
     initial_.mobiles.push_back(
         make_mobile(static_cast<int>(i), initial_.poses[i], to_vec(body.velocity_m_s), to_vec(body.angular_velocity_rad_s)));
   }
+  rested_s_ = time_s;
   integrator_ = std::make_unique<SimTK::RungeKuttaMersonIntegrator>(system_);
   integrator_->setAccuracy(1e-5);
 }
@@ -145,28 +154,77 @@ std::vector<TouchPoint> Engine::find_touches(const std::vector<Transform>& poses
   return all;
 }
 
-void Engine::set_resting(const std::vector<TouchPoint>& touches) {
-  std::map<std::pair<int, int>, int> sharing;
+void Engine::add_held(std::vector<TouchPoint>& touches, const Snapshot& now) const {
+  for (const RestingPoint& p : resting_->points()) {
+    const auto is_same = [&](const TouchPoint& t) { return t.a == p.touch.a && t.b == p.touch.b && t.feature == p.touch.feature; };
+    if (std::any_of(touches.begin(), touches.end(), is_same)) continue;
+    TouchPoint t = p.touch;
+    place_touch(t, now.poses[t.a], t.b >= 0 ? now.poses[t.b] : Transform());
+    if (t.depth_m <= p.offset_m) continue;
+    const Transform X_plane = t.plane_on_b ? (t.b >= 0 ? now.poses[t.b] : Transform()) : now.poses[t.a];
+    const Point away = t.where - X_plane * t.plane_point, outward = X_plane.R() * t.plane_normal;
+    if ((away - dot(away, outward) * outward).norm() < kHeld * surface(t.a).size_m()) touches.push_back(t);
+  }
+}
+
+/// Points of a pair share its load, and which of them there are changes from step to step. Their springs must not hold more after a change than before, or
+/// what sways on them is pushed at every sway and never lies: the share of one that stays falls at once and rises slowly; one that comes finds what is left
+/// of what the pair held before, and its spring begins where it can hold no more than that, and so much higher little by little.
+void Engine::set_resting(const std::vector<TouchPoint>& touches, const Snapshot& now) {
+  using Pair = std::pair<int, int>;
+  const double passed = std::max(0.0, now.time_s - rested_s_);
+  rested_s_ = now.time_s;
+  std::map<Pair, int> sharing;
+  std::map<Pair, double> left_j, wanted_j;  // energy that the points that come may have, and that they would have
   for (const TouchPoint& t : touches) ++sharing[{t.a, t.b}];
-  const double omega = std::sqrt(std::max(to_vec(world_.gravity_m_s2).norm(), 1.0) / kSink);
   std::vector<RestingPoint> points;
   for (const TouchPoint& t : touches) {
-    RestingPoint p;
-    p.touch = t;
-    p.body_a = bodies_[t.a].mobilized;
-    p.frame_a = bodies_[t.a].frame;
-    p.body_b = t.b >= 0 ? bodies_[t.b].mobilized : SimTK::MobilizedBodyIndex(0);
-    if (t.b >= 0) p.frame_b = bodies_[t.b].frame;
-    double inverse_mass = is_fixed(t.a) ? 0.0 : 1.0 / world_.bodies[t.a].mass_kg;
-    if (t.b >= 0 && !is_fixed(t.b)) inverse_mass += 1.0 / world_.bodies[t.b].mass_kg;
-    const double mass = 1.0 / inverse_mass / sharing[{t.a, t.b}];
-    p.stiffness_n_m = mass * omega * omega;
-    p.damping_n_s_m = 2.0 * mass * omega;  // critical
-    p.rolling_arm_m = kRolling * 10.0 * spot_radius_m(t.a, t.b);
-    p.friction = make_impact_point(t).friction;
+    RestingPoint p = make_resting(t);
+    p.share = 1.0 / sharing[{t.a, t.b}];
+    const auto old = std::find_if(rested_.begin(), rested_.end(),
+                                  [&](const RestedPoint& o) { return o.a == t.a && o.b == t.b && o.feature == t.feature; });
+    if (old != rested_.end()) {
+      left_j[{t.a, t.b}] += old->share * calc_spring_j(p, old->offset_m);
+      p.share = std::min(p.share, old->share * (1.0 + passed / kSettling));
+      p.offset_m = old->offset_m * std::exp(-passed / kSettling);
+      left_j[{t.a, t.b}] -= p.share * calc_spring_j(p, p.offset_m);
+    } else {
+      wanted_j[{t.a, t.b}] += p.share * calc_spring_j(p, 0.0);
+      p.offset_m = -1.0;
+    }
     points.push_back(p);
   }
+  for (RestingPoint& p : points) {
+    if (p.offset_m >= 0.0) continue;
+    const Pair pair{p.touch.a, p.touch.b};
+    const double part = wanted_j[pair] > 0.0 ? std::clamp(left_j[pair] / wanted_j[pair], 0.0, 1.0) : 1.0;
+    p.offset_m = std::max(0.0, p.touch.depth_m) * (1.0 - std::sqrt(part));
+  }
+  rested_.clear();
+  for (RestingPoint& p : points) {
+    p.stiffness_n_m *= p.share;
+    p.damping_n_s_m *= p.share;
+    rested_.push_back({p.touch.a, p.touch.b, p.touch.feature, p.share, p.offset_m});
+  }
   resting_->set_points(std::move(points));
+}
+
+/// A point that takes all of the load.
+RestingPoint Engine::make_resting(const TouchPoint& t) const {
+  const double omega = std::sqrt(std::max(to_vec(world_.gravity_m_s2).norm(), 1.0) / kSink);
+  RestingPoint p;
+  p.touch = t;
+  p.body_a = bodies_[t.a].mobilized;
+  p.frame_a = bodies_[t.a].frame;
+  p.body_b = t.b >= 0 ? bodies_[t.b].mobilized : SimTK::MobilizedBodyIndex(0);
+  if (t.b >= 0) p.frame_b = bodies_[t.b].frame;
+  double inverse_mass = is_fixed(t.a) ? 0.0 : 1.0 / world_.bodies[t.a].mass_kg;
+  if (t.b >= 0 && !is_fixed(t.b)) inverse_mass += 1.0 / world_.bodies[t.b].mass_kg;
+  p.stiffness_n_m = omega * omega / inverse_mass;
+  p.damping_n_s_m = 2.0 * omega / inverse_mass;  // critical
+  p.rolling_arm_m = kRolling * 10.0 * spot_radius_m(t.a, t.b);
+  p.friction = make_impact_point(t).friction;
+  return p;
 }
 
 std::vector<PushedPoint> Engine::calc_pushes(const Snapshot& now) const {
@@ -174,7 +232,7 @@ std::vector<PushedPoint> Engine::calc_pushes(const Snapshot& now) const {
   for (const RestingPoint& p : resting_->points()) {
     TouchPoint t = p.touch;
     place_touch(t, now.poses[t.a], t.b >= 0 ? now.poses[t.b] : Transform());
-    const double push = calc_push(p, t.depth_m, dot(calc_relative_velocity(now.mobiles, make_impact_point(t)), t.normal));
+    const double push = calc_push(p, t.depth_m - p.offset_m, dot(calc_relative_velocity(now.mobiles, make_impact_point(t)), t.normal));
     if (push > 0.0) pushed.push_back({t, push});
   }
   return pushed;
@@ -265,6 +323,29 @@ double Engine::calc_largest_step(const Snapshot& now, bool in_touch) const {
     if (in_touch && speed > 0.0) step = std::min(step, std::max(contact_step_s_, contact_step_s_ * kSlowTouch / speed));
   }
   return std::max(step, 2e-6);
+}
+
+double Engine::calc_kinetic_j(const Snapshot& now) const {
+  double energy = 0.0;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (world_.bodies[i].fixed) continue;
+    const Mobile& m = now.mobiles[i];
+    const Point spin = ~now.poses[i].R() * m.spin;
+    energy += 0.5 * (world_.bodies[i].mass_kg * m.velocity.normSqr() + dot(spin, bodies_[i].inertia * spin));
+  }
+  return energy;
+}
+
+double Engine::calc_energy_j(const Snapshot& now) const {
+  double energy = calc_kinetic_j(now);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (!world_.bodies[i].fixed) energy -= world_.bodies[i].mass_kg * dot(to_vec(world_.gravity_m_s2), now.mobiles[i].centre);
+  }
+  for (RestingPoint p : resting_->points()) {
+    place_touch(p.touch, now.poses[p.touch.a], p.touch.b >= 0 ? now.poses[p.touch.b] : Transform());
+    energy += calc_spring_j(p, p.offset_m);
+  }
+  return energy;
 }
 
 ImpactPoint Engine::make_impact_point(const TouchPoint& t) const {

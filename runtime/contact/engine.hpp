@@ -3,6 +3,7 @@
 
 #include <Simbody.h>
 
+#include <array>
 #include <map>
 #include <memory>
 #include <string>
@@ -22,6 +23,13 @@ struct Snapshot {
   double time_s = 0.0;
   std::vector<SimTK::Transform> poses;  // of the mesh frames, one a body
   std::vector<Mobile> mobiles;          // one a body; fixed ones cannot move
+};
+
+/// A point that has held a body up: how much of the load of its pair its spring takes, and at which depth it begins.
+struct RestedPoint {
+  int a = 0, b = -1;
+  std::array<int, 3> feature{};
+  double share = 1.0, offset_m = 0.0;
 };
 
 /// A point that holds a body up, where it is now, and how hard it pushes.
@@ -58,8 +66,16 @@ class Engine {
   /// The carrying points of every pair that cuts into each other.
   std::vector<TouchPoint> find_touches(const std::vector<SimTK::Transform>& poses) const;
 
+  /// Adds the points that hold bodies up and are still pressed where they were, though they are no touches any more: on the brim of a face, or between
+  /// edges that lie along each other, a point comes and goes with the slightest sway.
+  void add_held(std::vector<TouchPoint>& touches, const Snapshot& now) const;
+
   /// Which points hold the bodies up from now on.
-  void set_resting(const std::vector<TouchPoint>& touches);
+  void set_resting(const std::vector<TouchPoint>& touches, const Snapshot& now);
+
+  /// What the points that hold the bodies up carry over from one engine to another.
+  const std::vector<RestedPoint>& get_rested() const { return rested_; }
+  void set_rested(std::vector<RestedPoint> rested) { rested_ = std::move(rested); }
 
   /// The resting points that push at such places and speeds.
   std::vector<PushedPoint> calc_pushes(const Snapshot& now) const;
@@ -70,6 +86,10 @@ class Engine {
   /// No step may be longer than this, so that nothing passes through anything; while something is in touch, so that what comes down beside
   /// it is not far inside when it is seen.
   double calc_largest_step(const Snapshot& now, bool in_touch) const;
+
+  /// Of the bodies that move, and of the springs that hold them up [J]; gravity counts from the origin.
+  double calc_energy_j(const Snapshot& now) const;
+  double calc_kinetic_j(const Snapshot& now) const;
 
   ImpactPoint make_impact_point(const TouchPoint& touch) const;
   /// Points nearer to each other than this on a body belong to one spot [m].
@@ -90,6 +110,7 @@ class Engine {
     SimTK::Mat33 inverse_inertia{0};
   };
 
+  RestingPoint make_resting(const TouchPoint& touch) const;
   void add_body(const BodyModel& body, SurfaceSet& surfaces);
   Snapshot calc_flown(const Snapshot& from, double step_s) const;
   Mobile make_mobile(int body, const SimTK::Transform& pose, const SimTK::Vec3& velocity, const SimTK::Vec3& spin) const;
@@ -101,6 +122,8 @@ class Engine {
   SimTK::SimbodyMatterSubsystem matter_;
   SimTK::GeneralForceSubsystem forces_;
   RestingForce* resting_ = nullptr;  // owned by forces_
+  std::vector<RestedPoint> rested_;  // its points as they were set
+  double rested_s_ = 0.0;            // when
   SimTK::State state_;               // what the integrator starts from
   Snapshot initial_;
   mutable std::map<std::pair<int, int>, NearFaces> near_;  // a memory only

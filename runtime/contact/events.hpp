@@ -28,6 +28,15 @@ struct WorldOptions {
   double end_s = std::numeric_limits<double>::infinity();  // the world stops there
   bool islands = true;                                     // false: one Simbody system for all bodies, for comparison
   bool lasting_contacts = true;                            // false: no stream::Contact records, and none of their cost
+  bool audits_energy = false;                              // Statistics::energy
+};
+
+/// The books of mechanical energy: kinetic, of gravity, and of the springs of resting contacts. Looked at every 2 ms.
+struct EnergyAudit {
+  double rise_j = 0.0;      // the most that it has ever been above an earlier moment, what hits took put back
+  double hit_rise_j = 0.0;  // the most that a hit has added; they only take
+  double kinetic_j = 0.0;   // the largest there has been
+  double weight_n = 0.0;    // of all bodies that move; rise_j over it is a height
 };
 
 /// What a world has cost so far.
@@ -36,6 +45,7 @@ struct Statistics {
   std::int64_t islands = 0;  // groups of moving bodies at present
   std::int64_t made = 0;     // Simbody systems made so far
   double seconds_cpu = 0.0;
+  EnergyAudit energy;  // zeros unless asked for
 };
 
 /// A finished simulation: impulses in order of time; per body, poses in order of time (at least at 0 and at the end).

@@ -41,12 +41,13 @@ double calc_approach(const Engine& engine, const Snapshot& now, const TouchPoint
 }  // namespace
 
 Island::Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces, double time_s, const std::vector<OldPoint>& recent,
-               const std::vector<Spot>& spots, const WorldOptions& options)
+               const std::vector<RestedPoint>& rested, const std::vector<Spot>& spots, const WorldOptions& options)
     : world_(std::move(world)),
       members_(std::move(members)),
       engine_(world_, surfaces, time_s, options),
       state_(engine_.initial()),
-      has_lasting_(options.lasting_contacts) {
+      has_lasting_(options.lasting_contacts),
+      audits_(options.audits_energy) {
   still_since_s_ = time_s;
   const auto find = [&](int body) {
     const auto it = std::lower_bound(members_.begin(), members_.end(), body);
@@ -64,6 +65,14 @@ Island::Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces,
     }
     lasting_.spots().push_back(std::move(spot));
   }
+  std::vector<RestedPoint> own;
+  for (RestedPoint r : rested) {
+    const bool on_ground = r.b < 0;
+    r.a = find(r.a);
+    r.b = to_own(r.b);
+    if (r.a >= 0 && (r.b >= 0 || on_ground)) own.push_back(r);
+  }
+  engine_.set_rested(std::move(own));
   for (const OldPoint& o : recent) {
     const int a = find(o.a), b = o.b < 0 ? -1 : find(o.b);
     if (a >= 0 && (o.b < 0 || b >= 0)) recent_.push_back({a, b, o.in_a, o.time_s});
@@ -306,6 +315,7 @@ void Island::begin_window() {
   begin_poses_ = state_.poses;
   moved_m_.assign(members_.size(), 0.0);
   events_.clear();
+  taken_j_ = least_taken_j_ = 0.0;
 }
 
 /// Does everything lie and stay? (In the air nothing does, at the top of its flight either.)
@@ -328,10 +338,11 @@ bool Island::step(double until_s) {
     record();
     return true;
   }
-  const auto touches = engine_.find_touches(state_.poses);
+  auto touches = engine_.find_touches(state_.poses);
+  engine_.add_held(touches, state_);
   old_ = find_old(state_, touches);
   remember(state_, touches);
-  engine_.set_resting(touches);
+  engine_.set_resting(touches, state_);
   const double step = std::min(until_s - state_.time_s, engine_.calc_largest_step(state_, !touches.empty()));
   bool impact = false;
   if (stuck_ > 30) {
@@ -343,7 +354,13 @@ bool Island::step(double until_s) {
     impact = next.impact;
     stuck_ = impact && next.state.time_s - state_.time_s < 1e-6 ? stuck_ + 1 : 0;
     state_ = next.state;
-    if (impact) strike();
+    if (impact) {
+      const double before = audits_ ? engine_.calc_kinetic_j(state_) : 0.0;
+      strike();
+      const double taken = audits_ ? before - engine_.calc_kinetic_j(state_) : 0.0;
+      taken_j_ += taken;
+      least_taken_j_ = std::min(least_taken_j_, taken);
+    }
   }
   const bool done = until_s - state_.time_s <= kTouchTime;
   if (impact || !is_still(!touches.empty())) still_since_s_ = state_.time_s;
@@ -369,6 +386,14 @@ void Island::store(WorldModel& scene) const {
 
 void Island::add_recent(std::vector<OldPoint>& out) const {
   for (const OldPoint& o : recent_) out.push_back({find_member(o.a), find_member(o.b), o.in_a, o.time_s});
+}
+
+void Island::add_rested(std::vector<RestedPoint>& out) const {
+  for (RestedPoint r : engine_.get_rested()) {
+    r.a = find_member(r.a);
+    r.b = find_member(r.b);
+    out.push_back(r);
+  }
 }
 
 }  // namespace carillon::contact

@@ -23,10 +23,10 @@ struct OldPoint {
 class Island {
  public:
   /// `world`: the bodies that belong together and all that stand still, as they are at time_s. members[i]: the number in the scene of its
-  /// body i, rising. `recent`, `spots`: the points of the whole scene that were in contact within the last moments, and what touches.
-  /// `options`: of the world.
+  /// body i, rising. `recent`, `rested`, `spots`: the points of the whole scene that were in contact within the last moments, those that hold bodies up,
+  /// and what touches. `options`: of the world.
   Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces, double time_s, const std::vector<OldPoint>& recent,
-         const std::vector<Spot>& spots, const WorldOptions& options);
+         const std::vector<RestedPoint>& rested, const std::vector<Spot>& spots, const WorldOptions& options);
 
   /// From now on events and moves are counted anew.
   void begin_window();
@@ -38,9 +38,16 @@ class Island {
   double get_moved_m(std::size_t i) const { return moved_m_[i]; }
   const std::vector<stream::Event>& get_events() const { return events_; }
   std::int64_t get_steps() const { return steps_; }
+  /// Engine::calc_energy_j now, Engine::calc_kinetic_j, and what hits have taken since begin_window, all of them and the one that took least
+  /// (below 0: gave). What hits took is only kept where WorldOptions::audits_energy asks for it.
+  double calc_energy_j() const { return engine_.calc_energy_j(state_); }
+  double calc_kinetic_j() const { return engine_.calc_kinetic_j(state_); }
+  double get_taken_j() const { return taken_j_; }
+  double get_least_taken_j() const { return least_taken_j_; }
   /// Writes where its moving bodies are and how they move into the scene's.
   void store(WorldModel& scene) const;
   void add_recent(std::vector<OldPoint>& out) const;
+  void add_rested(std::vector<RestedPoint>& out) const;
   void add_spots(std::vector<Spot>& out) const;
 
  private:
@@ -74,6 +81,8 @@ class Island {
   std::vector<OldPoint> old_;     // in contact when the step began and not about to leave
   std::vector<OldPoint> recent_;  // in contact within the last kRollingTime
   bool has_lasting_ = true;
+  bool audits_ = false;
+  double taken_j_ = 0.0, least_taken_j_ = 0.0;
   LastingContacts lasting_;
   int stuck_ = 0;  // impacts in a row with no time between them
   double still_since_s_ = 0.0;

@@ -1,4 +1,4 @@
-// Method: at each point a spring and a damper that only push, f = max(0, k d + c d' g(d)), with g rising to 1 within kFullDepth so that the
+// Method: at each point a spring and a damper that only push, f = max(0, k d + c d' g(d)), d from where the spring begins, with g rising to 1 within kFullDepth so that the
 // force
 //   begins without a jump; friction -mu f u / max(|u|, kCreep), so that a body on a slope creeps by less than kCreep; rolling resistance
 //   -b f w / max(|w|, kSlowSpin), without which a rounded body rocks for ever.
@@ -16,9 +16,9 @@ constexpr double kSlowSpin = 0.05;   // rad/s; below this the rolling resistance
 
 }  // namespace
 
-double calc_push(const RestingPoint& p, double depth_m, double parting_m_s) {
-  if (depth_m <= 0.0) return 0.0;
-  return std::max(0.0, p.stiffness_n_m * depth_m - p.damping_n_s_m * parting_m_s * std::min(1.0, depth_m / kFullDepth));
+double calc_push(const RestingPoint& p, double pressed_m, double parting_m_s) {
+  if (pressed_m <= 0.0) return 0.0;
+  return std::max(0.0, p.stiffness_n_m * pressed_m - p.damping_n_s_m * parting_m_s * std::min(1.0, pressed_m / kFullDepth));
 }
 
 void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::SpatialVec>& body_forces, SimTK::Vector_<SimTK::Vec3>&,
@@ -31,11 +31,11 @@ void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::Sp
     const SimTK::Transform X_a = a.getBodyTransform(state) * p.frame_a, X_b = b.getBodyTransform(state) * p.frame_b;
     TouchPoint t = p.touch;
     place_touch(t, X_a, X_b);
-    if (t.depth_m <= 0.0) continue;
+    if (t.depth_m <= p.offset_m) continue;
     const Vec3 in_a = ~a.getBodyTransform(state) * t.where, in_b = ~b.getBodyTransform(state) * t.where;
     const Vec3 u = a.findStationVelocityInGround(state, in_a) - b.findStationVelocityInGround(state, in_b);
     const double un = dot(u, t.normal);
-    const double push = calc_push(p, t.depth_m, un);
+    const double push = calc_push(p, t.depth_m - p.offset_m, un);
     if (push <= 0.0) continue;
     const Vec3 slide = u - un * t.normal;
     const Vec3 force = push * t.normal - (p.friction * push / std::max(slide.norm(), kCreep)) * slide;
@@ -54,7 +54,8 @@ SimTK::Real RestingForce::calcPotentialEnergy(const SimTK::State& state) const {
     TouchPoint t = p.touch;
     place_touch(t, matter_.getMobilizedBody(p.body_a).getBodyTransform(state) * p.frame_a,
                 matter_.getMobilizedBody(p.body_b).getBodyTransform(state) * p.frame_b);
-    if (t.depth_m > 0.0) energy += 0.5 * p.stiffness_n_m * t.depth_m * t.depth_m;
+    const double pressed = std::max(0.0, t.depth_m - p.offset_m);
+    energy += 0.5 * p.stiffness_n_m * pressed * pressed;
   }
   return energy;
 }

@@ -17,14 +17,16 @@ struct RestingPoint {
   SimTK::MobilizedBodyIndex body_a, body_b;  // Ground for the ground and for fixed bodies
   SimTK::Transform frame_b;                  // of the mesh of b (or a) when it is fixed: its place in the world
   SimTK::Transform frame_a;
+  double share = 1.0;     // of the load of its two bodies
+  double offset_m = 0.0;  // depth at which the spring begins
   double stiffness_n_m = 0.0;
   double damping_n_s_m = 0.0;
   double friction = 0.0;
   double rolling_arm_m = 0.0;  // rolling resistance: moment per normal force
 };
 
-/// How hard the point pushes [N] at that depth [m] when the bodies part at that speed [m/s] along its normal.
-double calc_push(const RestingPoint& point, double depth_m, double parting_m_s);
+/// How hard the point pushes [N] when its spring is pressed so much [m] and the bodies part at that speed [m/s] along its normal.
+double calc_push(const RestingPoint& point, double pressed_m, double parting_m_s);
 
 /// Simbody force element: spring, damper and regularised Coulomb friction and rolling resistance at a list of points that is changed only
 /// between steps.

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <ctime>
 #include <functional>
+#include <limits>
 #include <numeric>
 
 #include "runtime/config/error.hpp"
@@ -84,6 +85,7 @@ class Runner::Parts {
   void add_island(const std::vector<int>& moving);
   std::vector<std::vector<int>> list_groups(Groups& groups) const;
   std::vector<int> find_moving(const Island& island) const;
+  void audit();
   void emit(std::vector<stream::Event>& events, double mark_s, const Sink& sink) const;
   stream::Motion make_motion(std::size_t body, double time_s) const;
   const Surface& surface(int body) const { return *surfaces_.at(world_.bodies[body].vertices_m); }
@@ -92,6 +94,7 @@ class Runner::Parts {
   WorldOptions options_;
   SurfaceSet surfaces_;
   std::vector<OldPoint> recent_;  // of all islands, at the start of the window
+  std::vector<RestedPoint> rested_;  // the same
   std::vector<Spot> spots_;       // the same
   std::vector<std::unique_ptr<Island>> islands_;
   std::vector<int> group_;   // of each body, in the window before: the lowest number in its island
@@ -103,11 +106,18 @@ class Runner::Parts {
   std::int64_t old_steps_ = 0;  // of islands that are no more
   std::int64_t made_ = 0;
   double seconds_cpu_ = 0.0;
+  EnergyAudit energy_;
+  double taken_j_ = 0.0;                                        // by hits
+  double least_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
 };
 
 Runner::Parts::Parts(WorldModel world, const WorldOptions& options) : world_(std::move(world)), options_(options) {
   Engine(world_, surfaces_, 0.0, options_).check_overlaps();
   group_.assign(world_.bodies.size(), -1);
+  const auto& g = world_.gravity_m_s2;
+  for (const BodyModel& body : world_.bodies) {
+    if (options_.audits_energy && !body.fixed) energy_.weight_n += body.mass_kg * std::hypot(g[0], g[1], g[2]);
+  }
 }
 
 stream::Motion Runner::Parts::make_motion(std::size_t body, double time_s) const {
@@ -143,7 +153,7 @@ void Runner::Parts::add_island(const std::vector<int>& moving) {
     members.push_back(body);
     part.bodies.push_back(world_.bodies[i]);
   }
-  islands_.push_back(std::make_unique<Island>(std::move(part), std::move(members), surfaces_, reached_s_, recent_, spots_, options_));
+  islands_.push_back(std::make_unique<Island>(std::move(part), std::move(members), surfaces_, reached_s_, recent_, rested_, spots_, options_));
   ++made_;
 }
 
@@ -273,14 +283,17 @@ bool Runner::Parts::join_what_met() {
 void Runner::Parts::close_window(const Sink& sink) {
   if (join_what_met()) return;
   recent_.clear();
+  rested_.clear();
   spots_.clear();
   std::vector<stream::Event> events;
   for (const auto& island : islands_) {
     island->store(world_);
     island->add_recent(recent_);
+    island->add_rested(rested_);
     island->add_spots(spots_);
     events.insert(events.end(), island->get_events().begin(), island->get_events().end());
   }
+  if (options_.audits_energy) audit();
   reached_s_ = until_s_;
   open_ = false;
   if (is_over()) {
@@ -289,6 +302,19 @@ void Runner::Parts::close_window(const Sink& sink) {
     }
   }
   emit(events, is_over() ? options_.end_s : std::max(0.0, reached_s_ - kEarliest), sink);
+}
+
+void Runner::Parts::audit() {
+  double now = 0.0, kinetic = 0.0;
+  for (const auto& island : islands_) {
+    now += island->calc_energy_j();
+    kinetic += island->calc_kinetic_j();
+    taken_j_ += island->get_taken_j();
+    energy_.hit_rise_j = std::max(energy_.hit_rise_j, -island->get_least_taken_j());
+  }
+  energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - least_j_);
+  energy_.kinetic_j = std::max(energy_.kinetic_j, kinetic);
+  least_j_ = std::min(least_j_, now + taken_j_);
 }
 
 void Runner::Parts::step(const Sink& sink) {
@@ -321,6 +347,7 @@ Statistics Runner::Parts::get_statistics() const {
   s.islands = static_cast<std::int64_t>(islands_.size());
   s.made = made_;
   s.seconds_cpu = seconds_cpu_;
+  s.energy = energy_;
   return s;
 }
 

@@ -22,7 +22,7 @@ namespace {
 constexpr double kNearCritical = 0.05;
 // Largest |root| x step for which kMoments Chebyshev terms hold the answer of a mode.
 constexpr double kStiffest = 4.0;
-// A mode that dies within 1/1024 of a sample has no sound of its own.
+// A root that dies within 1/1024 of a sample has no sound of its own.
 constexpr int kMaxSubsteps = 256;
 
 bool is_positive(double x) { return std::isfinite(x) && x > 0.0; }
@@ -120,8 +120,12 @@ void Model::add_ringing_mode(const Mode& mode) {
     sound_.back().wave[lane][1][k] = static_cast<float>(-wave.imag());
   }
   TurnTable& turn = turn_.back();
-  turn.period_re[lane] = answer(kPeriod).real();
-  turn.period_im[lane] = answer(kPeriod).imag();
+  // The angle of a period is repeated for as long as the mode sounds: half a unit of a double in it is heard after hours.
+  using Exact = long double;
+  const Exact exact_d = d, exact_omega = std::sqrt(static_cast<Exact>(mode.lambda)), period = kPeriod / static_cast<Exact>(rate_hz_);
+  const Exact angle = std::sqrt((exact_omega - exact_d) * (exact_omega + exact_d)) * period, size = std::exp(-exact_d * period);
+  turn.period_re[lane] = static_cast<double>(size * std::cos(angle));
+  turn.period_im[lane] = static_cast<double>(size * std::sin(angle));
   for (int q = 1; q < kQuanta; ++q) {
     turn.quanta_re[q - 1][lane] = static_cast<float>(answer(q * kQuantum).real());
     turn.quanta_im[q - 1][lane] = static_cast<float>(answer(q * kQuantum).imag());
@@ -153,10 +157,12 @@ void Model::add_damped_modes(std::vector<Mode> modes) {
   for (const Mode& mode : modes) {
     const double d = mode.decay;
     const double omega = std::sqrt(mode.lambda);
-    const double fastest = d > omega ? d + std::sqrt((d - omega) * (d + omega)) : omega;
+    const double root = d > omega ? std::sqrt((d - omega) * (d + omega)) : 0.0;
+    const double fastest = d > omega ? d + root : omega;
     int substeps = 1;
     while (fastest * h / substeps > kStiffest && substeps < kMaxSubsteps) substeps *= 2;
-    if (fastest * h / substeps > kStiffest) continue;
+    const bool follows = fastest * h / substeps > kStiffest;
+    if (follows) substeps = 1;
     DampedMode m{};
     const OscillatorMap full = calc_oscillator_map(mode.lambda, d, h);
     const OscillatorMap sub = calc_oscillator_map(mode.lambda, d, h / substeps);
@@ -165,16 +171,19 @@ void Model::add_damped_modes(std::vector<Mode> modes) {
     const auto points = get_chebyshev_points();
     std::array<double, kMoments> q{}, v{};
     for (int k = 0; k < kMoments; ++k) {
-      const OscillatorMap part = calc_oscillator_map(mode.lambda, d, (1.0 - points[k]) * h / substeps);
-      q[k] = part.qv;
-      v[k] = part.vv;
+      const double age = (1.0 - points[k]) * h / substeps;
+      const OscillatorMap part = calc_oscillator_map(mode.lambda, d, age);
+      q[k] = follows ? std::exp(-mode.lambda / fastest * age) : part.qv;
+      v[k] = follows ? 0.0 : part.vv;
     }
     m.force_q = calc_chebyshev_coefficients(q);
     m.force_v = calc_chebyshev_coefficients(v);
     m.gain = mode.gain;
-    m.bound = 2.0 * omega;
+    m.bound = root > 0.0 ? std::min(2.0 * omega, mode.lambda / (2.0 * root)) : 2.0 * omega;
     m.scale = mode.scale;
-    m.substeps = substeps;
+    m.fast = fastest;
+    m.slow = mode.lambda / fastest;
+    m.substeps = follows ? 0 : substeps;
     made.emplace_back(mode, m);
   }
   std::stable_sort(made.begin(), made.end(), [](const auto& a, const auto& b) { return a.second.substeps < b.second.substeps; });

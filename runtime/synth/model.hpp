@@ -61,12 +61,14 @@ class Model {
     double lambda = 0.0, decay = 0.0, gain = 0.0, scale = 0.0;  // scale: kg^-1/2 per integer step of the shape
     int bank_mode = 0;
   };
-  /// A mode at, near or above critical damping, as (q, q'). Stiff ones take several substeps a sample while a pulse acts.
+  /// A mode at, near or above critical damping, as (q, q'). Stiff ones take several substeps a sample while a pulse acts; those whose fast
+  /// root dies within a thousandth of a sample take none (0): that root follows the force, and force_q holds the answer of the slow one.
   struct DampedMode {
     double qq, qv, vq, vv;                  // map over one sample
     double sub_qq, sub_qv, sub_vq, sub_vv;  // map over one substep
     Moments force_q, force_v;
     double gain = 0.0, bound = 0.0, scale = 0.0;
+    double fast = 0.0, slow = 0.0;  // roots [1/s], of those that follow
     int substeps = 1;
   };
 
@@ -88,7 +90,7 @@ class Model {
   std::vector<StrikeTable> strike_;
   std::vector<std::array<float, kGroup>> weight_;  // bound on the pressure of a mode is weight times the size of its state
   std::vector<float> reach_;                       // Pa at 1 m per N s: what a strike can make of a group, or of a later one
-  std::vector<DampedMode> damped_;                 // ascending in substeps
+  std::vector<DampedMode> damped_;                 // ascending in substeps; those that follow come first
   std::vector<std::array<std::int32_t, 3>> triangles_;
   std::size_t columns_ = 0;          // groups x kGroup, then the damped modes
   std::vector<std::int16_t> shape_;  // (V, 3, columns_)

@@ -197,6 +197,41 @@ void Voice::strike_quantum(std::int64_t sample, int quantum, float* out) noexcep
   }
 }
 
+/// phi . impulse of one of the modes that do not ring [N s kg^-1/2].
+double Voice::calc_amplitude(const Pulse& pulse, std::size_t mode) const noexcept {
+  const std::size_t column = static_cast<std::size_t>(groups_) * kGroup + mode;
+  double amplitude = 0.0;
+  for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(pulse.weight[r]) * pulse.row[r][column];
+  return amplitude * model_->damped_[mode].scale;
+}
+
+/// A sample of a mode whose fast root f dies at once: with A the integral of the force times e^{-s age}, s the slow root, and B that of f e^{-f age},
+/// q = (A - B / f) / (f - s), q' = (B - s A) / (f - s). B is the force 1 / f before, up to its second derivative over f squared. `n`: of the sample
+/// within the quantum that contacts drive, or -1.
+void Voice::follow_force(std::size_t mode, std::int64_t sample, int n) noexcept {
+  const auto& m = model_->damped_[mode];
+  DampedState& state = damped_[mode];
+  const double rate_hz = model_->rate_hz_, lag = rate_hz / m.fast;  // in samples
+  double slow = (m.fast * state.q + state.v) * std::exp(-m.slow / rate_hz), fast = 0.0;
+  if (n >= 0) {
+    const float* force = contacts_->get_damped_force(mode) + n;
+    const auto& ramp = contacts_->get_ramp();
+    const auto begin = static_cast<double>(force[0]), end = static_cast<double>(force[1]);
+    for (int j = 0; j < kMoments; ++j) slow += (begin * ramp[0][j] + end * ramp[1][j]) * m.force_q[j];
+    fast += end - lag * (end - begin);
+  }
+  for (const Pulse& pulse : pulses_) {
+    const double begin = pulse.begin - static_cast<double>(sample - 1);
+    if (begin > 1.0 || begin + pulse.length <= 0.0) continue;
+    const Moments moments = calc_pulse_moments(pulse.shape, begin, pulse.length);
+    const double amplitude = calc_amplitude(pulse, mode);
+    for (int j = 0; j < kMoments; ++j) slow += amplitude * moments[j] * m.force_q[j];
+    if (pulse.length > 2.0 * lag) fast += amplitude * calc_pulse(pulse.shape, (1.0 - lag - begin) / pulse.length) * rate_hz / pulse.length;
+  }
+  const double width = m.fast - m.slow;
+  state = {(slow - fast / m.fast) / width, (fast - m.slow * slow) / width};
+}
+
 void Voice::add_damped(std::int64_t sample, bool struck, bool driven, float* out) noexcept {
   const bool forced = struck || driven;
   const auto& modes = model_->damped_;
@@ -206,6 +241,7 @@ void Voice::add_damped(std::int64_t sample, bool struck, bool driven, float* out
     std::size_t last = first + 1;
     while (last < modes.size() && (!forced || modes[last].substeps == substeps)) ++last;
     for (int n = 0; n < kQuantum; ++n) {
+      for (std::size_t i = first; forced && substeps == 0 && i < last; ++i) follow_force(i, sample + n, driven ? n : -1);
       for (int step = 0; forced && step < substeps; ++step) {
         for (std::size_t i = first; i < last; ++i) {
           const auto& m = modes[i];
@@ -232,10 +268,7 @@ void Voice::add_damped(std::int64_t sample, bool struck, bool driven, float* out
           if (moments[0] == 0.0) continue;
           for (std::size_t i = first; i < last; ++i) {
             const auto& m = modes[i];
-            const std::size_t column = static_cast<std::size_t>(groups_) * kGroup + i;
-            double amplitude = 0.0;
-            for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(pulse.weight[r]) * pulse.row[r][column];
-            amplitude *= m.scale;
+            const double amplitude = calc_amplitude(pulse, i);
             for (int j = 0; j < kMoments; ++j) {
               damped_[i].q += amplitude * moments[j] * m.force_q[j];
               damped_[i].v += amplitude * moments[j] * m.force_v[j];

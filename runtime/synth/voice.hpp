@@ -141,6 +141,8 @@ class Voice {
   int find_reach(float strength_n_s) const noexcept;
   void strike_quantum(std::int64_t sample, int quantum, float* out) noexcept;
   void add_damped(std::int64_t sample, bool struck, bool driven, float* out) noexcept;
+  void follow_force(std::size_t mode, std::int64_t sample, int n) noexcept;
+  double calc_amplitude(const Pulse& pulse, std::size_t mode) const noexcept;
   void begin_period() noexcept;
   void cull() noexcept;
   void fade_out(int groups) noexcept;
