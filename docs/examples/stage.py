@@ -78,7 +78,7 @@ class Stage:
         of carillon-render; looks at the sound. (rate, samples, report)"""
         (self.out / f"{name}.json").write_text(json.dumps(scene, indent=1) + "\n")
         self.run(f"the scene {name}", self.bin / "carillon-render", f"{name}.json", "-o", f"{name}.wav", "--spectrogram", f"{name}-spectrogram.png",
-                 "--trajectory", f"{name}-trajectory.json", "--report", f"{name}-report.json", "--quiet", *options)
+                 "--trajectory", f"{name}-trajectory.json", "--report", f"{name}-report.json", "--audit", "--quiet", *options)
         rate, samples = measure.read_wav(self.out / f"{name}.wav")
         report = json.loads((self.out / f"{name}-report.json").read_text())
         peak = abs(samples).max()
@@ -86,6 +86,10 @@ class Stage:
               f" {report['real_time_factor']:.3g} x real time")
         sane = report["resets"] == 0 and report["impulses_refused"] == 0 and (0.05 < peak < 1.0 or (may_be_silent and peak == 0.0))
         self.expect(f"{name}.wav is loud, not clipped, and nothing was lost", sane)
+        energy = report["energy"]
+        gained = max(energy["rise_j"], energy["hit_rise_j"])
+        self.expect(f"{name}: bodies gain {gained:.1g} J of {energy['largest_kinetic_j']:.2g} J from nowhere, modes a share of {energy['modes_rise']:.1g}",
+                    gained <= 1e-5 * energy["largest_kinetic_j"] and energy["modes_rise"] <= 1e-9)
         if picture:
             self.pictures.append(f"{name}-spectrogram.png")
         return rate, samples, report

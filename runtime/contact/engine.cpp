@@ -25,9 +25,11 @@ using SimTK::State;
 using SimTK::Transform;
 using Point = SimTK::Vec3;
 
-constexpr double kSink = 2e-5;         // m; how far a resting body sinks into its contact under its own weight
-constexpr double kHeld = 1e-3;          // of the size; a point that holds a body up is held so far from where it was found last
-constexpr double kSettling = 0.1;      // s; in which the share of a load that a point takes may double, and a spring that begins deeper comes up
+constexpr double kSink = 2e-5;       // m; how far a resting body sinks into its contact under its own weight
+constexpr double kHeld = 1e-3;       // of the size; a point that holds a body up is held so far from where it was found last
+constexpr double kTakesOver = 0.02;  // rad; so far below the plane a neighbour takes over (touch.cpp)
+constexpr double kSettling =
+    0.1;  // s; in which the share of a load that a point takes may double, and a spring that begins deeper comes up
 constexpr double kRolling = 2e-3;      // rolling resistance arm over the size of the smaller body; hard bodies on hard floors: 1e-3 to 5e-3
 constexpr double kLongestStep = 2e-3;  // s
 constexpr double kTurn = 0.02;         // rad; of one Runge-Kutta step of a flight, which is then right to 1e-10 of it
@@ -35,10 +37,32 @@ constexpr double kSlowTouch = 0.01;    // m/s; of bodies in touch that move slow
 
 Point to_vec(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
 
+/// The springs of two bodies when the points between them change: what those that are there no more, or take less, have left, and what
+/// those that come, and those that could take more, would hold.
+struct PairBooks {
+  int points = 0;
+  double left_j = 0.0, new_j = 0.0, rise_j = 0.0;
+};
+
+/// How much of what is wanted there is, 0..1.
+double calc_part(double there_is, double wanted) { return wanted > 0.0 ? std::clamp(there_is / wanted, 0.0, 1.0) : 1.0; }
+
+bool is_same(const TouchPoint& x, const TouchPoint& y) { return x.a == y.a && x.b == y.b && x.feature == y.feature; }
+
 /// What the spring of a point holds [J] at the depth of its touch when it begins at that depth.
 double calc_spring_j(const RestingPoint& p, double offset_m) {
   const double pressed = std::max(0.0, p.touch.depth_m - offset_m);
   return 0.5 * p.stiffness_n_m * pressed * pressed;
+}
+
+/// Whether no neighbour of a vertex is clearly below it along a normal of the plane that it stands on: where a body rolls, its corners take
+/// turns.
+bool is_lowest(const Surface& surface, int vertex, const Point& normal) {
+  for (const int w : surface.neighbours(vertex)) {
+    const Point d = surface.vertex(w) - surface.vertex(vertex);
+    if (dot(d, normal) < -kTakesOver * d.norm()) return false;
+  }
+  return true;
 }
 
 Transform make_pose(const Pose& pose) {
@@ -156,52 +180,60 @@ std::vector<TouchPoint> Engine::find_touches(const std::vector<Transform>& poses
 
 void Engine::add_held(std::vector<TouchPoint>& touches, const Snapshot& now) const {
   for (const RestingPoint& p : resting_->points()) {
-    const auto is_same = [&](const TouchPoint& t) { return t.a == p.touch.a && t.b == p.touch.b && t.feature == p.touch.feature; };
-    if (std::any_of(touches.begin(), touches.end(), is_same)) continue;
+    if (std::any_of(touches.begin(), touches.end(), [&](const TouchPoint& t) { return is_same(t, p.touch); })) continue;
     TouchPoint t = p.touch;
     place_touch(t, now.poses[t.a], t.b >= 0 ? now.poses[t.b] : Transform());
     if (t.depth_m <= p.offset_m) continue;
-    const Transform X_plane = t.plane_on_b ? (t.b >= 0 ? now.poses[t.b] : Transform()) : now.poses[t.a];
+    const int carrier = t.plane_on_b ? t.a : t.b, plane = t.plane_on_b ? t.b : t.a;
+    const Transform X_plane = plane >= 0 ? now.poses[plane] : Transform();
     const Point away = t.where - X_plane * t.plane_point, outward = X_plane.R() * t.plane_normal;
+    if (t.feature[0] != 2 && !is_lowest(surface(carrier), t.feature[1], ~now.poses[carrier].R() * outward)) continue;
     if ((away - dot(away, outward) * outward).norm() < kHeld * surface(t.a).size_m()) touches.push_back(t);
   }
 }
 
-/// Points of a pair share its load, and which of them there are changes from step to step. Their springs must not hold more after a change than before, or
-/// what sways on them is pushed at every sway and never lies: the share of one that stays falls at once and rises slowly; one that comes finds what is left
-/// of what the pair held before, and its spring begins where it can hold no more than that, and so much higher little by little.
+/// Points of a pair share its load, and which of them there are changes from step to step. Their springs must not hold more after a change
+/// than before, or what sways on them is pushed at every sway and never lies: the share of one that stays falls at once and rises slowly;
+/// one that comes finds what is left of what the pair held before, and its spring begins where it can hold no more than that, and so much
+/// higher little by little.
 void Engine::set_resting(const std::vector<TouchPoint>& touches, const Snapshot& now) {
-  using Pair = std::pair<int, int>;
   const double passed = std::max(0.0, now.time_s - rested_s_);
   rested_s_ = now.time_s;
-  std::map<Pair, int> sharing;
-  std::map<Pair, double> left_j, wanted_j;  // energy that the points that come may have, and that they would have
-  for (const TouchPoint& t : touches) ++sharing[{t.a, t.b}];
+  std::map<std::pair<int, int>, PairBooks> books;
+  for (const TouchPoint& t : touches) ++books[{t.a, t.b}].points;
+  for (RestingPoint gone : resting_->points()) {
+    if (std::any_of(touches.begin(), touches.end(), [&](const TouchPoint& t) { return is_same(t, gone.touch); })) continue;
+    place_touch(gone.touch, now.poses[gone.touch.a], gone.touch.b >= 0 ? now.poses[gone.touch.b] : Transform());
+    books[{gone.touch.a, gone.touch.b}].left_j += calc_spring_j(gone, gone.offset_m);
+  }
   std::vector<RestingPoint> points;
   for (const TouchPoint& t : touches) {
     RestingPoint p = make_resting(t);
-    p.share = 1.0 / sharing[{t.a, t.b}];
+    PairBooks& pair = books[{t.a, t.b}];
+    p.share = 1.0 / pair.points;
     const auto old = std::find_if(rested_.begin(), rested_.end(),
                                   [&](const RestedPoint& o) { return o.a == t.a && o.b == t.b && o.feature == t.feature; });
-    if (old != rested_.end()) {
-      left_j[{t.a, t.b}] += old->share * calc_spring_j(p, old->offset_m);
-      p.share = std::min(p.share, old->share * (1.0 + passed / kSettling));
-      p.offset_m = old->offset_m * std::exp(-passed / kSettling);
-      left_j[{t.a, t.b}] -= p.share * calc_spring_j(p, p.offset_m);
+    p.is_new = old == rested_.end();
+    if (p.is_new) {
+      pair.new_j += p.share * calc_spring_j(p, 0.0);
     } else {
-      wanted_j[{t.a, t.b}] += p.share * calc_spring_j(p, 0.0);
-      p.offset_m = -1.0;
+      pair.left_j += old->share * calc_spring_j(p, old->offset_m);
+      const double stays = std::exp(-passed / kSettling);
+      p.share = std::min(p.share + std::max(0.0, old->share - p.share) * stays, old->share * (1.0 + passed / kSettling));
+      p.offset_m = old->offset_m * stays;
+      pair.left_j -= p.share * calc_spring_j(p, p.offset_m);
+      pair.rise_j += std::max(0.0, 1.0 / pair.points - p.share) * calc_spring_j(p, p.offset_m);
     }
     points.push_back(p);
   }
-  for (RestingPoint& p : points) {
-    if (p.offset_m >= 0.0) continue;
-    const Pair pair{p.touch.a, p.touch.b};
-    const double part = wanted_j[pair] > 0.0 ? std::clamp(left_j[pair] / wanted_j[pair], 0.0, 1.0) : 1.0;
-    p.offset_m = std::max(0.0, p.touch.depth_m) * (1.0 - std::sqrt(part));
-  }
   rested_.clear();
   for (RestingPoint& p : points) {
+    const PairBooks& pair = books[{p.touch.a, p.touch.b}];
+    if (p.is_new) {
+      p.offset_m = std::max(0.0, p.touch.depth_m) * (1.0 - std::sqrt(calc_part(pair.left_j, pair.new_j)));
+    } else {
+      p.share += std::max(0.0, 1.0 / pair.points - p.share) * calc_part(pair.left_j - pair.new_j, pair.rise_j);
+    }
     p.stiffness_n_m *= p.share;
     p.damping_n_s_m *= p.share;
     rested_.push_back({p.touch.a, p.touch.b, p.touch.feature, p.share, p.offset_m});

@@ -66,8 +66,8 @@ class Engine {
   /// The carrying points of every pair that cuts into each other.
   std::vector<TouchPoint> find_touches(const std::vector<SimTK::Transform>& poses) const;
 
-  /// Adds the points that hold bodies up and are still pressed where they were, though they are no touches any more: on the brim of a face, or between
-  /// edges that lie along each other, a point comes and goes with the slightest sway.
+  /// Adds the points that hold bodies up and are still pressed where they were, though they are no touches any more: on the brim of a face,
+  /// or between edges that lie along each other, a point comes and goes with the slightest sway.
   void add_held(std::vector<TouchPoint>& touches, const Snapshot& now) const;
 
   /// Which points hold the bodies up from now on.

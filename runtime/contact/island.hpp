@@ -23,8 +23,8 @@ struct OldPoint {
 class Island {
  public:
   /// `world`: the bodies that belong together and all that stand still, as they are at time_s. members[i]: the number in the scene of its
-  /// body i, rising. `recent`, `rested`, `spots`: the points of the whole scene that were in contact within the last moments, those that hold bodies up,
-  /// and what touches. `options`: of the world.
+  /// body i, rising. `recent`, `rested`, `spots`: the points of the whole scene that were in contact within the last moments, those that
+  /// hold bodies up, and what touches. `options`: of the world.
   Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces, double time_s, const std::vector<OldPoint>& recent,
          const std::vector<RestedPoint>& rested, const std::vector<Spot>& spots, const WorldOptions& options);
 
@@ -33,13 +33,16 @@ class Island {
   /// One step towards the time given; true when it is reached. Throws SolveError.
   bool step(double until_s);
 
+  /// Whether all lies where it lies until another comes near: a step only lets time pass.
+  bool is_asleep() const;
+
   const std::vector<int>& get_members() const { return members_; }
   /// How far any point of its body i has moved since begin_window, at most [m].
   double get_moved_m(std::size_t i) const { return moved_m_[i]; }
   const std::vector<stream::Event>& get_events() const { return events_; }
   std::int64_t get_steps() const { return steps_; }
-  /// Engine::calc_energy_j now, Engine::calc_kinetic_j, and what hits have taken since begin_window, all of them and the one that took least
-  /// (below 0: gave). What hits took is only kept where WorldOptions::audits_energy asks for it.
+  /// Engine::calc_energy_j now, Engine::calc_kinetic_j, and what hits have taken since begin_window, all of them and the one that took
+  /// least (below 0: gave). What hits took is only kept where WorldOptions::audits_energy asks for it.
   double calc_energy_j() const { return engine_.calc_energy_j(state_); }
   double calc_kinetic_j() const { return engine_.calc_kinetic_j(state_); }
   double get_taken_j() const { return taken_j_; }
@@ -61,7 +64,6 @@ class Island {
   void follow_contacts();
   void note_moves();
   bool is_still(bool in_touch) const;
-  bool is_asleep() const;
   std::vector<OldPoint> find_old(const Snapshot& now, const std::vector<TouchPoint>& touches) const;
   bool is_old(const TouchPoint& touch, const Snapshot& now, double approach) const;
   void remember(const Snapshot& now, const std::vector<TouchPoint>& touches);

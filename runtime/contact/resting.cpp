@@ -1,5 +1,5 @@
-// Method: at each point a spring and a damper that only push, f = max(0, k d + c d' g(d)), d from where the spring begins, with g rising to 1 within kFullDepth so that the
-// force
+// Method: at each point a spring and a damper that only push, f = max(0, k d + c d' g(d)), d from where the spring begins, with g rising to
+// 1 within kFullDepth so that the force
 //   begins without a jump; friction -mu f u / max(|u|, kCreep), so that a body on a slope creeps by less than kCreep; rolling resistance
 //   -b f w / max(|w|, kSlowSpin), without which a rounded body rocks for ever.
 // Source: K. Hunt, E. Crossley (1975) for a damping that grows with depth; regularised Coulomb friction as in Simbody's own contacts.

@@ -17,7 +17,8 @@ struct RestingPoint {
   SimTK::MobilizedBodyIndex body_a, body_b;  // Ground for the ground and for fixed bodies
   SimTK::Transform frame_b;                  // of the mesh of b (or a) when it is fixed: its place in the world
   SimTK::Transform frame_a;
-  double share = 1.0;     // of the load of its two bodies
+  double share = 1.0;  // of the load of its two bodies
+  bool is_new = false;
   double offset_m = 0.0;  // depth at which the spring begins
   double stiffness_n_m = 0.0;
   double damping_n_s_m = 0.0;

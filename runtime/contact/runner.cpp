@@ -93,21 +93,23 @@ class Runner::Parts {
   WorldModel world_;  // bodies as they are at the start of the window
   WorldOptions options_;
   SurfaceSet surfaces_;
-  std::vector<OldPoint> recent_;  // of all islands, at the start of the window
+  std::vector<OldPoint> recent_;     // of all islands, at the start of the window
   std::vector<RestedPoint> rested_;  // the same
-  std::vector<Spot> spots_;       // the same
+  std::vector<Spot> spots_;          // the same
   std::vector<std::unique_ptr<Island>> islands_;
   std::vector<int> group_;   // of each body, in the window before: the lowest number in its island
   std::size_t current_ = 0;  // the island that is on its way through the window
   bool begun_ = false, open_ = false;
-  double reached_s_ = 0.0;  // start of the window
-  double until_s_ = 0.0;    // its end
+  bool was_asleep_ = false;  // all of it, when the window opened
+  bool asleep_ = false;      // all of it, since the window before: who may meet whom is as it was, and so is all else
+  double reached_s_ = 0.0;   // start of the window
+  double until_s_ = 0.0;     // its end
   std::int64_t window_ = 0;
   std::int64_t old_steps_ = 0;  // of islands that are no more
   std::int64_t made_ = 0;
   double seconds_cpu_ = 0.0;
   EnergyAudit energy_;
-  double taken_j_ = 0.0;                                        // by hits
+  double taken_j_ = 0.0;                                      // by hits
   double least_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
 };
 
@@ -153,7 +155,8 @@ void Runner::Parts::add_island(const std::vector<int>& moving) {
     members.push_back(body);
     part.bodies.push_back(world_.bodies[i]);
   }
-  islands_.push_back(std::make_unique<Island>(std::move(part), std::move(members), surfaces_, reached_s_, recent_, rested_, spots_, options_));
+  islands_.push_back(
+      std::make_unique<Island>(std::move(part), std::move(members), surfaces_, reached_s_, recent_, rested_, spots_, options_));
   ++made_;
 }
 
@@ -205,6 +208,15 @@ std::vector<int> Runner::Parts::find_moving(const Island& island) const {
 void Runner::Parts::open_window() {
   while (static_cast<double>(window_) * kWindow <= reached_s_ + kShortest) ++window_;
   until_s_ = std::min(options_.end_s, static_cast<double>(window_) * kWindow);
+  const auto sleeps = [](const auto& island) { return island->is_asleep(); };
+  asleep_ = was_asleep_ && std::all_of(islands_.begin(), islands_.end(), sleeps);
+  was_asleep_ = !islands_.empty() && std::all_of(islands_.begin(), islands_.end(), sleeps);
+  current_ = 0;
+  open_ = true;
+  if (asleep_) {
+    for (const auto& island : islands_) island->begin_window();
+    return;
+  }
   const double length = until_s_ - reached_s_;
   const auto& g = world_.gravity_m_s2;
   const double fallen = 0.5 * std::hypot(g[0], g[1], g[2]) * length * length;
@@ -235,8 +247,6 @@ void Runner::Parts::open_window() {
   }
   for (const auto& gone : before) old_steps_ += gone ? gone->get_steps() : 0;
   for (const auto& island : islands_) island->begin_window();
-  current_ = 0;
-  open_ = true;
 }
 
 /// Islands whose bodies may have met on their ways are made anew, together, as they were at the start of the window. False: there are none.
@@ -281,7 +291,7 @@ bool Runner::Parts::join_what_met() {
 }
 
 void Runner::Parts::close_window(const Sink& sink) {
-  if (join_what_met()) return;
+  if (!asleep_ && join_what_met()) return;
   recent_.clear();
   rested_.clear();
   spots_.clear();

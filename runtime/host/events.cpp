@@ -32,9 +32,11 @@ std::vector<stream::Event> make_still(const Scene& scene) {
   return events;
 }
 
-Course run_physics(const Scene& scene, bool has_contacts, const std::function<void(double)>& progress) {
-  contact::World world(make_world(scene),
-                       {.contact_step_s = scene.quality.contact_step_s, .end_s = scene.duration_s, .lasting_contacts = has_contacts});
+Course run_physics(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress) {
+  contact::World world(make_world(scene), {.contact_step_s = scene.quality.contact_step_s,
+                                           .end_s = scene.duration_s,
+                                           .lasting_contacts = has_contacts,
+                                           .audits_energy = audits});
   Course course;
   constexpr int kParts = 100;
   for (int part = 1; part <= kParts; ++part) {
@@ -43,6 +45,7 @@ Course run_physics(const Scene& scene, bool has_contacts, const std::function<vo
     if (progress) progress(static_cast<double>(part) / kParts);
   }
   course.steps = world.get_statistics().steps;
+  course.energy = world.get_statistics().energy;
   return course;
 }
 
@@ -60,7 +63,7 @@ contact::WorldSpec make_world(const Scene& scene) {
   return spec;
 }
 
-Course simulate(const Scene& scene, bool has_contacts, const std::function<void(double)>& progress) {
+Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress) {
   Course course;
   std::vector<const bank::Bank*> banks;
   for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
@@ -69,7 +72,7 @@ Course simulate(const Scene& scene, bool has_contacts, const std::function<void(
     course.recording.events = make_still(scene);
   } else {
     try {
-      course = run_physics(scene, has_contacts, progress);
+      course = run_physics(scene, has_contacts, audits, progress);
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     } catch (const SolveError& error) {

@@ -15,6 +15,7 @@ namespace carillon::host {
 struct Course {
   stream::Recording recording;
   std::int64_t steps = 0;  // of the physics
+  contact::EnergyAudit energy{};
 };
 
 /// Whether any body can move: without one there is no physics.
@@ -24,9 +25,9 @@ bool has_physics(const Scene& scene);
 contact::WorldSpec make_world(const Scene& scene);
 
 /// Runs the physics, if any body can move, and adds the strikes. Every body's spec has its bank. `has_contacts`: with records of contacts
-/// that last. `progress` (may be empty) is called with the finished fraction. Throws InputError and SolveError,
-/// which name the scene.
-Course simulate(const Scene& scene, bool has_contacts, const std::function<void(double)>& progress);
+/// that last; `audits`: with the books of energy. `progress` (may be empty) is called with the finished fraction. Throws InputError and
+/// SolveError, which name the scene.
+Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress);
 
 /// The events of a contacts file. Throws InputError when it is none, or was made for other bodies than the scene's: as many, of the same
 /// names, with as many triangles in their banks, in the same order.

@@ -38,6 +38,8 @@ int main(int argc, char** argv) {
   app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
       ->check(CLI::IsMember(carillon::host::kSampleFormatNames))
       ->option_text("FORMAT");
+  app.add_flag("--audit", options.audit,
+               "Keep the books of energy: how much bodies gain other than by hits, and modes while nothing acts on them");
   app.add_flag("--plan", options.plan, "Say for each body which effects are on, why, and what they will cost; no sound is made");
   app.add_flag("-q,--quiet", options.quiet, "No progress");
   try {

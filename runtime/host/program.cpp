@@ -90,6 +90,12 @@ void print_summary(const Scene& scene, const Sound& sound, const Figures& figure
   fmt::print("physics            {:.2f} s\n", figures.physics_s);
   fmt::print("sound              {:.2f} s for {:g} s at {} Hz\n", figures.sound_s, scene.duration_s, sound.rate_hz);
   fmt::print("real-time factor   {:.3f} (below 1 is faster than real time)\n", figures.real_time_factor);
+  if (figures.audit) {
+    const contact::EnergyAudit& bodies = figures.audit->bodies;
+    fmt::print("energy of bodies   rises by {:.2g} J at most, and by {:.2g} J at a hit; the largest of motion is {:.3g} J\n", bodies.rise_j,
+               bodies.hit_rise_j, bodies.kinetic_j);
+    fmt::print("energy of modes    rises by a share of {:.2g} at most while nothing acts\n", figures.audit->modes_rise);
+  }
   if (figures.peak_pa > 0.0) {
     fmt::print("peak               {:.4g} Pa at the {}\n", figures.peak_pa, scene.microphones_m.empty() ? "ears" : "microphones");
     fmt::print("level              {:.1f} dB re 20 uPa, loudest 125 ms {:.1f} dB\n", figures.levels.mean_db, figures.levels.loudest_db);
@@ -148,8 +154,8 @@ void run(const ProgramOptions& options) {
   auto started = Clock::now();
   const std::clock_t ticks = std::clock();
   const bool has_contacts = options.record.has_value() || plan::Planner(facts).needs_contacts();
-  const Course course =
-      options.contacts ? read_course(*options.contacts, scene) : simulate(scene, has_contacts, Progress("physics", options.quiet));
+  const Course course = options.contacts ? read_course(*options.contacts, scene)
+                                         : simulate(scene, has_contacts, options.audit, Progress("physics", options.quiet));
   figures.physics_s = get_seconds_since(started);
   figures.physics_cpu_s = static_cast<double>(std::clock() - ticks) / CLOCKS_PER_SEC;
   const bool measures = options.plan || options.report.has_value();
@@ -161,10 +167,14 @@ void run(const ProgramOptions& options) {
   contact::Simulation simulation = contact::collect(course.recording.events, centres_m);
   simulation.steps = course.steps;
   started = Clock::now();
-  const Sound sound =
-      calc_sound(scene, body_banks, course.recording.events,
-                 {.rate_hz = scene.sample_rate_hz, .plan = &plan, .measures = measures, .progress = Progress("sound", options.quiet)});
+  const Sound sound = calc_sound(scene, body_banks, course.recording.events,
+                                 {.rate_hz = scene.sample_rate_hz,
+                                  .plan = &plan,
+                                  .measures = measures,
+                                  .audits = options.audit,
+                                  .progress = Progress("sound", options.quiet)});
   figures.sound_s = get_seconds_since(started);
+  if (options.audit) figures.audit = EnergyBooks{course.energy, sound.energy_rise};
   figures.real_time_factor = (figures.physics_s + figures.sound_s) / scene.duration_s;
   figures.modes = sound.modes;
   figures.contacts = count_contacts(simulation);

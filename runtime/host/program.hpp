@@ -15,6 +15,7 @@ struct ProgramOptions {
   std::optional<std::filesystem::path> record;
   std::optional<int> rate_hz;         // instead of the scene's
   std::optional<std::string> format;  // instead of the scene's
+  bool audit = false;                 // books of energy
   bool plan = false;                  // say which effects are called for and why, instead of everything else
   bool quiet = false;                 // no progress
 };

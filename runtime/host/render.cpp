@@ -190,7 +190,8 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                           .surface = {.roughness_m = scene.bodies[i].spec.roughness_m, .friction = scene.bodies[i].spec.friction},
                           .longest_m = longest_m,
                           .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs),
-                          .isa = scene.quality.instructions});
+                          .isa = scene.quality.instructions,
+                          .audits_energy = options.audits});
   }
 
   constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
@@ -225,6 +226,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   sound.resets = counters.resets;
   for (std::size_t i = 0; i < fed.size(); ++i) {
     sound.body_peak_pa.push_back(synthesiser.get_peak_pa(static_cast<int>(i)));
+    sound.energy_rise = std::max(sound.energy_rise, synthesiser.get_energy_rise(static_cast<int>(i)));
     sound.effect_counters.push_back(synthesiser.get_effect_counters(static_cast<int>(i)));
   }
   sound.seconds_cpu = get_cpu_seconds() - started;

@@ -23,6 +23,7 @@ struct Sound {
   int modes = 0;                                       // of all bodies, below Nyquist
   std::vector<int> body_modes;                         // per body
   std::vector<double> body_peak_pa;                    // per body, at 1 m
+  double energy_rise = 0.0;                            // Synthesiser::get_energy_rise, the most of any body; where it is audited
   std::int64_t strikes = 0;                            // impulses that were played
   std::int64_t refused = 0;                            // impulses that could not be (too many at once, not finite)
   std::int64_t resets = 0;                             // bodies cleared because their state was no number
@@ -37,6 +38,7 @@ struct RenderOptions {
   int rate_hz = 48000;
   const Plan* plan = nullptr;              // whose changes the bodies follow; without, all bodies have the scene's effects
   bool measures = false;                   // what each effect of each body costs
+  bool audits = false;                     // the energy of the modes
   std::function<void(double)> progress{};  // may be empty; called with the finished fraction
 };
 

@@ -113,6 +113,13 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
   fmt::format_to(
       out, " \"peak_pa\": {:.6g},\n \"mean_db_spl\": {},\n \"loudest_db_spl\": {},\n \"gain_per_pa\": {:.6g},\n \"gain_reduced\": {},\n",
       f.peak_pa, make_level(f.levels.mean_db), make_level(f.levels.loudest_db), f.gain.per_pa, f.gain.reduced);
+  if (f.audit) {
+    const contact::EnergyAudit& bodies = f.audit->bodies;
+    fmt::format_to(out,
+                   " \"energy\": {{\"rise_j\": {:.6g}, \"hit_rise_j\": {:.6g}, \"largest_kinetic_j\": {:.6g}, \"weight_n\": {:.6g}, "
+                   "\"modes_rise\": {:.6g}}},\n",
+                   bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j, bodies.weight_n, f.audit->modes_rise);
+  }
   json += " \"per_body\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const auto played = std::count_if(simulation.impulses.begin(), simulation.impulses.end(),

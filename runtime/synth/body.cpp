@@ -108,8 +108,10 @@ std::unique_ptr<BodyChange> Body::make_change(EffectSet from, EffectSet to, std:
   change->inherits = model != model_;
   const auto lacks = [&](Effect effect) { return to.has(effect) && (change->inherits || !from.has(effect)); };
   if (lacks(Effect::kModal)) {
-    change->voice =
-        std::make_unique<Voice>(model, VoiceOptions{.max_strikes = frame_.max_strikes, .silence_pa = frame_.silence_pa, .isa = frame_.isa});
+    change->voice = std::make_unique<Voice>(
+        model,
+        VoiceOptions{
+            .max_strikes = frame_.max_strikes, .silence_pa = frame_.silence_pa, .isa = frame_.isa, .audits_energy = frame_.audits_energy});
     if (change->inherits && from.has(Effect::kModal)) change->succession = std::make_unique<Succession>(*model_, *model);
   }
   if (lacks(Effect::kAccelerationNoise)) {
@@ -311,6 +313,7 @@ void Body::make_sound(std::size_t count, BodyScratch& scratch, TickFunction tick
       voice_->process(mono);
       const VoiceCounters& after = voice_->get_counters();
       work_.resets += after.resets - before.resets;
+      work_.energy_rise = std::max(work_.energy_rise, after.energy_rise);
       work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
       if (touched) {
         const std::int64_t textured = contacts_->get_counters().samples - contact_samples;

@@ -31,6 +31,7 @@ struct BodyFrame {
   double silence_pa = 1e-10;
   Isa isa = Isa::kBest;
   Surface surface{};
+  bool audits_energy = false;
 };
 
 /// Memory that belongs to effects. What lasting contacts need counts as that of roughness here, whichever of the three effects need it.
@@ -75,6 +76,7 @@ struct BodyWork {
   PerEffect<std::int64_t> ticks{};
   std::int64_t strikes = 0, refused = 0, late = 0, resets = 0;
   float peak_pa = 0.0F;
+  double energy_rise = 0.0;  // VoiceCounters
 };
 
 using TickFunction = std::uint64_t (*)() noexcept;

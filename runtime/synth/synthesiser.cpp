@@ -116,7 +116,8 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                                        .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
                                        .silence_pa = settings.silence_pa,
                                        .isa = settings.isa,
-                                       .surface = settings.surface},
+                                       .surface = settings.surface,
+                                       .audits_energy = settings.audits_energy},
                              settings.position_m, settings.rotation);
   auto change = body->make_change({}, settings.effects);
   Published& published = published_bodies_[free];
@@ -125,6 +126,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
     published.ticks[effect].store(0, std::memory_order_relaxed);
   }
   published.peak_pa.store(0.0F, std::memory_order_relaxed);
+  published.energy_rise.store(0.0, std::memory_order_relaxed);
   Owned& owned = owned_[free];
   owned = Owned{.body = std::move(body),
                 .change = std::move(change),
@@ -471,6 +473,7 @@ void Synthesiser::publish(int number) noexcept {
     if (options_.ticks != nullptr) published.ticks[effect].store(work.ticks[effect], std::memory_order_relaxed);
   }
   published.peak_pa.store(work.peak_pa, std::memory_order_relaxed);
+  published.energy_rise.store(work.energy_rise, std::memory_order_relaxed);
 }
 
 EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
@@ -488,6 +491,11 @@ EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
 double Synthesiser::get_peak_pa(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return 0.0;
   return static_cast<double>(published_bodies_[static_cast<std::size_t>(body)].peak_pa.load(std::memory_order_relaxed));
+}
+
+double Synthesiser::get_energy_rise(int body) const noexcept {
+  if (body < 0 || body >= options_.max_bodies) return 0.0;
+  return published_bodies_[static_cast<std::size_t>(body)].energy_rise.load(std::memory_order_relaxed);
 }
 
 void Synthesiser::publish_counters() noexcept {

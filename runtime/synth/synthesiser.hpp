@@ -55,6 +55,7 @@ struct BodySettings {
   double longest_m = 0.0;     // as in SynthesiserOptions; 0: what it says there
   int max_waypoints = 0;
   Isa isa = Isa::kBest;
+  bool audits_energy = false;  // get_energy_rise()
 };
 
 /// What the effects of one body have done since it was added, and what they hold. An effect that is off keeps its units and holds nothing.
@@ -159,6 +160,9 @@ class Synthesiser {
   EffectCounters get_effect_counters(int body) const noexcept;
   /// The loudest that its modes have been so far [Pa at 1 m]. [any-thread]
   double get_peak_pa(int body) const noexcept;
+  /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a period in which nothing acted on it.
+  /// [any-thread]
+  double get_energy_rise(int body) const noexcept;
 
  private:
   /// What the main thread asks of the audio thread, and what comes back: a body that goes, or a change that is over.
@@ -181,6 +185,7 @@ class Synthesiser {
   struct Published {
     PerEffect<std::atomic<std::int64_t>> units{}, ticks{}, bytes{};
     std::atomic<float> peak_pa{0.0F};
+    std::atomic<double> energy_rise{0.0};
   };
   template <typename T>
   class Pipe;

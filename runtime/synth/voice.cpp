@@ -26,7 +26,7 @@ bool is_finite(const stream::Vec3& v) { return std::isfinite(v[0]) && std::isfin
 }  // namespace
 
 Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
-    : model_(std::move(model)), kernels_(&get_kernels(options.isa)), silence_pa_(options.silence_pa) {
+    : model_(std::move(model)), kernels_(&get_kernels(options.isa)), silence_pa_(options.silence_pa), audits_(options.audits_energy) {
   if (!(silence_pa_ > 0.0) || !std::isfinite(silence_pa_)) throw InputError("the pressure of silence must be a positive number of Pa");
   groups_ = static_cast<int>(model_->sound_.size());
   limit_ = cut_ = driven_ = groups_;
@@ -101,6 +101,7 @@ void Voice::render(int quanta) noexcept {
   horizon_ += quanta * kQuantum;
   rendered_ = held_ = quanta * kQuantum;
   if (first == 0) {
+    if (audits_) audit();
     fading_ = std::exchange(inherits_, false);
     if (const int stay = std::min(limit_, cut_); stay < live_) fade_out(stay);
     cut_ = groups_;
@@ -112,6 +113,7 @@ void Voice::render(int quanta) noexcept {
   std::fill(block_.begin(), block_.begin() + rendered_, 0.0F);
   bool struck_at_all = false;
   for (int q = 0; q < quanta; ++q) struck_at_all = struck_at_all || is_struck(start + q * kQuantum);
+  undisturbed_ = undisturbed_ && !struck_at_all && !touched;
   const bool whole = quanta == kQuanta && !struck_at_all && !touched;
   if (live_ > 0 && whole) {
     kernels_->ring(model_->sound_.data(), model_->turn_.data(), state_.data(), live_, block_.data());
@@ -205,9 +207,9 @@ double Voice::calc_amplitude(const Pulse& pulse, std::size_t mode) const noexcep
   return amplitude * model_->damped_[mode].scale;
 }
 
-/// A sample of a mode whose fast root f dies at once: with A the integral of the force times e^{-s age}, s the slow root, and B that of f e^{-f age},
-/// q = (A - B / f) / (f - s), q' = (B - s A) / (f - s). B is the force 1 / f before, up to its second derivative over f squared. `n`: of the sample
-/// within the quantum that contacts drive, or -1.
+/// A sample of a mode whose fast root f dies at once: with A the integral of the force times e^{-s age}, s the slow root, and B that of f
+/// e^{-f age}, q = (A - B / f) / (f - s), q' = (B - s A) / (f - s). B is the force 1 / f before, up to its second derivative over f
+/// squared. `n`: of the sample within the quantum that contacts drive, or -1.
 void Voice::follow_force(std::size_t mode, std::int64_t sample, int n) noexcept {
   const auto& m = model_->damped_[mode];
   DampedState& state = damped_[mode];
@@ -344,6 +346,14 @@ void Voice::fade_out(int groups) noexcept {
 }
 
 void Voice::set_limit(int modes) noexcept { limit_ = std::clamp((modes + kGroup - 1) / kGroup, std::min(1, groups_), groups_); }
+
+/// At the start of a period: holds the energy against that of the period before, when nothing acted in it.
+void Voice::audit() noexcept {
+  constexpr double kSmallest = 1e-280;  // below, squares are flushed to zero one by one
+  const double before = std::exchange(energy_j_, calc_energy_j());
+  if (undisturbed_ && before > kSmallest) counters_.energy_rise = std::max(counters_.energy_rise, energy_j_ / before - 1.0);
+  undisturbed_ = true;
+}
 
 void Voice::reset() noexcept {
   std::fill(state_.begin(), state_.end(), ModeState{});

@@ -25,6 +25,7 @@ struct VoiceOptions {
   int max_strikes = 256;      // pulses that may be waiting or acting at once
   double silence_pa = 1e-10;  // below this bound on its pressure at 1 m (-106 dB re 20 uPa) a body sleeps
   Isa isa = Isa::kBest;
+  bool audits_energy = false;  // VoiceCounters::energy_rise
 };
 
 struct VoiceCounters {
@@ -33,6 +34,7 @@ struct VoiceCounters {
   std::int64_t late = 0;          // began before the horizon and were moved there
   std::int64_t resets = 0;        // times that the state was not finite and was cleared
   std::int64_t mode_samples = 0;  // work done: modes x samples, whole groups
+  double energy_rise = 0.0;       // the largest share by which the energy rose over a period in which nothing acted; 0 unless asked for
 };
 
 /// A mode at or near critical damping: amplitude and velocity.
@@ -147,6 +149,7 @@ class Voice {
   void cull() noexcept;
   void fade_out(int groups) noexcept;
   void reset() noexcept;
+  void audit() noexcept;
 
   std::shared_ptr<const Model> model_;
   const Kernels* kernels_ = nullptr;
@@ -164,6 +167,8 @@ class Voice {
   int held_ = 0;              // of them not yet handed out: the last of block_
   int rendered_ = 0;          // samples in block_
   bool silent_ = true;        // block_ is all zero
+  bool audits_ = false, undisturbed_ = false;
+  double energy_j_ = 0.0;  // at the start of the period, where it is audited
   ContactForces* contacts_ = nullptr;
   VoiceCounters counters_;
 

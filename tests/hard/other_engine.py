@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""The same drop by Bullet and by our own physics: the same contacts make the same sound, live or from the file, and both engines agree on the first hit.
+
+usage: other_engine.py other_engine
+"""
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+from figure import hold
+
+BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
+CASE = "other_engine"
+AXIS, ANGLE = np.array([0.6, 0.8, 0.0]), 0.5  # how docs/examples/embed/bullet.cpp turns the body
+MASS, SIDE, HEIGHT, RESTITUTION = 1.0, 0.1, 0.4, 0.5  # of write_cube_bank and of that drop
+
+
+def run(*command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=300)
+    if done.returncode != 0:
+        sys.exit(f"{command[0]} failed: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def read_float_wav(file):
+    """(frames, 2) of a WAV file of 32-bit floats."""
+    data = file.read_bytes()
+    at = data.index(b"data")
+    size = int.from_bytes(data[at + 4:at + 8], "little")
+    return np.frombuffer(data[at + 8:at + 8 + size], dtype="<f4").reshape(-1, 2)
+
+
+def read_hits(file):
+    return [event["impulse"] for event in map(json.loads, file.read_text().splitlines()[1:]) if "impulse" in event]
+
+
+def write_scene(file, **body):
+    file.write_text(json.dumps({
+        "duration_s": 1.5, "ground": {"height_m": 0.0, "restitution": RESTITUTION, "friction": 0.6}, "listener": {"position_m": [0, -1, 0.2]},
+        "effects": ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"], "output": {"format": "float", "gain": 1e-3},
+        "bodies": [{"name": "body", "bank": "cube.h5", "restitution": RESTITUTION, "friction": 0.6, **body}]}))
+
+
+def turn(v, angle):
+    """v turned about AXIS (Rodrigues)."""
+    return v * math.cos(angle) + np.cross(AXIS, v) * math.sin(angle) + AXIS * (AXIS @ v) * (1 - math.cos(angle))
+
+
+def predict_first_hit():
+    """Time and impulse of the lowest corner's hit by Newton's restitution and a contact that sticks, in the world: J = M^-1 (change of velocity)."""
+    corners = [turn(np.array([x, y, z]), ANGLE) for x in (-SIDE / 2, SIDE / 2) for y in (-SIDE / 2, SIDE / 2) for z in (-SIDE / 2, SIDE / 2)]
+    arm = min(corners, key=lambda corner: corner[2])
+    time = math.sqrt(2 * (HEIGHT + arm[2]) / 9.81)
+    cross = np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
+    mobility = np.eye(3) / MASS - cross @ cross / (MASS * SIDE * SIDE / 6)
+    wanted = np.array([0.0, 0.0, (1 + RESTITUTION) * 9.81 * time])
+    return time, np.linalg.solve(mobility, wanted)
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        run(BIN / "write_cube_bank", root / "cube.h5")
+        run(BIN / "bullet_drop", root / "cube.h5", root / "bullet.jsonl", root / "live.f32")
+        write_scene(root / "replay.json", position_m=[0, 0, HEIGHT])
+        run(BIN / "carillon-render", "-q", root / "replay.json", "-o", root / "replay.wav", "--contacts", root / "bullet.jsonl")
+        live = np.fromfile(root / "live.f32", dtype="<f4").reshape(-1, 2)[16:] * np.float32(1e-3)  # 16 frames: the latency
+        replay = read_float_wav(root / "replay.wav")
+        frames = min(len(live), len(replay))
+        peak = np.abs(live).max()
+        assert frames > 71000 and peak > 0
+        hold(CASE, np.abs(live[:frames] - replay[:frames]).max() / peak, 1e-6, "Bullet live against its contacts file, over the peak")
+
+        degrees = [math.degrees(angle) for angle in find_fixed_angles()]
+        write_scene(root / "own.json", position_m=[0, 0, HEIGHT], rotation_deg=degrees)
+        run(BIN / "carillon-render", "-q", root / "own.json", "-o", root / "own.wav", "--record", root / "own.jsonl")
+        run(BIN / "carillon-render", "-q", root / "own.json", "-o", root / "again.wav", "--contacts", root / "own.jsonl")
+        hold(CASE, float((root / "own.wav").read_bytes() != (root / "again.wav").read_bytes()), 0.0, "our own contacts again, bytes that differ")
+
+        time, impulse = predict_first_hit()
+        size = np.linalg.norm(impulse)
+        for engine, most_s, most in (("bullet", 1.0 / 2000.0, 0.03), ("own", 2e-6, 1e-3)):
+            hits = read_hits(root / f"{engine}.jsonl")
+            assert len(hits) > 5, engine
+            first = hits[0]
+            hold(CASE, abs(first["time_s"] - first["duration_s"] / 2 - time), most_s, f"{engine}: time of the first hit against the closed form [s]")
+            there = turn(np.array(first["impulse_n_s"]), ANGLE)
+            hold(CASE, np.linalg.norm(there - impulse) / size, most, f"{engine}: its impulse against the closed form")
+
+
+def find_fixed_angles():
+    """The turn as angles about the fixed axes x, then y, then z, as a scene has it."""
+    m = np.array([turn(axis, ANGLE) for axis in np.eye(3)]).T
+    return math.atan2(m[2, 1], m[2, 2]), -math.asin(m[2, 0]), math.atan2(m[1, 0], m[0, 0])
+
+
+if __name__ == "__main__":
+    main()
