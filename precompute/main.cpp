@@ -75,8 +75,11 @@ struct CommandLine {
     app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
+    CLI::Option* matrices =
+        app.add_option("--matrices", options.matrices, "write K and M to this folder too, as Matrix Market files")->check(named);
     CLI::Option* validate =
-        app.add_flag("--validate", options.validate, "check the job and its mesh, predict modes, memory and time, and solve nothing");
+        app.add_flag("--validate", options.validate, "check the job and its mesh, predict modes, memory and time, and solve nothing")
+            ->excludes(matrices);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
     // What follows "--" is for PETSc and SLEPc.

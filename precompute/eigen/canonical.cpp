@@ -1,7 +1,12 @@
-// Method:     In the span of a cluster Phi the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with smooth weights w_d of no symmetry,
-//             has eigenvectors that depend on the span alone. Phi times these, by ascending eigenvalue, is the basis. If two eigenvalues of
-//             one form nearly coincide, another form is taken: the first of a fixed list that parts them well, or the best of the list.
-// Source:     Stewart, Sun, Matrix perturbation theory, 1990, chapter V: an eigenvector moves by the perturbation over the gap.
+// Method:     Modes that agree to the tolerance may be mixtures of such as do not agree to rounding. Their span is far more exact than they
+//             are: Rayleigh and Ritz in it, of K - mean M, so that differences keep their digits, part what can be told apart
+//             (split_groups). In the span of what is left, a cluster Phi, the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with
+//             smooth weights w_d of no symmetry, has eigenvectors that depend on the span alone. Phi times these, by ascending eigenvalue,
+//             is the basis. If two eigenvalues of one form nearly coincide, another form is taken: the first of a fixed list that parts
+//             them well, or the best of the list.
+// Source:     Stewart, Sun, Matrix perturbation theory, 1990, chapter V: an eigenvector moves by the perturbation over the gap. Parlett,
+// The
+//             symmetric eigenvalue problem, 1998, section 11.4 (what Rayleigh and Ritz make of a span).
 // Deviations: none.
 #include "precompute/eigen/canonical.hpp"
 
@@ -99,19 +104,64 @@ Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box&
   return basis;
 }
 
-}  // namespace
-
-std::vector<Cluster> find_clusters(const std::vector<double>& lambda, const ModeErrors& errors, double tolerance) {
-  std::vector<Cluster> clusters;
-  const double equal = std::clamp(kEqual * tolerance, kTightest, kLoosest);
+// Runs of modes whose neighbours agree to `equal`, or to what rounding leaves open.
+std::vector<Cluster> find_runs(const std::vector<double>& lambda, const ModeErrors& errors, double equal) {
+  std::vector<Cluster> runs;
   for (std::size_t j = 1; j < lambda.size(); ++j) {
     const double open = std::max(equal, kEqual * std::min(errors.floor[j - 1], errors.floor[j]));
     if (lambda[j] - lambda[j - 1] > open * lambda[j]) continue;
     const auto at = static_cast<std::int64_t>(j);
-    if (clusters.empty() || clusters.back().first + clusters.back().count != at) clusters.push_back({at - 1, 1});
-    ++clusters.back().count;
+    if (runs.empty() || runs.back().first + runs.back().count != at) runs.push_back({at - 1, 1});
+    ++runs.back().count;
   }
-  return clusters;
+  return runs;
+}
+
+// The eigenvectors of Phi^T (K - mean M) Phi, and its eigenvalues, ascending; the same on every rank.
+std::vector<double> calc_differences(const Operators& operators, const Columns& phi, double mean, std::vector<double>& rotation) {
+  const auto count = static_cast<std::size_t>(phi.count);
+  const auto size = static_cast<std::size_t>(phi.rows) * count;
+  std::vector<double> space(2 * size);
+  const Columns k_phi{space.data(), phi.rows, phi.rows, phi.count};
+  const Columns m_phi{space.data() + size, phi.rows, phi.rows, phi.count};
+  operators.stiffness.multiply(phi, k_phi);
+  operators.mass.multiply(phi, m_phi);
+  for (std::size_t i = 0; i < size; ++i) k_phi.values[i] -= mean * m_phi.values[i];
+  rotation.assign(count * count, 0.0);
+  multiply_transposed(phi, k_phi, rotation.data(), phi.count);
+  MPI_Allreduce(MPI_IN_PLACE, rotation.data(), static_cast<int>(rotation.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
+  PetscBLASInt order = phi.count;
+  PetscBLASInt room = 64 * order + 3 * order;
+  PetscBLASInt info = 0;
+  std::vector<double> differences(count);
+  std::vector<double> work(static_cast<std::size_t>(room));
+  LAPACKsyev_("V", "L", &order, rotation.data(), &order, differences.data(), work.data(), &room, &info);
+  if (info != 0) throw SolveError("A group of nearly equal modes cannot be parted (LAPACK dsyev failed).");
+  MPI_Bcast(rotation.data(), static_cast<int>(rotation.size()), MPI_DOUBLE, 0, operators.comm);
+  MPI_Bcast(differences.data(), phi.count, MPI_DOUBLE, 0, operators.comm);
+  return differences;
+}
+
+}  // namespace
+
+std::vector<Cluster> find_groups(const std::vector<double>& lambda, const ModeErrors& errors, double tolerance) {
+  return find_runs(lambda, errors, std::clamp(kEqual * tolerance, kTightest, kLoosest));
+}
+
+std::vector<Cluster> split_groups(const Operators& operators, const std::vector<Cluster>& groups, const ModeErrors& errors,
+                                  std::vector<double>& lambda, Mat shapes) {
+  if (groups.empty()) return {};
+  const LocalColumns access(shapes);
+  for (const Cluster& group : groups) {
+    const Columns phi = access.view().part(static_cast<int>(group.first), static_cast<int>(group.count));
+    const auto begin = lambda.begin() + group.first;
+    const double mean = std::accumulate(begin, begin + group.count, 0.0) / static_cast<double>(group.count);
+    std::vector<double> rotation;
+    const std::vector<double> differences = calc_differences(operators, phi, mean, rotation);
+    combine_columns(phi, rotation.data(), phi.count);
+    std::transform(differences.begin(), differences.end(), begin, [mean](double difference) { return mean + difference; });
+  }
+  return find_runs(lambda, errors, kTightest);
 }
 
 void make_canonical(const Operators& operators, const NodeLayout& nodes, const std::vector<Cluster>& clusters, std::vector<double>& lambda,

@@ -1,12 +1,19 @@
-// Method:     Sylvester's law of inertia: K - sigma M = L D L^T has as many negative pivots as there are eigenvalues below sigma.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3.
+// Method:     Sylvester's law of inertia: A = K - sigma M = L D L^T has as many negative pivots as there are eigenvalues below sigma.
+// Rounding
+//             of K moves the eigenvalues of rigid motions, R, off zero to either side, and past a sigma as small. Counted is then what
+//             there is beside them: A on the vectors M-orthogonal to R has n(A) + n(S) - dim R negative eigenvalues, n(A) those of A and
+//             n(S) those of S = -(M R)^T A^-1 M R, by the inertia of [A, M R; (M R)^T, 0] taken apart in two ways.
+// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3; Haynsworth, Linear Algebra Appl. 1, 1968 (inertia is additive);
+//             Gould, Math. Program. 32, 1985 (inertia on a subspace).
 // Deviations: none.
 #include "precompute/eigen/inertia.hpp"
 
 #include <fmt/core.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 
+#include "precompute/eigen/block_kernels.hpp"
 #include "precompute/eigen/memory.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
@@ -14,11 +21,26 @@
 #include "runtime/config/error.hpp"
 
 namespace carillon::eigen {
+namespace {
 
-InertiaCounter::InertiaCounter(const Problem& problem, const Options& options, Seconds& seconds, FactorStatistics& statistics,
-                               std::function<double(double)> to_hz)
-    : problem_(problem), options_(options), seconds_(seconds), statistics_(statistics), to_hz_(std::move(to_hz)) {
-  petsc::check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm_));
+using petsc::check;
+
+constexpr double kNearZero = 1e4;   // Of rounding_: below, rigid modes may lie on either side.
+constexpr double kWorthless = 1e3;  // Of rounding_: above, a shift that cannot be factorised is not so for rounding.
+constexpr double kHopeless = 1e-3;  // Of rounding_: below, there is no need to try.
+constexpr double kStep = 16;        // From one such shift to the next: four times the frequency.
+
+}  // namespace
+
+InertiaCounter::InertiaCounter(const Problem& problem, const Options& options, const std::vector<petsc::VecHandle>& rigid, Seconds& seconds,
+                               FactorStatistics& statistics, std::function<double(double)> to_hz)
+    : problem_(problem), options_(options), rigid_(rigid), seconds_(seconds), statistics_(statistics), to_hz_(std::move(to_hz)) {
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm_));
+  PetscScalar k = 0;
+  PetscScalar m = 0;
+  check(MatGetTrace(problem.stiffness, &k));
+  check(MatGetTrace(problem.mass, &m));
+  rounding_ = PETSC_MACHINE_EPSILON * k / m;
   uses_mumps_ = options.factorisation == Factorisation::kMumps;
 }
 
@@ -50,16 +72,56 @@ bool InertiaCounter::try_factorise(double sigma) {
   return true;
 }
 
-Inertia InertiaCounter::take(double lambda, double reach) {
+bool InertiaCounter::try_around(double lambda, double reach) {
   constexpr int kNudges = 5;
+  if (factor_ == nullptr) make_factor();
+  for (int i = 0; i < kNudges; ++i) {
+    if (!try_factorise(lambda * (1 + reach * i / kNudges))) continue;
+    taken_.push_back({standing_, count_below()});
+    return true;
+  }
+  return false;
+}
+
+// Eigenvalues below the shift where the factor stands; the rigid ones are below it.
+std::int64_t InertiaCounter::count_below() {
+  const std::int64_t all = factor_->get_negative_pivots();
+  const auto rigid = static_cast<int>(rigid_.size());
+  if (rigid == 0 || standing_ > kNearZero * rounding_) return all;
+  petsc::VecHandle image;
+  PetscInt rows = 0;
+  check(MatCreateVecs(problem_.mass, nullptr, image.out()));
+  check(VecGetLocalSize(image, &rows));
+  const auto size = static_cast<std::size_t>(rows) * rigid_.size();
+  std::vector<double> space(2 * size);
+  const Columns images{space.data(), rows, rows, rigid};
+  const Columns solved{space.data() + size, rows, rows, rigid};
+  for (int j = 0; j < rigid; ++j) {
+    const PetscScalar* values = nullptr;
+    check(MatMult(problem_.mass, rigid_[static_cast<std::size_t>(j)], image));
+    check(VecGetArrayRead(image, &values));
+    std::copy_n(values, rows, images.column(j));
+    std::copy_n(values, rows, solved.column(j));
+    check(VecRestoreArrayRead(image, &values));
+  }
+  factor_->solve(solved.values, solved.stride, rigid);
+  statistics_.solves += rigid;
+  std::vector<double> products(rigid_.size() * rigid_.size());
+  multiply_transposed(images, solved, products.data(), rigid);
+  MPI_Allreduce(MPI_IN_PLACE, products.data(), static_cast<int>(products.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  const Eigen::Map<const Eigen::MatrixXd> s(products.data(), rigid, rigid);
+  std::int64_t positive =
+      (Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (s + s.transpose()), Eigen::EigenvaluesOnly).eigenvalues().array() > 0).count();
+  MPI_Bcast(&positive, 1, MPI_INT64_T, 0, comm_);
+  return all + positive;  // all + n(S) - dim R beside the rigid ones, and dim R of these; n(S) of -products
+}
+
+Inertia InertiaCounter::take(double lambda, double reach, Want want) {
+  if (want == Want::kHereOrAbove) lambda = std::max(lambda, kHopeless * rounding_);
+  for (; want == Want::kHereOrAbove && lambda <= kWorthless * rounding_; lambda *= kStep)
+    if (try_around(lambda, reach)) return taken_.back();
   while (true) {
-    if (factor_ == nullptr) make_factor();
-    for (int i = 0; i < kNudges; ++i) {
-      const double sigma = lambda * (1 + reach * i / kNudges);
-      if (!try_factorise(sigma)) continue;
-      taken_.push_back({sigma, factor_->get_negative_pivots()});
-      return taken_.back();
-    }
+    if (try_around(lambda, reach)) return taken_.back();
     if (uses_mumps_ || options_.factorisation == Factorisation::kLdlt) break;
     uses_mumps_ = true;  // It pivots across fronts: slower, and stable where ours is not.
     release();

@@ -9,6 +9,7 @@
 
 #include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/eigen/solve_modes.hpp"
+#include "precompute/petsc/handle.hpp"
 
 namespace carillon::eigen {
 
@@ -18,16 +19,20 @@ struct Inertia {
   std::int64_t below = 0;
 };
 
+/// Where a count is wanted: there; or, where rounding makes a shift so near zero worthless, at the least one above that is not.
+enum class Want { kHere, kHereOrAbove };
+
 /// Factorises K - sigma M where it is asked to, with the solver that the options name, and remembers every count.
 class InertiaCounter {
  public:
-  /// Problem, options, seconds and statistics must outlive it. to_hz: of a scaled lambda, for messages.
-  InertiaCounter(const Problem& problem, const Options& options, Seconds& seconds, FactorStatistics& statistics,
-                 std::function<double(double)> to_hz);
+  /// Problem, options, rigid modes (M-orthonormal), seconds and statistics must outlive it. to_hz: of a scaled lambda, for messages.
+  InertiaCounter(const Problem& problem, const Options& options, const std::vector<petsc::VecHandle>& rigid, Seconds& seconds,
+                 FactorStatistics& statistics, std::function<double(double)> to_hz);
 
   /// Factorises at lambda, or up to `reach` (relative) above it where lambda hits an eigenvalue, and counts. The factor is left there.
-  /// Throws SolveError when K - sigma M is singular all around, SystemError when memory does not suffice. Collective.
-  Inertia take(double lambda, double reach = 1e-6);
+  /// Near zero, rigid modes count as below lambda whatever rounding of K has made of them. Throws SolveError when K - sigma M is singular
+  /// all around, SystemError when memory does not suffice. Collective.
+  Inertia take(double lambda, double reach = 1e-6, Want want = Want::kHere);
 
   /// The factor without numbers: what it will take. Collective.
   const ShiftedFactor& analyse();
@@ -56,13 +61,17 @@ class InertiaCounter {
  private:
   void make_factor();
   bool try_factorise(double sigma);
+  bool try_around(double lambda, double reach);
+  std::int64_t count_below();
 
   const Problem& problem_;
   const Options& options_;
+  const std::vector<petsc::VecHandle>& rigid_;
   Seconds& seconds_;
   FactorStatistics& statistics_;
   std::function<double(double)> to_hz_;
   MPI_Comm comm_ = MPI_COMM_NULL;
+  double rounding_ = 0;  // of an eigenvalue, by that of an ordinary entry of K
   bool uses_mumps_ = false;
   std::unique_ptr<ShiftedFactor> factor_;
   bool stands_ = false;  // factor_ holds the values at standing_

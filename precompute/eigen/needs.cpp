@@ -18,7 +18,7 @@ namespace {
 
 using petsc::check;
 
-constexpr double kZeroFraction = 1e-5;  // Of high_hz: frequencies below are zero to working precision.
+constexpr double kZeroFraction = 1e-7;  // Of high_hz: what is below is lost in the rounding of what is up there.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -34,12 +34,12 @@ double find_cpu_seconds() {
 }  // namespace
 
 BandEnds find_ends(const Options& options) {
-  return {calc_lambda(std::max(options.low_hz, kZeroFraction * options.high_hz)), calc_lambda(options.high_hz)};
+  return {calc_lambda(options.low_hz > 0 ? options.low_hz : kZeroFraction * options.high_hz), calc_lambda(options.high_hz)};
 }
 
-Slice count_between(const std::function<Inertia(double lambda, double reach)>& take, double low, double high) {
-  const Inertia above = take(high * (1 + kEdgeNudge), kEdgeNudge);
-  const Inertia below = take(low * (1 - 2 * kEdgeNudge), kEdgeNudge);
+Slice count_between(const TakeCount& take, double low, double high) {
+  const Inertia above = take(high * (1 + kEdgeNudge), kEdgeNudge, Want::kHere);
+  const Inertia below = take(low * (1 - 2 * kEdgeNudge), kEdgeNudge, Want::kHereOrAbove);
   return {below.lambda, below.below, above.lambda, above.below};
 }
 
@@ -86,7 +86,8 @@ Outlook look_ahead(const Problem& problem, const Options& options, const std::fu
   const BandEnds ends = find_ends(options);
   const Scaling scaling(problem.stiffness, problem.mass, ends.high);
   std::vector<std::int64_t> per_component;
-  outlook.rigid_count = static_cast<std::int64_t>(make_rigid_modes(problem.stiffness, problem.mass, problem.nodes, per_component).size());
+  const std::vector<petsc::VecHandle> rigid = make_rigid_modes(problem.stiffness, problem.mass, problem.nodes, per_component);
+  outlook.rigid_count = static_cast<std::int64_t>(rigid.size());
   outlook.is_dense = n <= kDenseRows || options.method == Method::kDense;
   outlook.copies_bytes = calc_copies_bytes(problem);
   outlook.copies_kept_bytes = calc_kept_bytes(problem);
@@ -95,7 +96,7 @@ Outlook look_ahead(const Problem& problem, const Options& options, const std::fu
   if (unlimited.factorisation == Factorisation::kCholmod) unlimited.factorisation = Factorisation::kAutomatic;
   Seconds seconds;
   FactorStatistics statistics;
-  InertiaCounter counter(problem, unlimited, seconds, statistics,
+  InertiaCounter counter(problem, unlimited, rigid, seconds, statistics,
                          [&](double lambda) { return std::sqrt(std::max(scaling.from_scaled(lambda), 0.0)) / (2 * std::numbers::pi); });
   double start = find_cpu_seconds();
   const ShiftedFactor& factor = counter.analyse();
@@ -106,8 +107,8 @@ Outlook look_ahead(const Problem& problem, const Options& options, const std::fu
   outlook.factor_kept_bytes = 8 * outlook.entries;
   if (!may_count(outlook)) return outlook;
   start = find_cpu_seconds();
-  const Slice band = count_between([&](double lambda, double reach) { return counter.take(lambda, reach); }, scaling.to_scaled(ends.low),
-                                   scaling.to_scaled(ends.high));
+  const Slice band = count_between([&](double lambda, double reach, Want want) { return counter.take(lambda, reach, want); },
+                                   scaling.to_scaled(ends.low), scaling.to_scaled(ends.high));
   outlook.factor_seconds = (find_cpu_seconds() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
   outlook.modes = std::min(band.count(), options.max_modes.value_or(band.count()));
   return outlook;

@@ -19,16 +19,19 @@ inline constexpr std::int64_t kSliceModes = 320;  // Beyond, orthogonalisation c
 
 inline constexpr double kEdgeNudge = 1e-6;  // Counts are taken this far outside the band, relative to lambda.
 
-/// The ends of the band as eigenvalues [(rad/s)^2]; a lower one of zero is what is zero to working precision.
+/// The ends of the band as eigenvalues [(rad/s)^2]; a lower one of zero is what no mesh can resolve beside the upper one.
 struct BandEnds {
   double low = 0;
   double high = 0;
 };
 BandEnds find_ends(const Options& options);
 
-/// Counts the eigenvalues below both ends (scaled), a little outside. take: InertiaCounter::take, or who asks it. Two factorisations.
-/// Collective.
-Slice count_between(const std::function<Inertia(double lambda, double reach)>& take, double low, double high);
+/// InertiaCounter::take, or who asks it.
+using TakeCount = std::function<Inertia(double lambda, double reach, Want want)>;
+
+/// Counts the eigenvalues below both ends (scaled), a little outside; below the lower one where rounding allows. Two factorisations, seldom
+/// more. Collective.
+Slice count_between(const TakeCount& take, double low, double high);
 
 /// Of this rank [byte]. K and M by nodes, at their worst moment while their arrays grow, and the rigid modes.
 std::int64_t calc_copies_bytes(const Problem& problem);

@@ -44,10 +44,12 @@ using petsc::check;
 constexpr double kSurelyApart = 1e-6;    // Modes farther apart than this, relative to lambda, are no group.
 constexpr double kEdgeTolerance = 1e-9;  // A mode this close to an end of the band (relative to lambda) is in it.
 constexpr double kSafeMargin = 1e-7;     // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
+constexpr double kDenseRounding = 1e4;   // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
 constexpr int kRounds = 60;              // Krylov runs per interval at most until its count is met,
 constexpr int kIdleRounds = 2;           // and so many without a new mode.
 constexpr double kLockedMargin = 0.5;    // Of a slice's width: modes found that near are held away (818 modes: 2,181 solves, at 0.1 2,272).
 constexpr double kKrylovTolerance = 0.1;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
+constexpr double kWorstResidual = 1e-4;   // Of a mode that rounding alone has spoilt: a bank takes none above.
 constexpr int kBases = 3;                 // of equal modes that are tried anew, because their residuals added up.
 
 std::vector<Inertia> sort_counts(std::vector<Inertia> counts) {
@@ -75,6 +77,8 @@ class BandSolver {
  private:
   Modes solve_band();
   std::string explain() const;
+  double find_fastest() const;
+  bool is_dense_exact() const;
   void solve_dense_band();
   void make_counter();
   void solve_sparse_band();
@@ -84,7 +88,7 @@ class BandSolver {
   void find_missing(const Slice& slice, double sigma);
   void run_rounds(const Slice& slice, ShiftedFactor* cholmod, double sigma, int first);
   double run_round(const Slice& slice, ShiftedFactor* cholmod, double sigma, Missing missing, int round);
-  Inertia take(double lambda, double reach = 1e-6);
+  Inertia take(double lambda, double reach = 1e-6, Want want = Want::kHere);
   std::int64_t count_found(double low, double high) const;
   double find_margin(double lambda) const;
   void move_doubtful_counts();
@@ -148,15 +152,20 @@ void BandSolver::report(Phase phase, std::int64_t done, std::int64_t more_solves
                      factor.factorisations, factor.solves + more_solves});
 }
 
-/// What makes an error of the solve likely, as a sentence for the user: rounding in K moves squared frequencies by about its epsilon times
-/// the greatest.
-std::string BandSolver::explain() const {
-  double fastest = 0;  // about the greatest eigenvalue
+/// About the greatest eigenvalue. Collective.
+double BandSolver::find_fastest() const {
+  double fastest = 0;
   for (std::size_t i = 0; i < operators_->stiffness_diagonal.size(); ++i)
     fastest = std::max(fastest, operators_->stiffness_diagonal[i] / operators_->mass_diagonal[i]);
   MPI_Allreduce(MPI_IN_PLACE, &fastest, 1, MPI_DOUBLE, MPI_MAX, comm_);
+  return fastest;
+}
+
+/// What makes an error of the solve likely, as a sentence for the user: rounding in K moves squared frequencies by about its epsilon times
+/// the greatest.
+std::string BandSolver::explain() const {
   constexpr double kSafe = 30;  // times that rounding, squared frequencies keep their digits
-  const double rounding = PETSC_MACHINE_EPSILON * fastest;
+  const double rounding = PETSC_MACHINE_EPSILON * find_fastest();
   if (low_ > kSafe * rounding) return {};
   return fmt::format(
       " The body is so thin, or its elements so small, that rounding in K alone moves its squared frequencies by ({:.2g} Hz)^2: let the "
@@ -184,7 +193,7 @@ Modes BandSolver::solve_band() {
       modes_.rigid_count = static_cast<std::int64_t>(rigid_.size());
       operators_ = std::make_unique<Operators>(problem_.stiffness, problem_.mass);
     }
-    if (n_ <= kDenseRows || options_.method == Method::kDense) {
+    if ((n_ <= kDenseRows || options_.method == Method::kDense) && is_dense_exact()) {
       solve_dense_band();
     } else {
       solve_sparse_band();
@@ -196,6 +205,9 @@ Modes BandSolver::solve_band() {
   MPI_Allreduce(MPI_IN_PLACE, &modes_.seconds, sizeof(Seconds) / sizeof(double), MPI_DOUBLE, MPI_MAX, comm_);
   return std::move(modes_);
 }
+
+// Whether the lowest eigenvalue of the band stands out of what LAPACK's rounding, a part of the largest of all, does to every one.
+bool BandSolver::is_dense_exact() const { return low_ > kDenseRounding * PETSC_MACHINE_EPSILON * find_fastest(); }
 
 void BandSolver::solve_dense_band() {
   check_memory(comm_, calc_dense_bytes(n_), options_.memory_limit_bytes, "The dense solve");
@@ -234,7 +246,8 @@ void BandSolver::solve_dense_band() {
 
 Slice BandSolver::count_band() {
   report(Phase::kCount, 0);
-  const Slice band = count_between([this](double lambda, double reach) { return take(lambda, reach); }, low_, high_);
+  const Slice band = count_between([this](double lambda, double reach, Want want) { return take(lambda, reach, want); }, low_, high_);
+  low_ = std::max(low_, band.low);
   modes_.count_below_low = band.below_low;
   if (band.below_low < modes_.rigid_count || band.count() < 0) {
     throw SolveError(
@@ -243,9 +256,9 @@ Slice BandSolver::count_band() {
                     band.below_low, to_hz(band.low), band.below_high, to_hz(band.high), modes_.rigid_count));
   }
   if (band.below_low > modes_.rigid_count) {
-    const Inertia still = take(low_ * 1e-4);
-    modes_.mechanism_count = still.below - modes_.rigid_count;
-    counter_->forget(still.lambda);
+    const Inertia still = take(low_ * 1e-4, 1e-6, Want::kHereOrAbove);
+    modes_.mechanism_count = std::min(still.below, band.below_low) - modes_.rigid_count;
+    if (still.lambda != band.low) counter_->forget(still.lambda);
   }
   modes_.band_count = band.count();
   return band;
@@ -258,22 +271,23 @@ Slice BandSolver::cut(const Slice& band) {
 }
 
 // A count, or what is remembered of it.
-Inertia BandSolver::take(double lambda, double reach) {
+Inertia BandSolver::take(double lambda, double reach, Want want) {
   SearchStep step;
-  step.asked = {lambda, reach};
+  step.asked = {lambda, reach, want == Want::kHereOrAbove ? 1.0 : 0.0};
   if (const SearchStep* known = keeper_.recall(step)) {
     const Inertia taken{known->answer[0], static_cast<std::int64_t>(known->answer[1])};
     counter_->recall(taken);
     return taken;
   }
-  const Inertia taken = counter_->take(lambda, reach);
+  const Inertia taken = counter_->take(lambda, reach, want);
   step.answer = {taken.lambda, static_cast<double>(taken.below)};
   keeper_.record(step);
   return taken;
 }
 
 void BandSolver::make_counter() {
-  counter_ = std::make_unique<InertiaCounter>(problem_, options_, modes_.seconds, modes_.factor, [this](double x) { return to_hz(x); });
+  counter_ =
+      std::make_unique<InertiaCounter>(problem_, options_, rigid_, modes_.seconds, modes_.factor, [this](double x) { return to_hz(x); });
   keeper_.set_counter(counter_.get());
 }
 
@@ -284,7 +298,7 @@ void BandSolver::solve_sparse_band() {
   const Slice band = count_band();
   if (band.count() == 0) return describe_proof();
   const std::int64_t last = std::min(band.below_high, band.below_low + options_.max_modes.value_or(band.count()));
-  if (n_ <= kDenseRowsFull && static_cast<double>(last) > kDenseShare * n_) {
+  if (n_ <= kDenseRowsFull && static_cast<double>(last) > kDenseShare * n_ && is_dense_exact()) {
     keeper_.set_counter(nullptr);
     counter_.reset();
     return solve_dense_band();
@@ -503,7 +517,10 @@ void BandSolver::prove() {
 
 void BandSolver::describe_proof() {
   Proof& proof = modes_.proof;
-  const std::vector<Inertia> counts = sort_counts(counter_->get_taken());
+  std::vector<Inertia> counts = sort_counts(counter_->get_taken());
+  // Where the shift had to go up for rounding, and nothing but the rigid modes lies below it, nothing else lies below the band either.
+  const double asked = scaling_.to_scaled(find_ends(options_).low) * (1 - 2 * kEdgeNudge);
+  if (counts.front().below == modes_.rigid_count) counts.front().lambda = std::min(counts.front().lambda, asked);
   for (const Inertia& taken : counts) proof.counts.push_back({to_hz(taken.lambda), taken.below, find_margin(taken.lambda)});
   proof.found = count_found(counts.front().lambda, counts.back().lambda);
   proof.factor_backward_error = counter_->get_worst_backward_error();
@@ -624,10 +641,11 @@ void BandSolver::drop_beyond_limit() {
   modes_.shapes = std::move(kept);
 }
 
-/// Of modes that are equal, and measures all in it.
+/// Of modes that are equal, or nearly, and measures all in it.
 void BandSolver::choose_basis(ModeErrors& errors) {
-  modes_.proof.clusters = find_clusters(modes_.lambda, errors, options_.tolerance);
-  if (modes_.proof.clusters.empty()) return;
+  const std::vector<Cluster> groups = find_groups(modes_.lambda, errors, options_.tolerance);
+  modes_.proof.clusters = split_groups(*operators_, groups, errors, modes_.lambda, modes_.shapes);
+  if (groups.empty()) return;
   make_canonical(*operators_, problem_.nodes, modes_.proof.clusters, modes_.lambda, modes_.shapes);
   std::vector<double> quotients = modes_.lambda;
   errors = normalise_and_measure(*operators_, quotients, modes_.shapes);
@@ -651,6 +669,13 @@ void BandSolver::finish() {
     choose_basis(errors);
   }
   certify(errors);
+  for (std::size_t j = 0; j < errors.residual.size(); ++j) {
+    if (errors.residual[j] <= std::max(kWorstResidual, options_.tolerance)) continue;
+    throw SolveError(fmt::format(
+        "Mode {} at {:.6g} Hz is so slow beside the stiffest of the body that rounding leaves a relative residual of {:.2g} in it, "
+        "more than {:g}. Let the band begin above it, or mend what is far stiffer than the rest: thin elements, or a material.",
+        j, to_hz(modes_.lambda[j]), errors.residual[j], kWorstResidual));
+  }
   counter_.reset();
   measure_margins();
   modes_.residual = errors.residual;

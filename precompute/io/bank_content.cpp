@@ -106,7 +106,7 @@ bank::Bank make_bank(const spec::JobSpec& job, const Setting& setting, Body& bod
   bank.regions = make_regions(solved);
   bank.proof = make_proof(modes);
   bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
-  bank.band_hz = job.band_hz;
+  bank.band_hz = {find_low_hz(job, modes), job.band_hz[1]};
   bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
   bank.element = spec::to_text(setting.element);
   bank.mass = spec::to_text(job.mass);

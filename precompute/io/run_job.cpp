@@ -17,6 +17,7 @@
 #include "precompute/io/describe_run.hpp"
 #include "precompute/io/fingerprint.hpp"
 #include "precompute/io/interrupt.hpp"
+#include "precompute/io/matrices.hpp"
 #include "precompute/io/open_job.hpp"
 #include "precompute/io/run.hpp"
 #include "precompute/io/solve_body.hpp"
@@ -130,6 +131,7 @@ void open_checkpoint(Run& run) {
 
 RunSummary carry_out(Run& run, const fs::path& job_file) {
   open_job(run, job_file);
+  check_matrices(run);
   open_progress(run);
   open_checkpoint(run);
   AccurateBody found;

@@ -15,6 +15,7 @@
 #include "precompute/fem/energy.hpp"
 #include "precompute/io/checkpoint_file.hpp"
 #include "precompute/io/fingerprint.hpp"
+#include "precompute/io/matrices.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -138,7 +139,8 @@ estimate::ErrorBars calc_bars(Run& run, const Body& body, const fem::System& sys
   for (const spec::Material& material : solved.materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
-  estimate::Solution solution{modes.lambda, modes.residual, modes.shapes, run.job.band_hz[0], is_cut ? last_hz : run.job.band_hz[1]};
+  estimate::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
+                              is_cut ? last_hz : run.job.band_hz[1]};
   return estimate::calc_error_bars(run.comm, body.pieces.local, system.stiffness, system.mass, solids, solved.materials.of_tet,
                                    run.job.mass, solution);
 }
@@ -173,9 +175,15 @@ void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
 
 void warn_of_oddities(Run& run, const Body& body, const eigen::Modes& modes) {
   warn_of_low_modes(run, body, modes);
-  if (modes.mechanism_count > 0)
+  if (const double low_hz = find_low_hz(run.job, modes); low_hz > run.job.band_hz[0]) {
     run.stations.warn(fmt::format(
-        "the body has {} motions without stiffness besides the rigid ones (parts that hang on a point or an edge)", modes.mechanism_count));
+        "the band begins at {:.3g} Hz: of the {} motions below, the rigid ones left out, rounding beside what is stiffest leaves no digit",
+        low_hz, modes.count_below_low - modes.rigid_count));
+  } else if (modes.mechanism_count > 0) {
+    run.stations.warn(fmt::format(
+        "the body has {} motions without stiffness besides the rigid ones (parts that hang on a point, on an edge or on next to nothing)",
+        modes.mechanism_count));
+  }
   if (modes.lambda.empty()) run.stations.warn("no mode lies in the band: the bank will be silent");
 }
 
@@ -200,6 +208,10 @@ void warn_of_locking(Run& run, const spec::Material& material, bool is_linear) {
 }
 
 }  // namespace
+
+double find_low_hz(const spec::JobSpec& job, const eigen::Modes& modes) {
+  return modes.proof.counts.empty() ? job.band_hz[0] : std::max(job.band_hz[0], modes.proof.counts.front().freq_hz);
+}
 
 eigen::Options make_options(const Run& run, const Setting& setting) {
   eigen::Options options;
@@ -243,6 +255,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   SolvedBody solved;
   const fem::System system = assemble_body(run, setting, body, solved);
 
+  write_matrices(run, body, system);
   begin_checkpoint(run, setting, body);
   solved.modes = solve_named(run, setting, body, system, make_layout(body.pieces));
   keep(run, solved.modes);

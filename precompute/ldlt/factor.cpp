@@ -1,6 +1,7 @@
 // Method:     Plan, numbers and workspace behind one door; a factorisation is trusted by what it does to a vector whose image is known.
 //             Shifts that let the numbers grow, as pivots are sought inside the blocks only, get a step of iterative refinement.
 // Source:     Rigal and Gaches 1967 (normwise backward error); Higham 2002, sections 7.1, 12.1 (fixed precision refinement).
+//             What is factorised is graded (graded.cpp).
 // Deviations: the infinity norm of K - sigma M is bounded by ||K|| + |sigma| ||M||.
 #include "precompute/ldlt/factor.hpp"
 
@@ -11,6 +12,7 @@
 #include <limits>
 #include <vector>
 
+#include "precompute/ldlt/graded.hpp"
 #include "precompute/ldlt/local_rows.hpp"
 #include "precompute/ldlt/numeric.hpp"
 #include "precompute/petsc/handle.hpp"
@@ -31,8 +33,9 @@ constexpr double kVanishedPivot = 64 * std::numeric_limits<double>::epsilon();  
 }  // namespace
 
 struct Factor::State {
-  Mat stiffness = nullptr;
-  Mat mass = nullptr;
+  State(Mat stiffness, Mat mass) : graded(stiffness, mass), plan(make_plan(stiffness, mass)) {}
+
+  GradedPair graded;  // what is factorised, measured and refined with
   Plan plan;
   Numbers numbers;
   Workspace workspace;
@@ -50,7 +53,7 @@ struct Factor::State {
   /// y = (K - sigma M) x on this rank's rows. Collective.
   void apply(Vec x, Vec y, Vec scratch) const;
   double measure_backward_error(bool is_refined);
-  /// X <- A^-1 X with the factorisation alone. Collective.
+  /// X <- A^-1 X, A graded, with the factorisation alone. Collective.
   void solve(double* x, int stride, int columns);
   /// The same, and one step of iterative refinement. Collective.
   void solve_refined(double* x, int stride, int columns);
@@ -81,14 +84,14 @@ void Factor::State::allocate() {
 double Factor::State::calc_norm() const {
   double k = 0;
   double m = 0;
-  check(MatNorm(stiffness, NORM_INFINITY, &k));
-  check(MatNorm(mass, NORM_INFINITY, &m));
+  check(MatNorm(graded.get_stiffness(), NORM_INFINITY, &k));
+  check(MatNorm(graded.get_mass(), NORM_INFINITY, &m));
   return k + std::abs(sigma) * m;
 }
 
 void Factor::State::apply(Vec x, Vec y, Vec scratch) const {
-  check(MatMult(stiffness, x, y));
-  check(MatMult(mass, x, scratch));
+  check(MatMult(graded.get_stiffness(), x, y));
+  check(MatMult(graded.get_mass(), x, scratch));
   check(VecAXPY(y, -sigma, scratch));
 }
 
@@ -96,7 +99,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   petsc::VecHandle x;
   petsc::VecHandle b;
   petsc::VecHandle scratch;
-  check(MatCreateVecs(stiffness, x.out(), b.out()));
+  check(MatCreateVecs(graded.get_stiffness(), x.out(), b.out()));
   check(VecDuplicate(x, scratch.out()));
   PetscInt first = 0;
   PetscInt last = 0;
@@ -129,11 +132,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
 }
 
-Factor::Factor(Mat stiffness, Mat mass) : state_(std::make_unique<State>()) {
-  state_->stiffness = stiffness;
-  state_->mass = mass;
-  state_->plan = make_plan(stiffness, mass);
-}
+Factor::Factor(Mat stiffness, Mat mass) : state_(std::make_unique<State>(stiffness, mass)) {}
 
 Factor::~Factor() = default;
 Factor::Factor(Factor&&) noexcept = default;
@@ -144,10 +143,11 @@ const Analysis& Factor::get_analysis() const { return state_->plan.analysis; }
 bool Factor::factorise(double sigma) {
   State& s = *state_;
   s.sigma = sigma;
+  s.graded.update();
   s.norm = s.calc_norm();
   s.name_need([&] {
     s.allocate();
-    factorise_fronts(s.plan, s.stiffness, s.mass, sigma, s.numbers);
+    factorise_fronts(s.plan, s.graded.get_stiffness(), s.graded.get_mass(), sigma, s.numbers);
     petsc::add_flops(s.plan.analysis.ranks[static_cast<std::size_t>(s.plan.rank)].flops);
   });
   s.backward_error = std::numeric_limits<double>::infinity();
@@ -174,7 +174,7 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
   petsc::VecHandle from;
   petsc::VecHandle to;
   petsc::VecHandle scratch;
-  check(MatCreateVecs(stiffness, from.out(), to.out()));
+  check(MatCreateVecs(graded.get_stiffness(), from.out(), to.out()));
   check(VecDuplicate(from, scratch.out()));
   PetscInt rows = 0;
   check(VecGetLocalSize(from, &rows));
@@ -197,10 +197,12 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
 }
 
 void Factor::solve(double* x, int stride, int columns) {
+  state_->graded.scale(x, stride, columns);
   if (state_->needs_refinement)
     state_->solve_refined(x, stride, columns);
   else
     state_->solve(x, stride, columns);
+  state_->graded.scale(x, stride, columns);
 }
 
 }  // namespace carillon::ldlt

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 namespace carillon::config {
 namespace {
@@ -25,11 +26,6 @@ class Descriptor {
     if (value_ >= 0) ::close(value_);
   }
   int get() const { return value_; }
-  bool close() {
-    const int value = value_;
-    value_ = -1;
-    return ::close(value) == 0;
-  }
 
  private:
   int value_ = -1;
@@ -122,29 +118,50 @@ int write_all(int descriptor, std::string_view bytes) {
 
 }  // namespace
 
-void write_file(const fs::path& file, std::string_view bytes) {
-  const fs::path temporary = make_temporary_name(file);
-  const auto refuse = [&](int error) {
-    ::unlink(temporary.c_str());
-    throw SystemError(
-        fmt::format("{}: cannot write: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(error)));
-  };
-  ::unlink(temporary.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
-  const int nameless = open_nameless(folder_of(file));
-  Descriptor fd(nameless >= 0 ? nameless : ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (fd.get() < 0) refuse(errno);
-  if (const int error = write_all(fd.get(), bytes); error != 0) refuse(error);
-  if (::fsync(fd.get()) != 0) refuse(errno);
+WholeFile::WholeFile(fs::path file) : file_(std::move(file)), temporary_(make_temporary_name(file_)) {
+  ::unlink(temporary_.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
+  descriptor_ = open_nameless(folder_of(file_));
+  is_nameless_ = descriptor_ >= 0;
+  if (!is_nameless_) descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) refuse(errno);
+}
+
+WholeFile::~WholeFile() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  if (!is_nameless_) ::unlink(temporary_.c_str());
+}
+
+void WholeFile::refuse(int error) {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = -1;
+  ::unlink(temporary_.c_str());
+  throw SystemError(
+      fmt::format("{}: cannot write: {}; check the folder's rights and the space on the disk", file_.string(), std::strerror(error)));
+}
+
+void WholeFile::append(std::string_view bytes) {
+  if (const int error = write_all(descriptor_, bytes); error != 0) refuse(error);
+}
+
+void WholeFile::commit() {
+  if (::fsync(descriptor_) != 0) refuse(errno);
   {
     // Whoever is killed by a signal that can be caught leaves no temporary name behind.
     const SignalPause pause;
-    if (nameless >= 0) {
-      if (const int error = link_nameless(fd.get(), temporary); error != 0) refuse(error);
+    if (is_nameless_) {
+      if (const int error = link_nameless(descriptor_, temporary_); error != 0) refuse(error);
     }
-    if (!fd.close()) refuse(errno);
-    if (::rename(temporary.c_str(), file.c_str()) != 0) refuse(errno);
+    if (::close(std::exchange(descriptor_, -1)) != 0) refuse(errno);
+    if (::rename(temporary_.c_str(), file_.c_str()) != 0) refuse(errno);
   }
-  sync_folder(folder_of(file));
+  sync_folder(folder_of(file_));
+}
+
+void write_file(const fs::path& file, std::string_view bytes) {
+  WholeFile whole(file);
+  whole.append(bytes);
+  whole.commit();
 }
 
 void check_writable(const fs::path& file, std::string_view what) {

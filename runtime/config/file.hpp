@@ -20,6 +20,32 @@ std::string read_file(const std::filesystem::path& file, std::string_view what, 
 /// the middle leaves nothing. Throws SystemError when the disk refuses; nothing is left behind then.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
 
+/// The same for content that comes in pieces:
+///
+///   WholeFile file("stiffness.mtx");
+///   while (more) file.append(piece);
+///   file.commit();
+///
+/// One that goes without commit() leaves nothing behind. All throw SystemError when the disk refuses.
+class WholeFile {
+ public:
+  explicit WholeFile(std::filesystem::path file);
+  ~WholeFile();
+  WholeFile(const WholeFile&) = delete;
+  WholeFile& operator=(const WholeFile&) = delete;
+
+  void append(std::string_view bytes);
+  /// The name is there, and the old content gone, when it returns.
+  void commit();
+
+ private:
+  [[noreturn]] void refuse(int error);
+
+  std::filesystem::path file_, temporary_;
+  int descriptor_ = -1;
+  bool is_nameless_ = false;  // the temporary file has no name yet
+};
+
 /// Throws InputError unless `file` can be written: its folder exists (or can be made) and takes files, and `file` itself is no folder or
 /// device. Meant for before long work. `what` names the output in messages ("bank").
 void check_writable(const std::filesystem::path& file, std::string_view what);

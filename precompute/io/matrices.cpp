@@ -1,0 +1,171 @@
+// Method:     Every rank writes the lower triangle of its rows as text, a piece at a time; rank 0 puts the pieces into the file.
+// Source:     Boisvert, Pozo, Remington, The Matrix Market exchange formats, NISTIR 5935, 1996.
+// Deviations: none.
+#include "precompute/io/matrices.hpp"
+
+#include <fmt/core.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <iterator>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "precompute/io/node_order.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/config/file.hpp"
+
+namespace carillon::io {
+namespace {
+
+namespace fs = std::filesystem;
+using petsc::check;
+
+constexpr std::size_t kPieceBytes = std::size_t{1} << 22;
+
+/// Appends the next piece of this rank's text; an empty one is the last.
+using NextPiece = std::function<void(std::string& piece)>;
+
+/// The pieces of rank 0, then those of rank 1 and so on, in one file. Collective; fails on all ranks alike.
+void write_in_turn(MPI_Comm comm, const fs::path& file, const std::string& head, const NextPiece& next_piece) {
+  int rank = 0;
+  int ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  std::exception_ptr error;
+  const auto attempt = [&](const auto& step) {
+    if (error) return;
+    try {
+      step();
+    } catch (...) {
+      error = std::current_exception();
+    }
+  };
+  std::optional<config::WholeFile> whole;
+  if (rank == 0) {
+    attempt([&] {
+      whole.emplace(file);
+      whole->append(head);
+    });
+  }
+  std::string piece;
+  for (int turn = 0; turn < ranks; ++turn) {
+    for (std::int64_t size = 1; size > 0;) {
+      piece.clear();
+      if (rank == turn) attempt([&] { next_piece(piece); });
+      size = static_cast<std::int64_t>(piece.size());
+      MPI_Bcast(&size, 1, MPI_INT64_T, turn, comm);
+      if (turn != 0 && rank == turn) MPI_Send(piece.data(), static_cast<int>(size), MPI_CHAR, 0, 0, comm);
+      if (turn != 0 && rank == 0) {
+        piece.resize(static_cast<std::size_t>(size));
+        MPI_Recv(piece.data(), static_cast<int>(size), MPI_CHAR, turn, 0, comm, MPI_STATUS_IGNORE);
+      }
+      if (rank == 0) attempt([&] { whole->append(piece); });
+    }
+  }
+  petsc::agree(comm, error);
+  petsc::run_agreed(comm, [&] {
+    if (rank == 0) whole->commit();
+  });
+}
+
+/// By row of K and M in nodes: the place of the node among the free nodes in the order of the mesh. The same on every rank.
+std::vector<std::int32_t> find_places(MPI_Comm comm, const fem::LocalMesh& local) {
+  int ranks = 1;
+  MPI_Comm_size(comm, &ranks);
+  std::vector<int> counts(static_cast<std::size_t>(ranks)), starts(counts);
+  MPI_Allgather(&local.free_nodes, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
+  std::exclusive_scan(counts.begin(), counts.end(), starts.begin(), 0);
+  std::vector<std::int32_t> in_mesh(static_cast<std::size_t>(starts.back() + counts.back()));
+  MPI_Allgatherv(local.node_in_mesh.data(), local.free_nodes, MPI_INT32_T, in_mesh.data(), counts.data(), starts.data(), MPI_INT32_T, comm);
+  std::vector<std::int32_t> order(in_mesh.size()), places(in_mesh.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(),
+            [&](std::int32_t a, std::int32_t b) { return in_mesh[static_cast<std::size_t>(a)] < in_mesh[static_cast<std::size_t>(b)]; });
+  for (std::size_t i = 0; i < order.size(); ++i) places[static_cast<std::size_t>(order[i])] = static_cast<std::int32_t>(i);
+  return places;
+}
+
+/// Calls visit(row, column, value) for what of one row of the matrix is in the lower triangle, in the order of the mesh and from 1 on.
+template <class Visit>
+void visit_row(Mat matrix, PetscInt row, const std::vector<std::int32_t>& places, Visit&& visit) {
+  const auto find = [&](PetscInt i) { return 3 * static_cast<std::int64_t>(places[static_cast<std::size_t>(i / 3)]) + i % 3 + 1; };
+  PetscInt count = 0;
+  const PetscInt* columns = nullptr;
+  const PetscScalar* values = nullptr;
+  check(MatGetRow(matrix, row, &count, &columns, &values));
+  const std::int64_t own = find(row);
+  for (PetscInt k = 0; k < count; ++k) {
+    const std::int64_t other = find(columns[k]);
+    if (other <= own && values[k] != 0) visit(own, other, values[k]);
+  }
+  check(MatRestoreRow(matrix, row, &count, &columns, &values));
+}
+
+void write_matrix(const Run& run, const fs::path& file, const std::string& what, Mat matrix, const std::vector<std::int32_t>& places) {
+  PetscInt first = 0;
+  PetscInt last = 0;
+  check(MatGetOwnershipRange(matrix, &first, &last));
+  std::int64_t entries = 0;
+  for (PetscInt row = first; row < last; ++row) visit_row(matrix, row, places, [&](std::int64_t, std::int64_t, double) { ++entries; });
+  MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_INT64_T, MPI_SUM, run.comm);
+  const std::size_t n = 3 * places.size();
+  const std::string head =
+      fmt::format("%%MatrixMarket matrix coordinate real symmetric\n% {}; rows: nodes.csv\n{} {} {}\n", what, n, n, entries);
+  PetscInt row = first;
+  write_in_turn(run.comm, file, head, [&](std::string& piece) {
+    for (; row < last && piece.size() < kPieceBytes; ++row) {
+      visit_row(matrix, row, places, [&](std::int64_t i, std::int64_t j, double value) {
+        fmt::format_to(std::back_inserter(piece), "{} {} {:.17g}\n", i, j, value);
+      });
+    }
+  });
+}
+
+void write_nodes(const Run& run, const fs::path& file, const fem::LocalMesh& local) {
+  const NodeOrder order(run.comm, local);
+  std::vector<double> positions, numbers;
+  for (std::int32_t i = 0; i < local.free_nodes; ++i) {
+    for (const double x : local.nodes_m[static_cast<std::size_t>(i)]) positions.push_back(x);
+    numbers.insert(numbers.end(), 3, local.node_in_mesh[static_cast<std::size_t>(i)]);
+  }
+  NodeOrder::Room room;
+  const std::vector<const double*> columns{numbers.data(), positions.data()};
+  order.to_records(columns, room);
+  std::int64_t node = 0;
+  write_in_turn(run.comm, file, "node,x_m,y_m,z_m\n", [&](std::string& piece) {
+    for (; node < order.count() && piece.size() < kPieceBytes; ++node) {
+      const double* record = room.records.data() + 6 * node;
+      fmt::format_to(std::back_inserter(piece), "{:.0f},{:.17g},{:.17g},{:.17g}\n", record[0], record[1], record[3], record[5]);
+    }
+  });
+}
+
+}  // namespace
+
+void check_matrices(const Run& run) {
+  const fs::path& folder = run.options.matrices;
+  if (folder.empty()) return;
+  petsc::run_agreed(run.comm, [&] {
+    if (run.rank != 0) return;
+    for (const char* name : {"stiffness.mtx", "mass.mtx", "nodes.csv"}) config::check_writable(folder / name, "file of the matrices");
+  });
+}
+
+void write_matrices(Run& run, const Body& body, const fem::System& system) {
+  const fs::path& folder = run.options.matrices;
+  if (folder.empty()) return;
+  run.stations.begin("matrices", folder.string());
+  const std::vector<std::int32_t> places = find_places(run.comm, body.pieces.local);
+  write_matrix(run, folder / "stiffness.mtx", "stiffness matrix K [N/m]", system.stiffness, places);
+  write_matrix(run, folder / "mass.mtx", "mass matrix M [kg]", system.mass, places);
+  write_nodes(run, folder / "nodes.csv", body.pieces.local);
+  run.stations.end();
+}
+
+}  // namespace carillon::io

@@ -1,0 +1,34 @@
+// K and M as they are factorised where stiffness spans many decades.
+#pragma once
+
+#include <petscmat.h>
+
+#include <vector>
+
+#include "precompute/petsc/handle.hpp"
+
+namespace carillon::ldlt {
+
+/// S K S and S M S, S a power of two per node that brings the diagonal of K near one: a soft part beside a stiff one, or an element a
+/// thousand times thinner than its neighbours, then has pivots of its own size, not of the rounding of others. Bodies of one stiffness stay
+/// as they are, and cost nothing. Borrows K and M.
+class GradedPair {
+ public:
+  GradedPair(Mat stiffness, Mat mass) : given_stiffness_(stiffness), given_mass_(mass) {}
+
+  /// Reads the values of K and M again. Collective.
+  void update();
+  Mat get_stiffness() const { return scaled_stiffness_ ? scaled_stiffness_.get() : given_stiffness_; }
+  Mat get_mass() const { return scaled_mass_ ? scaled_mass_.get() : given_mass_; }
+  /// X <- S X on this rank's rows, column-major.
+  void scale(double* x, int stride, int columns) const;
+
+ private:
+  Mat given_stiffness_;
+  Mat given_mass_;
+  petsc::MatHandle scaled_stiffness_;  // null where S is one
+  petsc::MatHandle scaled_mass_;
+  std::vector<double> factor_;  // (own rows), empty where S is one
+};
+
+}  // namespace carillon::ldlt
