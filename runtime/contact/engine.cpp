@@ -41,7 +41,7 @@ Point to_vec(const std::array<double, 3>& x) { return {x[0], x[1], x[2]}; }
 /// those that come, and those that could take more, would hold.
 struct PairBooks {
   int points = 0;
-  double left_j = 0.0, new_j = 0.0, rise_j = 0.0;
+  double left_j = 0.0, new_j = 0.0, rise_j = 0.0, lift_j = 0.0;
 };
 
 /// How much of what is wanted there is, 0..1.
@@ -193,9 +193,9 @@ void Engine::add_held(std::vector<TouchPoint>& touches, const Snapshot& now) con
 }
 
 /// Points of a pair share its load, and which of them there are changes from step to step. Their springs must not hold more after a change
-/// than before, or what sways on them is pushed at every sway and never lies: the share of one that stays falls at once and rises slowly;
-/// one that comes finds what is left of what the pair held before, and its spring begins where it can hold no more than that, and so much
-/// higher little by little.
+/// than before, or what sways on them is pushed at every sway and never lies. So the share of one that stays falls little by little, for
+/// what it holds would be lost; what others leave, first those that come may have (a spring begins at the depth where it holds no more than
+/// that), then those whose share could rise, then springs that began deep and may come up.
 void Engine::set_resting(const std::vector<TouchPoint>& touches, const Snapshot& now) {
   const double passed = std::max(0.0, now.time_s - rested_s_);
   rested_s_ = now.time_s;
@@ -219,10 +219,12 @@ void Engine::set_resting(const std::vector<TouchPoint>& touches, const Snapshot&
     } else {
       pair.left_j += old->share * calc_spring_j(p, old->offset_m);
       const double stays = std::exp(-passed / kSettling);
-      p.share = std::min(p.share + std::max(0.0, old->share - p.share) * stays, old->share * (1.0 + passed / kSettling));
-      p.offset_m = old->offset_m * stays;
-      pair.left_j -= p.share * calc_spring_j(p, p.offset_m);
+      p.share = std::min(old->share, p.share + (old->share - p.share) * stays);
+      p.offset_m = old->offset_m;
+      const double held = p.share * calc_spring_j(p, p.offset_m);
+      pair.left_j -= held;
       pair.rise_j += std::max(0.0, 1.0 / pair.points - p.share) * calc_spring_j(p, p.offset_m);
+      pair.lift_j += p.share * calc_spring_j(p, p.offset_m * stays) - held;
     }
     points.push_back(p);
   }
@@ -233,6 +235,8 @@ void Engine::set_resting(const std::vector<TouchPoint>& touches, const Snapshot&
       p.offset_m = std::max(0.0, p.touch.depth_m) * (1.0 - std::sqrt(calc_part(pair.left_j, pair.new_j)));
     } else {
       p.share += std::max(0.0, 1.0 / pair.points - p.share) * calc_part(pair.left_j - pair.new_j, pair.rise_j);
+      const double lifted = calc_part(pair.left_j - pair.new_j - pair.rise_j, pair.lift_j);
+      p.offset_m *= 1.0 + lifted * lifted * (std::exp(-passed / kSettling) - 1.0);
     }
     p.stiffness_n_m *= p.share;
     p.damping_n_s_m *= p.share;
@@ -264,7 +268,9 @@ std::vector<PushedPoint> Engine::calc_pushes(const Snapshot& now) const {
   for (const RestingPoint& p : resting_->points()) {
     TouchPoint t = p.touch;
     place_touch(t, now.poses[t.a], t.b >= 0 ? now.poses[t.b] : Transform());
-    const double push = calc_push(p, t.depth_m - p.offset_m, dot(calc_relative_velocity(now.mobiles, make_impact_point(t)), t.normal));
+    const Point turn = now.mobiles[t.a].spin - (t.b >= 0 ? now.mobiles[t.b].spin : Point(0));
+    const double push = calc_push(p, t.depth_m - p.offset_m, dot(calc_relative_velocity(now.mobiles, make_impact_point(t)), t.normal),
+                                  (turn - dot(turn, t.normal) * t.normal).norm());
     if (push > 0.0) pushed.push_back({t, push});
   }
   return pushed;

@@ -18,13 +18,14 @@ namespace {
 using SimTK::dot;
 using Point = SimTK::Vec3;
 
-constexpr double kPatience = 5e-3;  // s
-constexpr double kRise = 5e-3;      // s; the force of a new contact comes within it: the impact before has been heard already
-constexpr double kInterval = 1e-3;  // s
-constexpr double kGone = 5e-3;      // s; a spot that has not carried for so long has ended
-constexpr double kSmooth = 20e-3;   // s
-constexpr double kSmallest = 1e-6;  // m; of a patch
-constexpr double kSharpest = 5e-4;  // m; radius of an edge that the mesh has sharp
+constexpr double kPatience = 5e-3;    // s
+constexpr double kRise = 5e-3;        // s; the force of a new contact comes within it: the impact before has been heard already
+constexpr double kInterval = 1e-3;    // s
+constexpr double kGone = 5e-3;        // s; a spot that has not carried for so long has ended
+constexpr double kSmooth = 20e-3;     // s
+constexpr double kSmallest = 1e-6;    // m; of a patch
+constexpr double kRollingSpin = 1.0;  // rad/s; slower, what sways stays where it is
+constexpr double kSharpest = 5e-4;    // m; radius of an edge that the mesh has sharp
 
 /// What touches at one place now.
 struct Group {
@@ -38,6 +39,12 @@ Point calc_velocity(const Snapshot& now, int body, const Point& where) {
   if (body < 0) return Point(0);
   const Mobile& m = now.mobiles[body];
   return m.inverse_mass > 0.0 ? Point(m.velocity + m.spin % (where - m.centre)) : Point(0);
+}
+
+/// How fast the bodies turn against each other, without what is about the normal.
+Point calc_turn(const Snapshot& now, const Group& g) {
+  const Point turn = now.mobiles[g.a].spin - (g.b >= 0 ? now.mobiles[g.b].spin : Point(0));
+  return turn - dot(turn, g.normal) * g.normal;
 }
 
 std::vector<Group> make_groups(const Engine& engine, const Snapshot& now) {
@@ -112,8 +119,7 @@ void record(const Engine& engine, const Snapshot& now, const Group& g, Spot& spo
   slip -= creep;
   // How much of the place's speed is that of b's surface: the creep belongs to the sweep over the other one.
   const double share = dot(u, u) > 0.0 ? std::clamp(dot(va - g.carried, u) / dot(u, u), 0.0, 1.0) : 0.0;
-  Point turn = now.mobiles[g.a].spin - (g.b >= 0 ? now.mobiles[g.b].spin : Point(0));
-  turn -= dot(turn, g.normal) * g.normal;
+  const Point turn = calc_turn(now, g);
   const auto calc_sweep = [&](const Point& surface) {
     const Point w = g.carried + spot.drift - surface;
     return (w - dot(w, g.normal) * g.normal).norm();
@@ -186,7 +192,9 @@ void LastingContacts::update(const Engine& engine, const std::vector<int>& membe
     }
     Spot& spot = *nearest;
     const double dt = now.time_s - spot.seen_s;
-    const Point velocity = spot.features == g.features ? g.carried : Point((g.where - spot.where) / dt);
+    // The load goes over from corner to corner while a body rolls, before one of them comes or goes.
+    const bool stays = spot.features == g.features && calc_turn(now, g).norm() < kRollingSpin;
+    const Point velocity = stays ? g.carried : Point((g.where - spot.where) / dt);
     spot.drift += dt / (dt + kSmooth) * (velocity - g.carried - spot.drift);
     spot.where = g.where;
     spot.features = g.features;

@@ -11,14 +11,16 @@
 namespace carillon::contact {
 namespace {
 
-constexpr double kFullDepth = 4e-6;  // m; a fifth of the depth under the body's own weight
-constexpr double kSlowSpin = 0.05;   // rad/s; below this the rolling resistance fades
+constexpr double kFullDepth = 4e-6;   // m; a fifth of the depth under the body's own weight
+constexpr double kRollingSpin = 1.0;  // rad/s; beyond, the damping fades: who rocks on its corners turns more slowly
+constexpr double kSlowSpin = 0.05;    // rad/s; below this the rolling resistance fades
 
 }  // namespace
 
-double calc_push(const RestingPoint& p, double pressed_m, double parting_m_s) {
+double calc_push(const RestingPoint& p, double pressed_m, double parting_m_s, double turning_rad_s) {
   if (pressed_m <= 0.0) return 0.0;
-  return std::max(0.0, p.stiffness_n_m * pressed_m - p.damping_n_s_m * parting_m_s * std::min(1.0, pressed_m / kFullDepth));
+  const double turns = turning_rad_s / kRollingSpin, damping = p.damping_n_s_m * (0.1 + 0.9 / (1.0 + turns * turns));
+  return std::max(0.0, p.stiffness_n_m * pressed_m - damping * parting_m_s * std::min(1.0, pressed_m / kFullDepth));
 }
 
 void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::SpatialVec>& body_forces, SimTK::Vector_<SimTK::Vec3>&,
@@ -35,13 +37,13 @@ void RestingForce::calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::Sp
     const Vec3 in_a = ~a.getBodyTransform(state) * t.where, in_b = ~b.getBodyTransform(state) * t.where;
     const Vec3 u = a.findStationVelocityInGround(state, in_a) - b.findStationVelocityInGround(state, in_b);
     const double un = dot(u, t.normal);
-    const double push = calc_push(p, t.depth_m - p.offset_m, un);
+    const Vec3 roll = a.getBodyAngularVelocity(state) - b.getBodyAngularVelocity(state);
+    const double push = calc_push(p, t.depth_m - p.offset_m, un, (roll - dot(roll, t.normal) * t.normal).norm());
     if (push <= 0.0) continue;
     const Vec3 slide = u - un * t.normal;
     const Vec3 force = push * t.normal - (p.friction * push / std::max(slide.norm(), kCreep)) * slide;
     a.applyForceToBodyPoint(state, in_a, force, body_forces);
     b.applyForceToBodyPoint(state, in_b, -force, body_forces);
-    const Vec3 roll = a.getBodyAngularVelocity(state) - b.getBodyAngularVelocity(state);
     const Vec3 moment = (-p.rolling_arm_m * push / std::max(roll.norm(), kSlowSpin)) * roll;
     a.applyBodyTorque(state, moment, body_forces);
     b.applyBodyTorque(state, -moment, body_forces);

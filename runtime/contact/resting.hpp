@@ -26,8 +26,9 @@ struct RestingPoint {
   double rolling_arm_m = 0.0;  // rolling resistance: moment per normal force
 };
 
-/// How hard the point pushes [N] when its spring is pressed so much [m] and the bodies part at that speed [m/s] along its normal.
-double calc_push(const RestingPoint& point, double pressed_m, double parting_m_s);
+/// How hard the point pushes [N] when its spring is pressed so much [m] and the bodies part at that speed [m/s] along its normal and
+/// turn against each other at that one: a body that rolls sets its corners down and takes them up, and must not be braked by that.
+double calc_push(const RestingPoint& point, double pressed_m, double parting_m_s, double turning_rad_s);
 
 /// Simbody force element: spring, damper and regularised Coulomb friction and rolling resistance at a list of points that is changed only
 /// between steps.

@@ -140,7 +140,7 @@ TEST(time, settling_stack) {
     hold("settling_stack", static_cast<double>(course.at_end.steps - course.at_half.steps), 0.0,
          part + ", steps of physics after a second");
     hold("settling_stack", course.last_s, 0.1, part + ", last hit [s]");
-    hold("settling_stack", calc_rise_um(course), 0.01, part + ", energy gained, as a height [um]");
+    hold("settling_stack", calc_rise_um(course), 1e-4, part + ", energy gained, as a height [um]");
     hold("settling_stack", std::abs(course.end[3][2] - 0.175), 5e-4, part + ", height of the uppermost [m]");
     hold("settling_stack", std::abs(course.end[3][0]), 2e-4, part + ", way aside of the uppermost [m]");
   }
@@ -186,7 +186,7 @@ TEST(time, spinning_contacts) {
     spec.bodies[0].angular_velocity_rad_s = {0.0, 0.0, 80.0};
     const Course course = run(spec, 3.0, 1.5);
     const std::string part = is_coin ? "coin" : "lump with ears";
-    hold("spinning_contacts", calc_rise_um(course), 0.01, part + ", energy gained, as a height [um]");
+    hold("spinning_contacts", calc_rise_um(course), 1e-4, part + ", energy gained, as a height [um]");
     hold("spinning_contacts", course.at_end.energy.hit_rise_j / course.at_end.energy.kinetic_j, 1e-12, part + ", energy that a hit gave");
     hold("spinning_contacts", course.impulses, 1000.0, part + ", hits");
     hold("spinning_contacts", static_cast<double>(course.at_end.steps), 30000.0, part + ", steps of physics");
@@ -222,7 +222,7 @@ TEST(time, energy) {
   const auto check = [](const std::string& part, const WorldSpec& spec, double end_s) {
     const Course course = run(spec, end_s, 0.5 * end_s, true);
     const contact::EnergyAudit& energy = course.at_end.energy;
-    hold("energy", energy.rise_j / energy.kinetic_j, 1e-5, part + ", gained over the largest of motion");
+    hold("energy", energy.rise_j / energy.kinetic_j, 1e-9, part + ", gained over the largest of motion");
     hold("energy", energy.hit_rise_j / energy.kinetic_j, 1e-12, part + ", given by a hit");
     if (course.impulses > 0) hold("energy", calc_modes_rise(spec, course, end_s), 1e-12, part + ", modes between strikes");
   };
