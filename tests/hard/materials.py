@@ -118,8 +118,8 @@ def hold_rod(case, part, first, second, bound, same):
 
 
 def modulus_contrast():
-    hold_rod("modulus_contrast", "1e6", (1e9, 1000), (1e15, 1000), 1e-5, 1e-8)
-    hold_rod("modulus_contrast", "1e3", (1e9, 1000), (1e12, 1000), 1e-5, 1e-10)
+    hold_rod("modulus_contrast", "1e6", (1e9, 1000), (1e15, 1000), 1e-5, 2e-9)
+    hold_rod("modulus_contrast", "1e3", (1e9, 1000), (1e12, 1000), 1e-5, 1e-11)
 
 
 def density_contrast():
