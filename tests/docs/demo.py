@@ -36,3 +36,12 @@ assert all(count > 0 for count in struck.values()) and len(struck) == 4, struck 
 for picture in ("chute-spectrogram.png", "bunny-modes.png", "chute-path.png"):
     bytes_ = (work / picture).read_bytes()
     assert bytes_[:8] == b"\x89PNG\r\n\x1a\n" and len(bytes_) > 30000, picture
+
+# The books of energy of the same scene: nothing gains any between hits.
+subprocess.run([bin_dir / "carillon-render", "scene.json", "-o", "audited.wav", "--report", "audited.json", "--audit", "--quiet"], cwd=work, check=True)
+energy = json.loads((work / "audited.json").read_text())["energy"]
+print(energy)
+gained = max(energy["rise_j"], energy["hit_rise_j"])
+assert energy["largest_kinetic_j"] > 0.1 and gained <= 1e-7 * energy["largest_kinetic_j"] + 1e-9 * energy["weight_n"], energy
+assert energy["modes_rise"] <= 1e-9, energy
+assert (work / "audited.wav").read_bytes() == (work / "chute.wav").read_bytes(), "keeping books changed the sound"
