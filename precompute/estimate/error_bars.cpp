@@ -12,9 +12,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "precompute/estimate/algebraic.hpp"
+#include "precompute/estimate/order.hpp"
 #include "precompute/estimate/recovery.hpp"
 #include "precompute/petsc/session.hpp"
 
@@ -163,28 +163,6 @@ bool is_curved(MPI_Comm comm, const fem::LocalMesh& local) {
   return curved != 0;
 }
 
-/// The k-th lowest of numbers that lie in intervals around their centres lies between the k-th lowest of all lower and of all upper ends.
-/// Modes above `top_hz`, which nobody computed, may really lie as much lower as the bars of the last quarter are wide.
-std::vector<double> widen_for_order(std::span<const double> lambda, double top_hz, const std::vector<double>& cents) {
-  const std::size_t count = cents.size();
-  const auto to_cents = [&](double l) { return 600 * std::log2(l / lambda[0]); };
-  const double widest = *std::max_element(cents.end() - static_cast<std::ptrdiff_t>((count + 3) / 4), cents.end());
-  const double omega = 2 * std::numbers::pi * top_hz;
-  const double unknown = std::max(to_cents(lambda[count - 1]), top_hz > 0 ? to_cents(omega * omega) : 0.0) - widest;
-  std::vector<double> low(count), high(count), result(count);
-  for (std::size_t m = 0; m < count; ++m) {
-    low[m] = to_cents(lambda[m]) - cents[m];
-    high[m] = to_cents(lambda[m]) + cents[m];
-  }
-  std::sort(low.begin(), low.end());
-  std::sort(high.begin(), high.end());
-  for (std::size_t m = 0; m < count; ++m) {
-    const double centre = to_cents(lambda[m]);
-    result[m] = std::max(centre - std::min(low[m], unknown), high[m] - centre);
-  }
-  return result;
-}
-
 }  // namespace
 
 ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffness, Mat mass, std::span<const Solid> solids,
@@ -196,7 +174,7 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
   Recovery recovery = make_recovery(comm, local, solids, material_of_tet);
   const std::vector<double> sums = calc_sums(comm, local, recovery, mass_kind, solution);
   bars.kind = local.order == 1 ? Kind::kT4 : is_curved(comm, local) ? Kind::kT10Curved : Kind::kT10;
-  std::vector<double> cents;
+  std::vector<double> cents, cents_above;
   for (std::size_t m = 0; m < solution.lambda.size(); ++m) {
     const double* sum = &sums[m * kSums];
     ErrorBars::Parts parts;
@@ -207,8 +185,10 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
     parts.geometry_noise = sum[4];
     bars.parts.push_back(parts);
     cents.push_back(predict_cents(parts, bars.kind));
+    parts.interpolation = 0.0;  // elements that cannot follow a mode are too stiff: the truth lies below
+    cents_above.push_back(predict_cents(parts, bars.kind));
   }
-  bars.discretisation_cents = widen_for_order(solution.lambda, solution.high_hz, cents);
+  bars.discretisation_cents = widen_for_order(solution.lambda, {cents, cents_above}, {solution.high_hz, solution.low_hz, solution.below});
   return bars;
 }
 

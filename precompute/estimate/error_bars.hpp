@@ -28,6 +28,7 @@ struct Solution {
   Mat shapes = nullptr;              // (3n, m) dense, phi^T M phi = 1; null when m is 0
   double low_hz = 0.0;               // ends of the band in which the modes are complete (proven by a count): they close the gaps of the
   double high_hz = 0.0;              // first and the last mode. high_hz: where the list was cut (max_modes), its last frequency
+  std::int64_t below = 0;            // elastic modes below low_hz, counted
 };
 
 /// The kinds of mesh whose errors fall at different rates.
@@ -44,7 +45,8 @@ struct ErrorBars {
   /// what rounding in K leaves open.
   std::vector<double> algebraic_cents;
   /// Between the frequency of K phi = lambda M phi and that of the elastic body: an estimate, safety factor included; holds for the k-th of
-  /// the sorted frequencies, whatever modes change places.
+  /// the sorted frequencies, whatever modes change places, those that are not in the list among them. k counts the elastic modes below the
+  /// band too.
   std::vector<double> discretisation_cents;
 
   /// The parts of the estimate as shares of lambda, without safety factors: for predict_cents() and for people.

@@ -56,7 +56,7 @@ double calc_mean_edge(MPI_Comm comm, const fem::LocalMesh& local) {
 
 /// The largest predicted bar on a mesh with edges `ratio` times as long. A refined mesh file keeps its facets.
 double predict_worst(const estimate::ErrorBars& bars, bool keeps_geometry, double ratio) {
-  double worst = 0.0;
+  double worst = 0.0, widest = 0.0, own = 0.0, own_then = 0.0;
   for (std::size_t k = 0; k < bars.parts.size(); ++k) {
     estimate::ErrorBars::Parts parts = bars.parts[k];
     if (keeps_geometry) {
@@ -65,10 +65,14 @@ double predict_worst(const estimate::ErrorBars& bars, bool keeps_geometry, doubl
       parts.geometry_noise /= rate;
     }
     // What the bar holds beyond its parts (modes that change places) shrinks with them.
-    const double beyond = bars.discretisation_cents[k] / std::max(estimate::predict_cents(bars.parts[k], bars.kind), 1e-300);
-    worst = std::max(worst, std::clamp(beyond, 1.0, 10.0) * estimate::predict_cents(parts, bars.kind, ratio));
+    const double now = estimate::predict_cents(bars.parts[k], bars.kind), then = estimate::predict_cents(parts, bars.kind, ratio);
+    worst = std::max(worst, std::clamp(bars.discretisation_cents[k] / std::max(now, 1e-300), 1.0, 10.0) * then);
+    widest = std::max(widest, bars.discretisation_cents[k]);
+    own = std::max(own, now);
+    own_then = std::max(own_then, then);
   }
-  return worst;
+  // The bars of the last modes follow from the widest, not from their own parts.
+  return own > 0.0 ? std::max(worst, widest / own * own_then) : worst;
 }
 
 /// The longest edges, as a part of those now, that are predicted to meet the goal; nothing above `least` does: `least`.

@@ -141,6 +141,7 @@ estimate::ErrorBars calc_bars(Run& run, const Body& body, const fem::System& sys
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
   estimate::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
                               is_cut ? last_hz : run.job.band_hz[1]};
+  solution.below = std::max<std::int64_t>(0, modes.count_below_low - modes.rigid_count - modes.mechanism_count);
   return estimate::calc_error_bars(run.comm, body.pieces.local, system.stiffness, system.mass, solids, solved.materials.of_tet,
                                    run.job.mass, solution);
 }

@@ -299,7 +299,8 @@ Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t
   const bool cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double begin = find_cpu_s();
   outcome.bars = estimate::calc_error_bars(comm, pieces.local, system.stiffness, system.mass, solids, solid.of_tet, mass,
-                                           {modes.lambda, modes.residual, modes.shapes, low_hz, cut ? outcome.freq_hz.back() : high_hz});
+                                           {modes.lambda, modes.residual, modes.shapes, low_hz, cut ? outcome.freq_hz.back() : high_hz,
+                                            modes.count_below_low - modes.rigid_count - modes.mechanism_count});
   outcome.estimate_cpu_s = find_cpu_s() - begin;
   return outcome;
 }

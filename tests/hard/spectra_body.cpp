@@ -103,7 +103,8 @@ estimate::ErrorBars calc_bars(MPI_Comm comm, const Body& body, const Answer& ans
   const bool is_cut = answer.modes.band_count > static_cast<std::int64_t>(answer.freq_hz.size());
   return estimate::calc_error_bars(
       comm, answer.pieces.local, answer.system.stiffness, answer.system.mass, solids, of_tet, spec::Mass::consistent,
-      {answer.modes.lambda, answer.modes.residual, answer.modes.shapes, options.low_hz, is_cut ? answer.freq_hz.back() : options.high_hz});
+      {answer.modes.lambda, answer.modes.residual, answer.modes.shapes, options.low_hz, is_cut ? answer.freq_hz.back() : options.high_hz,
+       answer.modes.count_below_low - answer.modes.rigid_count - answer.modes.mechanism_count});
 }
 
 std::int64_t count_below(const fem::System& alone, double freq_hz) {

@@ -75,9 +75,9 @@ TEST(spectra, plate_pairs) {
     const Body plate{shapes::make_box({0.1, 0.1, 0.01}, {order == 1 ? 10 : 6, order == 1 ? 10 : 6, 1}, order),
                      {make_solid(200e9, 0.3, 7850)}};
     eigen::Options options = make_band(20, 80e3);
-    options.max_modes = 10;
+    options.max_modes = 14;  // T10 have the pair that is really the 14th and 15th above this cut
     const Answer answer = hold_every_way(id, part, plate, options);
-    hold_bars(id, part, plate, answer, options, read_known("slab", 10));
+    hold_bars(id, part, plate, answer, options, read_known("slab", 14));
     if (order == 2) hold_groups(id, part, answer.freq_hz, 3, {2}, 1e-9);
   }
 }
