@@ -17,8 +17,8 @@ namespace {
 
 double to_lambda(double hz) { return std::pow(2 * std::numbers::pi * hz, 2); }
 
-/// A square plate of one layer of 6 x 6 cells: bending is up to 140 cents too sharp, stretching next to nothing. The pair that is really the 14th and
-/// the 15th lies above a mode of stretching, the 16th.
+/// A square plate of one layer of 6 x 6 cells: bending is up to 140 cents too sharp, stretching next to nothing. The pair that is really
+/// the 14th and the 15th lies above a mode of stretching, the 16th.
 Outcome solve_slab(double high_hz, int max_modes) {
   const mesh::TetMesh mesh = shapes::make_box({0.1, 0.1, 0.01}, {6, 6, 1}, 2);
   Outcome outcome = solve(PETSC_COMM_WORLD, mesh, {}, get_body("slab").materials, false, 20, high_hz, max_modes);
