@@ -60,7 +60,7 @@ def make_parser():
     one.add_argument("--quick", action="store_true", help="meshes of 600 and 1200 nodes, 1 and 2 ranks, one repeat, unless given otherwise")
     one.add_argument("--record", metavar="FILE", help="keep the work per phase (operations, messages, bytes) in this file")
     one.add_argument("--check", metavar="FILE", help="compare the work per phase with this file's, and fail where it has grown by more than 5 %%")
-    one.add_argument("--timeout", type=float, default=3600, help="seconds that one run may take (default: 3600)")
+    one.add_argument("--timeout", type=programs.read_seconds, default=3600, help="seconds that one run may take (default: 3600)")
     one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: beside this program)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error")
     study.add_command(commands, read_count)

@@ -1,10 +1,23 @@
 """The programs that a study starts: given, beside this program, or on the way of commands."""
+import argparse
+import math
 import os
 import pathlib
 import shutil
 import sys
 
 from errors import InputError
+
+
+def read_seconds(text):
+    """Of --timeout."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text!r}: give a number of seconds above 0")
+    return value
 
 
 def find_program(given, name="carillon-precompute"):

@@ -56,7 +56,9 @@ class Study(unittest.TestCase):
 
     def test_report_is_whole(self):
         text = (self.out / "report.md").read_text()
-        self.assertIn("carillon study accuracy --only elements", text)
+        commands = [line.strip() for line in text.splitlines() if line.startswith("    carillon study accuracy")]
+        self.assertEqual(commands, ["carillon study accuracy --quick --on cube ring --only elements -o REPORT",
+                                    *(f"carillon study accuracy --only elements --on {bodies} --quick -o REPORT" for bodies in ("cube", "ring", "cube ring"))])
         self.assertIn("## In words", text)
         for picture in ("elements-cube.svg", "elements-ring.svg"):
             self.assertIn(f"({picture})", text)
@@ -149,12 +151,19 @@ class Study(unittest.TestCase):
         empty = self.folder / "empty"
         empty.mkdir(exist_ok=True)
         cases = {("--on", "cub"): "vibraphone", ("--only", "element"): "elements", ("--on", "bunny", "--surface", "none.obj"): "none.obj", ("--bin", empty): "--bin", ("-o", "file"): "cannot be made",
-                 ("--repeats", "0"): "repeats", ("--fast",): "--fast"}
+                 ("--repeats", "0"): "repeats", ("--fast",): "--fast", ("--timeout", "-1"): "above 0", ("--timeout", "nan"): "above 0", ("--write-advice", "empty"): "empty"}
         for words, expected in cases.items():
             result = call(self.folder, "--quick", *words)
             self.assertEqual((result.returncode, len(result.stderr.strip().splitlines())), (2, 1), f"{words}: {result.stderr}")
             self.assertIn(expected, result.stderr)
             self.assertFalse((self.folder / "accuracy").exists(), words)
+
+    def test_without_numpy_only_the_sections_that_need_it_are_missing(self):
+        for words, code, expected in ((("advise", "--help"), 0, "--cents"), (("accuracy", "--only", "playing"), 2, "python3-numpy")):
+            result = subprocess.run(["/usr/bin/python3", "-S", str(BIN / "carillon-study"), *words], cwd=self.folder, capture_output=True, text=True)  # -S: nothing but the standard library
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(expected, result.stdout + result.stderr)
+            self.assertNotIn("Traceback", result.stderr)
 
     def test_error_of_a_program_is_passed_on_with_its_code(self):
         fakes = self.folder / "fakes"

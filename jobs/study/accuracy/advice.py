@@ -1,6 +1,7 @@
 """Section: the recommendation. For every default of the program the figure that chose it, and what the next stricter and the next looser
 would cost and bring; and the measurements that `carillon study advise` foresees from (advice.json), written anew from a study."""
 import json
+import os
 import statistics
 import time
 
@@ -58,6 +59,16 @@ def make_content(lab, bodies, facts):
             content["truths"][body.name] = {"freq_hz": truth.freq_hz, "uncertainty": truth.uncertainty}
     forecast.Advice(content)  # whoever reads it can
     return content
+
+
+def check_path(path):
+    """InputError where write() could not write."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: cannot be written: {'this is a folder' if path.is_dir() else 'its folder may not be written to'}")
 
 
 def write(lab, bodies, path):

@@ -162,7 +162,7 @@ def describe_level(text, least, cheapest, count):
     seconds = [cost.cpu_s for cost in least]
     spread = f"{min(seconds):.2g} to {max(seconds):.2g} CPU s (median {statistics.median(seconds):.2g} s over {len(seconds)} of {count} bodies)" if len(seconds) > 1 else f"{seconds[0]:.2g} CPU s"
     by_trend = sum(cost.how == "extrapolated" for cost in least)
-    trend = f", {by_trend} of them by the trend of the finest meshes" if by_trend else ""
+    trend = (", by the trend of the finest meshes" if len(least) == 1 else f", {by_trend} of them by the trend of the finest meshes") if by_trend else ""
     return f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {spread}{trend}; cheapest is {', '.join(f'{kind} on {number}' for kind, number in cheapest.most_common())}."
 
 

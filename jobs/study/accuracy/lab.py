@@ -93,11 +93,12 @@ def read_kept(path):
 
 
 class Lab:
-    def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600):
-        """out: the report's folder. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 when quick, else 2."""
+    def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600, on=None):
+        """out: the report's folder. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 when quick, else 2. on: names of --on, where it was given."""
         self.out, self.programs, self.quick = pathlib.Path(out).resolve(), programs, quick
         self.repeats = repeats or (1 if quick else 2)
         self.surface, self.timeout_s = surface, timeout_s
+        self.on, self.asked_repeats = on, repeats  # for the commands in the report
         self.meshes, self.runs = self.out / "work/meshes", self.out / "work/runs"
         try:
             for folder in (self.meshes, self.runs):
@@ -113,8 +114,9 @@ class Lab:
 
     def make_command(self, section, *words):
         """The line that makes a section or a part of it again."""
-        parts = ["carillon", "study", "accuracy", "--only", section, *words, *(["--quick"] if self.quick else []), "-o", "REPORT"]
-        return shlex.join(parts)
+        on = ["--on", *self.on] if self.on and "--on" not in words else []
+        repeats = ["--repeats", str(self.asked_repeats)] if self.asked_repeats else []
+        return shlex.join(["carillon", "study", "accuracy", "--only", section, *words, *on, *repeats, *(["--quick"] if self.quick else []), "-o", "REPORT"])
 
     def find_program(self, name):
         if name not in self.programs:
