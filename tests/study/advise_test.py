@@ -153,12 +153,18 @@ class Program(unittest.TestCase):
         (self.folder / "empty.json").write_text("{}")
         (self.folder / "old.json").write_text('{"format": 0}')
         (self.folder / "wrong.json").write_text(json.dumps(CUBE | {"bnad_hz": [1, 2]}))
+        (self.folder / "lost.json").write_text(json.dumps({"mesh": "gone.msh"}))
+        (self.folder / "none.advice").write_text('{"format": 1, "bodies": {}}')
+        (self.folder / "zero.advice").write_text('{"format": 1, "bodies": {}, "calibration": {"job": {}, "cpu_s": 0}}')
+        (self.folder / "few.advice").write_text('{"format": 1, "bodies": {}, "calibration": {"job": {}, "cpu_s": 1}}')
         cases = {("bar",): "--cents", ("bar", "--cents", "0"): "above 0", ("bar", "--cents", "-3"): "above 0", ("bar", "--cents", "nan"): "above 0", ("bar", "--cents", "five"): "above 0",
                  ("bar", "--seconds", "inf"): "above 0", ("bra", "--cents", "5"): 'did you mean "bar"', ("none.json", "--cents", "5"): "no such file", ("pipe.json", "--cents", "5"): "regular file",
                  ("both.json", "--cents", "5"): "both", ("list.json", "--cents", "5"): "object", ("empty.json", "--cents", "5"): "neither", ("a.txt", "--cents", "5"): "ending",
                  ("bar", "--cents", "5", "--wall", "0.1"): "--wall", ("bar", "--cents", "5", "--advice", "old.json"): "--write-advice", ("bar", "--cents", "5", "--advice", "nothing.json"): "nothing.json",
                  ("bar", "--cents", "5", "--bin", "nowhere"): "--bin", ("box", "--cents", "5", "--band", "5,2"): "20,20000", ("bar", "--cents", "1e-7"): "give --cents", ("bar", "--seconds", "0.001"): "give --seconds",
-                 ("a.msh", "--cents", "5", "--check"): "--check", ("wrong.json", "--cents", "5"): "bnad_hz", (".", "--cents", "5"): "regular file"}
+                 ("a.msh", "--cents", "5", "--check"): "--check", ("wrong.json", "--cents", "5"): "bnad_hz", (".", "--cents", "5"): "regular file", ("bar", "--cents", "5", "--check"): "--check", ("lost.json", "--cents", "5"): "gone.msh",
+                 ("bar", "--cents", "5", "--advice", "none.advice"): "calibration", ("bar", "--cents", "5", "--advice", "zero.advice"): "above 0",
+                 ("box", "--cents", "5", "--advice", "few.advice"): "too few", ("wrong.json", "--cents", "50", "-o", "."): "-o"}
         for words, expected in cases.items():
             done = call(self.folder, *words)
             self.assertEqual(done.returncode, 2, f"{words}: {done.stdout}{done.stderr}")
@@ -169,6 +175,7 @@ class Program(unittest.TestCase):
             self.assertFalse(list(self.folder.glob("advice/*.hdf")), words)
         self.assertEqual(call(self.folder, "bra", "--cents", "5", "-o", "other").returncode, 2)
         self.assertFalse((self.folder / "other").exists())
+        self.assertEqual(json.loads((self.folder / "wrong.json").read_text()), CUBE | {"bnad_hz": [1, 2]})
 
 
 if __name__ == "__main__":

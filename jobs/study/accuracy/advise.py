@@ -1,6 +1,6 @@
 """`carillon study advise BODY --cents 5 [--seconds 10]`: the setting to use, what it will reach and cost, and afterwards what it did.
 
-Bodies of the study are foreseen from what the study measured on them; others from two coarse solves of their own (forecast.Probe). Seconds
+Bodies of the study are foreseen from what the study measured on them; others from coarse solves of their own (forecast.Probe). Seconds
 of another machine are scaled by one small solve that both made.
 """
 import argparse
@@ -34,7 +34,7 @@ PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
 
 @dataclasses.dataclass
 class Outcome:
-    """What the run came to. how: "known" frequencies, a "finer" mesh, or error "bars"."""
+    """What the run came to. how: "known" frequencies, the study's "extrapolated" ones, a "finer" mesh, or error "bars"."""
     cents: float
     mode: int
     bar: float
@@ -51,8 +51,15 @@ class KnownTarget:
     def __init__(self, body, advice):
         self.body, self.name, self.kind, self.has_surface, self.is_round = body, body.name, "study", body.surface, body.round
         self.notes = [f"the study's {body.name}: {body.summary}; its lowest {body.modes} modes"]
-        self.truth_hz = list(body.truth.freq_hz) if body.truth else advice.content.get("truths", {}).get(body.name, {}).get("freq_hz", [])
-        self.truth_text = body.truth.source if body.truth else "the study's finest curved T10, extrapolated"
+        truth = {} if body.truth else advice.content.get("truths", {}).get(body.name, {})
+        self.truth_hz = list(body.truth.freq_hz) if body.truth else truth.get("freq_hz", [])
+        self.how = "known" if body.truth else "extrapolated"
+        self.doubt_cents = max((1200 * math.log2(1 + doubt) for doubt in truth.get("uncertainty", [])), default=0.0)
+        if self.doubt_cents > 1:
+            self.notes.append(f"nobody knows its frequencies: errors are held against the study's finest curved T10, extrapolated, which may be {show(self.doubt_cents)} cents wrong themselves")
+
+    def list_files(self):
+        return []
 
     def make_case(self, lab, setting, name):
         element, _, mass = setting.element.partition(" ")
@@ -68,6 +75,9 @@ class OwnTarget:
         self.target, self.name, self.kind, self.notes, self.truth_hz = target, target.name, target.kind, target.notes, []
         self.has_surface, self.is_round = target.kind == "surface", target.kind != "mesh"
 
+    def list_files(self):
+        return self.target.list_files()
+
     def make_case(self, lab, setting, name):
         return Case(f"{self.name}, {name}", self.target.make_job(setting), setting.ranks)
 
@@ -76,6 +86,11 @@ class Adviser:
     def __init__(self, options, tools, advice):
         self.options, self.advice = options, advice
         self.target = self.find_target(options.body)
+        self.check_folder()
+        if self.target.kind != "study" or self.target.name not in advice.curves:
+            for element in ("T4", "T10") if self.target.kind == "mesh" else ("T10",):
+                if len(advice.find_bar_ratios(element)) < 2:
+                    raise InputError(f"{options.advice}: it has too few meshes of {element} to foresee {self.target.name} from; take the advice of a study of more bodies")
         self.lab = Lab(options.out, tools, repeats=1, surface=options.surface)
         self.lab.say = lambda text: None  # what there is to say is said here
         self.cores = len(os.sched_getaffinity(0))
@@ -88,11 +103,25 @@ class Adviser:
             raise InputError(f"{word}: --check needs a finer mesh, and none can be made of a mesh file here")
         return target
 
+    def check_folder(self):
+        """InputError where what is kept would take the place of what was given."""
+        given = [self.options.body, *self.target.list_files()]
+        for kept in self.find_kept():
+            if kept.exists() and any(os.path.exists(path) and os.path.samefile(kept, path) for path in given):
+                raise InputError(f"{kept}: this was given, and what is kept would take its place; give another folder with -o")
+
+    def find_kept(self):
+        """(job, bank): under the body's name in the folder."""
+        name = pathlib.Path(self.target.name).stem
+        return [pathlib.Path(self.options.out).resolve() / f"{name}.{ending}" for ending in ("json", "hdf")]
+
     def name_target(self, word):
         known = bodies.make_bodies()
         if word in known:
             if self.options.wall or self.options.height or self.options.band:
                 raise InputError(f"{word}: --wall, --height and --band are for bodies of your own; the study's has its own")
+            if self.options.check:
+                raise InputError(f"{word}: --check is for bodies of your own; the study tells the frequencies of its own")
             return KnownTarget(bodies.choose([word], self.options.surface)[0], self.advice)
         target = targets.find_target(word, self.options.wall, self.options.height, self.options.band)
         if target is None:
@@ -237,7 +266,7 @@ class Adviser:
         bar = max(bars)
         if self.target.truth_hz:
             errors = [abs(1200 * math.log2(f / true)) for f, true in zip(solve.freq_hz, self.target.truth_hz)]
-            how = "known"
+            how = self.target.how
         elif self.options.check:
             finer = self.solve(dataclasses.replace(setting, nodes=round(CHECK_GROWTH * setting.nodes)), "finer mesh, to check")
             slope = self.probe.find_slope(*self.probe.trials[-2:]) if self.probe else 4 / 3
@@ -253,12 +282,11 @@ class Adviser:
 
     def keep(self, solve):
         """The job and its bank, under the body's name in the folder."""
-        name = pathlib.Path(self.target.name).stem
-        bank = self.lab.out / f"{name}.hdf"
-        job = json.loads((solve.bank.parent / "job.json").read_text()) | {"bank": bank.name}
+        file, bank = self.find_kept()
+        content = json.loads((solve.bank.parent / "job.json").read_text()) | {"bank": bank.name}
         shutil.copyfile(solve.bank, bank)
-        (self.lab.out / f"{name}.json").write_text(json.dumps(job, indent=1) + "\n")
-        return self.lab.out / f"{name}.json", bank
+        file.write_text(json.dumps(content, indent=1) + "\n")
+        return file, bank
 
 
 def find_bars(solve):
@@ -267,7 +295,7 @@ def find_bars(solve):
 
 # --- what is said
 
-HOW = {"known": "against frequencies that are known without a mesh", "finer": "against a finer mesh, what that one is wrong itself made up for", "bars": "by its error bars over the factor by which such bars are too long"}
+HOW = {"known": "against frequencies that are known without a mesh", "extrapolated": "against the study's finest curved T10, extrapolated", "finer": "against a finer mesh, what that one is wrong itself made up for", "bars": "by its error bars over the factor by which such bars are too long"}
 
 
 def show(cents):
@@ -330,8 +358,8 @@ def read_packed_advice(path=None):
     mend = "carillon study accuracy --write-advice FILE writes one"
     try:
         return forecast.read_advice(scaling.read_text(path, "advice", mend))
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise InputError(f"{path}: {error}; {mend}") from None
+    except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
+        raise InputError(f"{path}: {f'{error} is missing' if isinstance(error, KeyError) else error}; {mend}") from None
 
 
 def run(options):
@@ -379,8 +407,8 @@ def read_band(text):
 def add_command(commands):
     one = commands.add_parser("advise", help="the setting to use for so many cents or seconds, what it will reach and cost, and afterwards what it did",
                               description="Says which element, mass, mesh size, tolerance and ranks to use for a body, with the error and the CPU seconds to expect, then solves it so and says what "
-                              "they were. Bodies of the study are foreseen from its measurements; others are tried on two coarse meshes first.")
-    one.add_argument("body", metavar="BODY", help=f"a body of the study ({', '.join(bodies.make_bodies())}), a shape ({', '.join(targets.SHAPES)}), a job (.json), a surface (.obj .stl .ply .off) or a mesh file; "
+                              "they were. Bodies of the study are foreseen from its measurements; others are tried on coarse meshes first.")
+    one.add_argument("body", metavar="BODY", help=f"a body of the study ({', '.join(bodies.make_bodies())}), a shape ({', '.join(name for name in targets.SHAPES if name not in bodies.make_bodies())}), a job (.json), a surface (.obj .stl .ply .off) or a mesh file; "
                      "steel where no material is given")
     one.add_argument("--cents", type=read_positive(MOST_CENTS, "cents"), metavar="C", help="the largest error that any frequency of the band may have")
     one.add_argument("--seconds", type=read_positive(MOST_SECONDS, "CPU seconds"), metavar="S", help="CPU seconds, of all ranks, that the solve may take (trials and calibration beside it)")

@@ -212,6 +212,10 @@ def read_advice(text):
     content = json.loads(text)
     if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("bodies"), dict):
         raise ValueError(f"no advice of format {FORMAT}")
+    calibration = content["calibration"]
+    numbers = [calibration["cpu_s"], *(row[key] for rows in content["bodies"].values() for row in rows for key in ("nodes", "unknowns", "modes", "cpu_s", "worst_cents", "bar_cents"))]
+    if not isinstance(calibration["job"], dict) or not all(isinstance(number, (int, float)) and 0 < number < math.inf for number in numbers):
+        raise ValueError("what was measured is no number above 0")
     return Advice(content)
 
 

@@ -17,6 +17,10 @@ class Target:
     def __init__(self, name, template, kind, notes=()):
         self.name, self.template, self.kind, self.notes = name, template, kind, list(notes)
 
+    def list_files(self):
+        """The files that the job names."""
+        return [file for file in (self.template.get("mesh"), self.template.get("body", {}).get("surface")) if file]
+
     def make_job(self, setting):
         job = copy.deepcopy(self.template)
         element, _, mass = setting.element.partition(" ")
@@ -57,7 +61,7 @@ def find_file(path, ending):
         return Target(path.name, {"body": {"surface": full}, "material": STEEL}, "surface", [STEEL_TEXT])
     if ending in MESHES:
         return Target(path.name, {"mesh": full, "material": STEEL}, "mesh", [STEEL_TEXT])
-    raise InputError(f"{path}: the ending tells what a file is, and {ending or 'none'!r} is none of a job (.json), a surface ({', '.join(SURFACES)}) or a mesh ({', '.join(MESHES[:4])} ...)")
+    raise InputError(f"{path}: the ending tells what a file is, and {repr(ending) if ending else 'this one has none, which'} is none of a job (.json), a surface ({', '.join(SURFACES)}) or a mesh ({', '.join(MESHES[:4])} ...)")
 
 
 def find_job(path):
@@ -88,4 +92,7 @@ def find_job(path):
 def resolve(job_file, folder, path):
     if not isinstance(path, str):
         raise InputError(f"{job_file}: {path!r} is no path")
-    return str((folder / path).resolve())
+    found = (folder / path).resolve()
+    if not found.is_file():
+        raise InputError(f"{job_file}: {path}: {'this is no regular file' if found.exists() else 'there is no such file'} (paths are from the job's folder)")
+    return str(found)
