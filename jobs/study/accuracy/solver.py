@@ -128,8 +128,8 @@ class Solver:
         first, last = data[1], data[-1]
         power = math.log(last[3] / first[3]) / math.log(last[1] / first[1])
         self.facts["modes"] = {"power": power}
-        self.page.conclude(f"**Modes**: {last[1] / first[1]:.0f} times as many ({first[1]} to {last[1]}) take {last[3] / first[3]:.1f} times the CPU time on one mesh (power {power:.2f}), but the highest are "
-                           f"{last[8] / first[8]:.0f} times as wrong: it is the mesh that they need, not the solver, which makes a wide band dear.")
+        self.page.conclude(f"**Modes**: {last[1] / first[1]:.0f} times as many ({first[1]} to {last[1]}) take {last[3] / first[3]:.1f} times the CPU time on one mesh (power {power:.2f}), but the error bar of the worst is "
+                           f"{last[8] / first[8]:.0f} times as long: it is the mesh that they need, not the solver, which makes a wide band dear.")
 
     # --- ranks
 
@@ -155,7 +155,9 @@ class Solver:
         self.facts["ranks"] = {ranks: {"cpu": sum(c for c, _ in values) / len(values), "wall": sum(w for _, w in values) / len(values), "crowded": ranks > cores} for ranks, values in ratios.items()}
         two = self.facts["ranks"][2]
         self.page.conclude(f"**Ranks** change no frequency by more than {show(moved, 2)} cents; two take {two['cpu']:.2f} times the CPU seconds of one and {two['wall']:.2f} times its wall clock here, for solves of "
-                           f"{min(row[3] for row in data[1:]):.1f} to {max(row[3] for row in data[1:] if row[1] == 1):.1f} CPU s.")
+                           f"{min(row[3] for row in data[1:]):.1f} to {max(row[3] for row in data[1:] if row[1] == 1):.1f} CPU s."
+                           + (f" The machine had other work besides (a load of {self.lab.load_start:.1f} on {cores} core{'s' if cores > 1 else ''} when the study began): the wall clock tells little of the ranks."
+                              if self.lab.load_start > 0.5 * cores else ""))
 
     # --- ordering and factorisation
 
