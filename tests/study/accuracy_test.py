@@ -207,6 +207,7 @@ class Parts(unittest.TestCase):
             self.assertAlmostEqual(cost.cpu_s, seconds, 9)
             self.assertEqual(cost.how, how)
         self.assertIsNone(cents.find_cost(points, 0.1))
+        self.assertEqual([cents.is_known(cents.Truth((100.0, 200.0), (0.001, 0.01), ""), level) for level in (1, 10, 17.2, 17.3)], [False, False, False, True])
         slow_start = [cents.Point("x", 1, 1, elements, 1.0 + elements * 1e-6, 0, [1000.0 / elements]) for elements in (10, 100, 1000)]
         self.assertGreater(cents.find_cost(slow_start, 0.1).cpu_s, 15)  # ten times the elements: more than ten times the seconds
 

@@ -97,10 +97,10 @@ def find_best_t10(body):
 
 
 def find_costs(results, level):
-    """{kind or "T10": {body: CPU seconds}} for the worst mode within so many cents; "T10" are those that suit the body."""
+    """{kind or "T10": {body: CPU seconds}} for the worst mode within so many cents, of bodies whose truth is known so well; "T10" are those that suit the body."""
     costs = {}
-    for body, points, _ in results:
-        for kind in body.get_kinds():
+    for body, points, truth in results:
+        for kind in body.get_kinds() if cents.is_known(truth, level) else ():
             cost = cents.find_cost([point for point in points if point.kind == kind.name], level)
             if cost:
                 costs.setdefault("T10" if kind.name == find_best_t10(body) else kind.name, {})[body.name] = cost.cpu_s
@@ -113,13 +113,16 @@ def recommend_element(results, today):
     t10 = ear.get("T10", {})
     wins = [body for body in t10 if body not in linear or t10[body] <= LITTLE * linear[body]]
     ratios = [linear[body] / t10[body] for body in linear if body in t10]
-    figure = f"{TRAINED_EAR:g} cents: T10 are the cheapest on {len(wins)} of {len(results)} bodies"
+    told = sum(cents.is_known(truth, TRAINED_EAR) for _, _, truth in results)  # bodies
+    if not told:
+        return None
+    figure = f"{TRAINED_EAR:g} cents: T10 are the cheapest on {len(wins)} of {told} bod{'ies' if told != 1 else 'y'}"
     figure += f"; T4 take {median(ratios):.2g} times as long (median of the {len(ratios)} where they get there)" if ratios else "; T4 get there on none"
     stricter = median(one["T10"][body] / t10[body] for body in t10 if body in one.get("T10", {}))
     rough = [min(semitone[kind][body] for kind in ("T4 consistent", "T4 lumped") if body in semitone.get(kind, {})) / semitone["T10"][body]
              for body in semitone.get("T10", {}) if any(body in semitone.get(kind, {}) for kind in ("T4 consistent", "T4 lumped"))]
     looser = f"T4 for a semitone: {say_times(median(rough))} of T10" if rough else "T4 for a semitone: out of reach"
-    return ("element", today["element"], figure, f"T10 to 1 cent: {say_times(stricter)} of {TRAINED_EAR:g} cents", looser, (today["element"] == "T10") == (2 * len(wins) > len(results)))
+    return ("element", today["element"], figure, f"T10 to 1 cent: {say_times(stricter)} of {TRAINED_EAR:g} cents", looser, (today["element"] == "T10") == (2 * len(wins) > told))
 
 
 def recommend_sides(results):

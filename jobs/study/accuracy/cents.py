@@ -103,6 +103,11 @@ class Cost:
         return f"{sign}{self.cpu_s:.2g}" if self.cpu_s < 100 else f"{sign}{self.cpu_s:.0f}"
 
 
+def is_known(truth, cents):
+    """Whether the truth is known well enough, in all its modes, to tell an error of so many cents."""
+    return to_cents(1 + max(truth.uncertainty), 1) <= cents
+
+
 LEAST_GROWTH = 1.2  # of CPU seconds with the number of elements; on small meshes the start of the program hides it
 
 

@@ -81,10 +81,10 @@ def expect_rate(body, kind):
     return 4 if kind.curved or not body.round else 2
 
 
-def describe_cost(points, kinds):
-    """The cheapest element for each level, as a sentence; "" without one."""
+def describe_cost(points, kinds, truth):
+    """The cheapest element for each level that the truth can tell, as a sentence; "" without one."""
     parts = []
-    for level, text in reversed(LEVELS):
+    for level, text in reversed([(level, text) for level, text in LEVELS if cents.is_known(truth, level)]):
         costs = {kind.name: cents.find_cost([point for point in points if point.kind == kind.name], level) for kind in kinds}
         costs = {name: cost for name, cost in costs.items() if cost}
         if costs:
@@ -102,7 +102,7 @@ def study_body(section, lab, body, solves):
         section.say(remark)
     draw(section, body, points, command)
     add_table(section, body, points, command)
-    cost = describe_cost(points, body.get_kinds())
+    cost = describe_cost(points, body.get_kinds(), truth)
     if cost:
         section.say(f"{body.name[0].upper()}{body.name[1:]}: the worst of {len(points[0].cents)} modes within {cost}. (≤: its coarsest mesh is better than that; ~: its finest is worse, by its trend.)")
     return points, truth
@@ -135,11 +135,12 @@ def add_costs(section, lab, results):
     data = [("body", "element", "cents", "cpu_s", "how")]
     cheapest = {level: collections.Counter() for level, _ in LEVELS}
     table = {}
-    for body, points, _ in results:
+    for body, points, truth in results:
         best = {}
         for kind in body.get_kinds():
-            costs = [cents.find_cost([point for point in points if point.kind == kind.name], level) for level, _ in LEVELS]
-            rows.append((body.name, kind.name, *(str(cost) if cost else "out of reach" for cost in costs)))
+            own = [point for point in points if point.kind == kind.name]
+            costs = [cents.find_cost(own, level) if cents.is_known(truth, level) else None for level, _ in LEVELS]
+            rows.append((body.name, kind.name, *(str(cost) if cost else "out of reach" if cents.is_known(truth, level) else "not told" for cost, (level, _) in zip(costs, LEVELS))))
             for (level, _), cost in zip(LEVELS, costs):
                 if cost:
                     data.append((body.name, kind.name, level, cost.cpu_s, cost.how))
@@ -149,7 +150,7 @@ def add_costs(section, lab, results):
         for level, (_, name) in best.items():
             cheapest[level][name] += 1
     section.add_table("costs", rows, "CPU seconds for the worst mode of the band to be as near as that (≤: the coarsest mesh is better; ~: the finest is worse, by its trend; out of reach: more than thirty times "
-                      "as wrong, or errors that do not fall).", data, lab.make_command("elements"))
+                      "as wrong, or errors that do not fall; not told: the truth itself is less certain than that).", data, lab.make_command("elements"))
     names = [body.name for body, _, _ in results]
     for level, text in LEVELS:
         least = [min(costs, key=lambda cost: cost.cpu_s) for name in names if (costs := [cost for key, cost in table.items() if key[0] == name and key[2] == level])]
