@@ -62,7 +62,7 @@ def format_html(sections, setting, machine, findings):
             if item.kind == "text":
                 out.append(f"<p>{to_inline(item.text)}</p>")
                 continue
-            if item.command != shown:
+            if item.kind == "chart" or item.command != shown:
                 out.append(f"<pre>{html.escape(item.command)}</pre>")
                 shown = item.command
             if item.kind == "chart":

@@ -47,7 +47,7 @@ class Section:
         lines = [f"## {self.title}", ""]
         shown = None
         for item in self.items:
-            if item.kind != "text" and item.command != shown:
+            if item.kind == "chart" or (item.kind == "table" and item.command != shown):
                 lines += [f"    {item.command}", ""]
                 shown = item.command
             if item.kind == "text":
