@@ -122,14 +122,19 @@ Inertia InertiaCounter::take(double lambda, double reach, Want want) {
     if (try_around(lambda, reach)) return taken_.back();
   while (true) {
     if (try_around(lambda, reach)) return taken_.back();
-    if (uses_mumps_ || options_.factorisation == Factorisation::kLdlt) break;
-    uses_mumps_ = true;  // It pivots across fronts: slower, and stable where ours is not.
-    release();
+    if (!turn_to_mumps()) break;
   }
   throw SolveError(
       fmt::format("K - sigma M is singular all around {:.6g} Hz: the mesh has nodes without mass or stiffness, or the mass matrix is "
                   "not positive definite.",
                   to_hz_(lambda)));
+}
+
+bool InertiaCounter::turn_to_mumps() {
+  if (uses_mumps_ || options_.factorisation == Factorisation::kLdlt) return false;
+  uses_mumps_ = true;
+  release();
+  return true;
 }
 
 ShiftedFactor& InertiaCounter::stand_at(double sigma) {

@@ -40,6 +40,9 @@ class InertiaCounter {
   ShiftedFactor& get_factor();
   /// The factor where the last take left it; null if none stands.
   ShiftedFactor* find_standing() { return stands_ ? factor_.get() : nullptr; }
+  /// The next factor is one that pivots across fronts: slower, and stable where ours is not. False if it does already, or the options
+  /// forbid it. Frees the factor. Collective.
+  bool turn_to_mumps();
   /// Frees the factor; the next take makes another. Collective.
   void release() {
     factor_.reset();

@@ -96,15 +96,17 @@ void normalise(const Operators& operators, const Columns& x, const Columns& work
 
 // The factor at a shift below the group, `nearness` away relative to lambda. Returns the shift.
 double stand_below(const RefineRequest& request, const Group& group, double nearness, const std::vector<double>& lambda, RefineCost& cost) {
-  ShiftedFactor& factor = request.get_factor();
-  double sigma = lambda[group.front()] * (1 - nearness);
-  constexpr int kNudges = 5;
-  for (int i = 0; !factor.factorise(sigma); ++i) {
-    if (i == kNudges) throw SolveError("K - sigma M is singular all around a mode: the mesh has nodes without mass or stiffness.");
-    sigma -= 1e-2 * nearness * lambda[group.front()];
-  }
-  ++cost.factorisations;
-  return sigma;
+  constexpr int kShifts = 6;
+  const double low = lambda[group.front()];
+  do {
+    ShiftedFactor& factor = request.get_factor();
+    for (int i = 0; i < kShifts; ++i) {
+      const double sigma = low * (1 - nearness * (1 + 1e-2 * i));
+      ++cost.factorisations;
+      if (factor.factorise(sigma)) return sigma;
+    }
+  } while (request.turn_stable && request.turn_stable());
+  throw SolveError("K - sigma M is singular all around a mode: the mesh has nodes without mass or stiffness.");
 }
 
 // The modes of a group, and what they have to be mended by: (K - sigma M)^-1 (K phi - lambda M phi), with the factor that stands.

@@ -17,6 +17,7 @@ struct RefineRequest {
   double tolerance = 1e-8;                     // of the relative residual
   ShiftedFactor* at_hand = nullptr;            // a factor that stands, of any shift in or near the band: tried first; may be null
   std::function<ShiftedFactor&()> get_factor;  // L D L^T of any shift; asked for only when a mode needs it
+  std::function<bool()> turn_stable;           // makes get_factor's one that pivots more; false when there is none. May be empty
 };
 
 struct RefineCost {

@@ -45,6 +45,9 @@ constexpr double kSurelyApart = 1e-6;    // Modes farther apart than this, relat
 constexpr double kEdgeTolerance = 1e-9;  // A mode this close to an end of the band (relative to lambda) is in it.
 constexpr double kSafeMargin = 1e-7;     // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
 constexpr double kDenseRounding = 1e4;   // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
+constexpr double kDenseStill = 1e3;      // Of the same: eigenvalues below are zero as far as LAPACK can tell,
+constexpr double kStill = 1e2;           // or a count by inertia.
+constexpr double kSlow = 1e-4;           // Of the band's lower end: no mechanism is faster.
 constexpr int kRounds = 60;              // Krylov runs per interval at most until its count is met,
 constexpr int kIdleRounds = 2;           // and so many without a new mode.
 constexpr double kLockedMargin = 0.5;    // Of a slice's width: modes found that near are held away (818 modes: 2,181 solves, at 0.1 2,272).
@@ -77,7 +80,7 @@ class BandSolver {
  private:
   Modes solve_band();
   std::string explain() const;
-  double find_fastest() const;
+  void find_fastest();
   bool is_dense_exact() const;
   void solve_dense_band();
   void make_counter();
@@ -123,6 +126,7 @@ class BandSolver {
   Scaling scaling_;
   double low_ = 0;  // scaled lambda, the band's ends
   double high_ = 0;
+  double fastest_ = 0;          // about the greatest eigenvalue
   double sought_to_ = 0;        // the end of the last slice
   std::vector<double> others_;  // modes found and not taken: outside the band, or beyond max_modes
   std::vector<petsc::VecHandle> rigid_;
@@ -152,20 +156,18 @@ void BandSolver::report(Phase phase, std::int64_t done, std::int64_t more_solves
                      factor.factorisations, factor.solves + more_solves});
 }
 
-/// About the greatest eigenvalue. Collective.
-double BandSolver::find_fastest() const {
-  double fastest = 0;
+/// Collective.
+void BandSolver::find_fastest() {
   for (std::size_t i = 0; i < operators_->stiffness_diagonal.size(); ++i)
-    fastest = std::max(fastest, operators_->stiffness_diagonal[i] / operators_->mass_diagonal[i]);
-  MPI_Allreduce(MPI_IN_PLACE, &fastest, 1, MPI_DOUBLE, MPI_MAX, comm_);
-  return fastest;
+    fastest_ = std::max(fastest_, operators_->stiffness_diagonal[i] / operators_->mass_diagonal[i]);
+  MPI_Allreduce(MPI_IN_PLACE, &fastest_, 1, MPI_DOUBLE, MPI_MAX, comm_);
 }
 
 /// What makes an error of the solve likely, as a sentence for the user: rounding in K moves squared frequencies by about its epsilon times
-/// the greatest.
+/// the greatest. Not collective: an error may be one rank's alone.
 std::string BandSolver::explain() const {
   constexpr double kSafe = 30;  // times that rounding, squared frequencies keep their digits
-  const double rounding = PETSC_MACHINE_EPSILON * find_fastest();
+  const double rounding = PETSC_MACHINE_EPSILON * fastest_;
   if (low_ > kSafe * rounding) return {};
   return fmt::format(
       " The body is so thin, or its elements so small, that rounding in K alone moves its squared frequencies by ({:.2g} Hz)^2: let the "
@@ -192,6 +194,7 @@ Modes BandSolver::solve_band() {
       rigid_ = make_rigid_modes(problem_.stiffness, problem_.mass, problem_.nodes, modes_.proof.rigid_per_component);
       modes_.rigid_count = static_cast<std::int64_t>(rigid_.size());
       operators_ = std::make_unique<Operators>(problem_.stiffness, problem_.mass);
+      find_fastest();
     }
     if ((n_ <= kDenseRows || options_.method == Method::kDense) && is_dense_exact()) {
       solve_dense_band();
@@ -207,7 +210,7 @@ Modes BandSolver::solve_band() {
 }
 
 // Whether the lowest eigenvalue of the band stands out of what LAPACK's rounding, a part of the largest of all, does to every one.
-bool BandSolver::is_dense_exact() const { return low_ > kDenseRounding * PETSC_MACHINE_EPSILON * find_fastest(); }
+bool BandSolver::is_dense_exact() const { return low_ > kDenseRounding * PETSC_MACHINE_EPSILON * fastest_; }
 
 void BandSolver::solve_dense_band() {
   check_memory(comm_, calc_dense_bytes(n_), options_.memory_limit_bytes, "The dense solve");
@@ -232,7 +235,7 @@ void BandSolver::solve_dense_band() {
   }
   modes_.count_below_low = count_under(low);
   modes_.band_count = count_under(high) - modes_.count_below_low;
-  modes_.mechanism_count = count_under(low_ * 1e-4) - modes_.rigid_count;
+  modes_.mechanism_count = std::max<std::int64_t>(0, count_under(kDenseStill * PETSC_MACHINE_EPSILON * fastest_) - modes_.rigid_count);
   Proof& proof = modes_.proof;
   proof.found = modes_.band_count;
   proof.method = fmt::format("all {} eigenvalues of the dense problem (LAPACK dsygvd), counted", n_);
@@ -256,8 +259,11 @@ Slice BandSolver::count_band() {
                     band.below_low, to_hz(band.low), band.below_high, to_hz(band.high), modes_.rigid_count));
   }
   if (band.below_low > modes_.rigid_count) {
-    const Inertia still = take(low_ * 1e-4, 1e-6, Want::kHereOrAbove);
-    modes_.mechanism_count = std::min(still.below, band.below_low) - modes_.rigid_count;
+    constexpr double kReach = 1e-6;
+    const double slow = kSlow * low_;
+    const Inertia still = take(std::min(slow, kStill * PETSC_MACHINE_EPSILON * fastest_), kReach, Want::kHereOrAbove);
+    // Where rounding hides what is so slow, slow modes would be taken for mechanisms.
+    if (still.lambda <= slow * (1 + kReach)) modes_.mechanism_count = std::max<std::int64_t>(0, still.below - modes_.rigid_count);
     if (still.lambda != band.low) counter_->forget(still.lambda);
   }
   modes_.band_count = band.count();
@@ -592,6 +598,7 @@ RefineRequest BandSolver::make_refine_request(double tolerance) {
     if (counter_ == nullptr) make_counter();
     return counter_->get_factor();
   };
+  request.turn_stable = [this] { return counter_->turn_to_mumps(); };
   return request;
 }
 

@@ -142,7 +142,9 @@ struct Modes {
   std::int64_t rigid_count = 0;      // dimension of the rigid subspace, all components; deflated, not in lambda
   std::int64_t count_below_low = 0;  // eigenvalues below the band: rigid modes, mechanisms and modes below low_hz
   std::int64_t band_count = 0;       // modes the band holds, by inertia; more than lambda.size() only if max_modes cut it
-  std::int64_t mechanism_count = 0;  // of count_below_low: neither rigid nor audible to 1e-4 low_hz (parts that hang on a point or an edge)
+  /// Of count_below_low: not rigid, and zero as far as rounding can tell (parts that hang on a point or an edge). None where rounding
+  /// reaches so near the band that slow modes pass for such.
+  std::int64_t mechanism_count = 0;
   Proof proof;
   FactorStatistics factor;
   Seconds seconds;

@@ -167,7 +167,7 @@ double calc_diagonal(const mesh::CheckReport& check) {
 /// A body of which the fundamental is not heard is seldom what was meant; most often its mesh is in millimetres.
 void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
   const std::int64_t below = modes.count_below_low - modes.rigid_count - modes.mechanism_count;
-  if (below <= 0) return;
+  if (below <= 0 || find_low_hz(run.job, modes) > run.job.band_hz[0]) return;
   run.stations.warn(
       fmt::format("the fundamental is out of the band: {} mode{} below the band, which begins at {:g} Hz; the body measures {:.3g} m "
                   "across: if its mesh is in millimetres, scale it by 0.001",
