@@ -202,7 +202,7 @@ def describe_difference(difference):
 
 
 def describe_knob(knob, turns):
-    """What the default is worth against the most accurate and the cheapest setting that nobody tells apart."""
+    """What the default is worth against the most accurate and the loosest setting that nobody tells apart."""
     best, usual = turns[0], find_turn(turns, knob.default)
     cheap = None
     for one in turns[1:]:
@@ -216,10 +216,10 @@ def describe_knob(knob, turns):
         text = (f"{knob.title} (`{knob.key}`): the default, {format_setting(knob.default)}, takes {usual.cpu_ms:.2f} ms of {what} for a second where the most accurate one, {format_setting(best.setting)}, takes "
                 f"{best.cpu_ms:.2f}, and {describe_difference(usual.difference)}")
     if cheap is None:
-        return text + "; every cheaper setting is told apart."
+        return text + "; every looser setting is told apart."
     if cheap is usual:
-        return text + "; it is the cheapest that nobody tells apart."
-    return text + f"; the cheapest that nobody tells apart is {format_setting(cheap.setting)}, {cheap.cpu_ms:.2f} ms, {sounds.format_db(cheap.difference.error_db)} dB(A)."
+        return text + "; it is the loosest that nobody tells apart."
+    return text + f"; the loosest that nobody tells apart is {format_setting(cheap.setting)}, {cheap.cpu_ms:.2f} ms, {sounds.format_db(cheap.difference.error_db)} dB(A)."
 
 
 def add_knob(section, knob, turns):
