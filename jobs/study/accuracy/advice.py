@@ -273,7 +273,7 @@ def study(lab, bodies):
     if banks.NAME in lab.found:
         add_defaults(page, "bank", "Defaults of the bank (section banks).", recommend_modes(lab.found[banks.NAME]))
     if playing.NAME in lab.found:
-        add_defaults(page, "runtime", "Defaults of the runtime (section playing).", [recommend_knob(knob, turns) for knob, turns in lab.found[playing.NAME]])
+        add_defaults(page, "runtime", f"Defaults of the runtime (section playing). One agrees when nobody tells it from the most accurate setting and no more than one looser setting that nobody tells either would save {WORTH_MS:g} ms of CPU for a second.", [recommend_knob(knob, turns) for knob, turns in lab.found[playing.NAME]])
     else:
         page.say("Defaults of bank and runtime: `--only banks playing advice`.")
     write(lab, bodies, lab.out / "advice.json")
