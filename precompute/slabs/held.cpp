@@ -92,7 +92,7 @@ void find_held_boxes(MPI_Comm comm, const std::string& name, const Wish& wish, S
   const double slack = mesh::calc_place_tolerance(low, high);
   for (const Hold& hold : wish.hold) {
     if (!hold.box_m) continue;
-    const auto& [from, to] = *hold.box_m;
+    const std::array<double, 3>&from = hold.box_m->at(0), &to = hold.box_m->at(1);  // clang 14 takes no binding into a lambda
     std::int64_t count = 0;
     for (std::size_t i = 0; i < slab.nodes_m.size(); ++i) {
       bool is_in = true;
