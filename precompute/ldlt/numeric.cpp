@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <new>
 #include <numeric>
@@ -82,10 +81,10 @@ class Factoriser {
     point_at_columns();
     for (std::int32_t i = 0; i < front.width; ++i) where_[front.first + i] = i;
     for (std::size_t i = 0; i < front.rows.size(); ++i) where_[front.rows[i]] = front.width + static_cast<std::int32_t>(i);
-    std::memset(columns_.data(), 0, sizeof(double) * static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_));
+    std::fill_n(columns_.data(), static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_), 0.0);
     double* panels = numbers_.panels.data() + numbers_.front_offsets[s];
     if (front.is_interface) {
-      std::memset(update_, 0, sizeof(double) * static_cast<std::size_t>(count_update(r_)));
+      std::fill_n(update_, count_update(r_), 0.0);  // none where nothing is updated
       add_blocks(front);
       for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kAll);  // the last one lies on top
       for (std::size_t c = 0; c < front.remote_children.size(); ++c) add_remote_child(front.remote_children[c], remote_[s][c]);
