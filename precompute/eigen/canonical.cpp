@@ -1,12 +1,11 @@
-// Method:     Modes that agree to the tolerance may be mixtures of such as do not agree to rounding. Their span is far more exact than they
-//             are: Rayleigh and Ritz in it, of K - mean M, so that differences keep their digits, part what can be told apart
+// Method:     Modes that agree to the tolerance may be mixtures of such as do not agree to rounding. Their span is far more exact than
+//             they are: Rayleigh and Ritz in it, of K - mean M, so that differences keep their digits, part what can be told apart
 //             (split_groups). In the span of what is left, a cluster Phi, the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with
 //             smooth weights w_d of no symmetry, has eigenvectors that depend on the span alone. Phi times these, by ascending eigenvalue,
 //             is the basis. If two eigenvalues of one form nearly coincide, another form is taken: the first of a fixed list that parts
 //             them well, or the best of the list.
 // Source:     Stewart, Sun, Matrix perturbation theory, 1990, chapter V: an eigenvector moves by the perturbation over the gap. Parlett,
-// The
-//             symmetric eigenvalue problem, 1998, section 11.4 (what Rayleigh and Ritz make of a span).
+//             The symmetric eigenvalue problem, 1998, section 11.4 (what Rayleigh and Ritz make of a span).
 // Deviations: none.
 #include "precompute/eigen/canonical.hpp"
 

@@ -1,6 +1,5 @@
 // Method:     Cholesky of M, L^-1 K L^-T to tridiagonal form, divide and conquer. Every rank solves the same gathered matrices and keeps
-// its
-//             rows.
+//             its rows.
 // Source:     Golub, Van Loan, Matrix Computations, sections 8.4 and 8.7; LAPACK's dsygvd (five times as fast as the QR of dsygv).
 // Deviations: none.
 #include "precompute/eigen/dense_modes.hpp"

@@ -1,10 +1,9 @@
 // Method:     Sylvester's law of inertia: A = K - sigma M = L D L^T has as many negative pivots as there are eigenvalues below sigma.
-// Rounding
-//             of K moves the eigenvalues of rigid motions, R, off zero to either side, and past a sigma as small. Counted is then what
-//             there is beside them: A on the vectors M-orthogonal to R has n(A) + n(S) - dim R negative eigenvalues, n(A) those of A and
-//             n(S) those of S = -(M R)^T A^-1 M R, by the inertia of [A, M R; (M R)^T, 0] taken apart in two ways.
-// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3; Haynsworth, Linear Algebra Appl. 1, 1968 (inertia is additive);
-//             Gould, Math. Program. 32, 1985 (inertia on a subspace).
+//             Rounding of K moves the eigenvalues of rigid motions, R, off zero to either side, and past a sigma as small. Counted is then
+//             what there is beside them: A on the vectors M-orthogonal to R has n(A) + n(S) - dim R negative eigenvalues, n(A) those of A
+//             and n(S) those of S = -(M R)^T A^-1 M R, by the inertia of [A, M R; (M R)^T, 0] taken apart in two ways.
+// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3; Haynsworth, Linear Algebra Appl. 1, 1968 (inertia is
+//             additive); Gould, Math. Program. 32, 1985 (inertia on a subspace).
 // Deviations: none.
 #include "precompute/eigen/inertia.hpp"
 

@@ -1,14 +1,12 @@
 // Method:     A few bad modes go through the operator at hand once more, (K - sigma M)^-1 M phi, and are made orthogonal to the others:
-// that
-//             mends what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration with
-//             sigma just below the group damps everything farther from sigma than the group is. It is written as a correction, phi - (K -
-//             sigma M)^-1 (K phi - lambda M phi), so that it ends at the modes of K and M and not at those of the factors' rounding, which
-//             differ for thin bodies. Rayleigh-Ritz within the group parts its members; Gram-Schmidt from the lowest mode up makes the
-//             whole set M-orthonormal again. What is still bad is tried again in narrower groups, whose shifts are nearer; the narrowest
-//             hold a single mode.
-//             The stiffness against fast motions multiplies the rounding of a slow mode's entries: its residual is large though the mode
-//             is right. The inverse takes that out again: with d = (K - sigma M)^-1 r there is an eigenvalue within |lambda - sigma|
-//             ||d||_M, relative to itself, of lambda - sigma, as for any residual of the inverse.
+//             that mends what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration
+//             with sigma just below the group damps everything farther from sigma than the group is. It is written as a correction, phi -
+//             (K - sigma M)^-1 (K phi - lambda M phi), so that it ends at the modes of K and M and not at those of the factors' rounding,
+//             which differ for thin bodies. Rayleigh-Ritz within the group parts its members; Gram-Schmidt from the lowest mode up makes
+//             the whole set M-orthonormal again. What is still bad is tried again in narrower groups, whose shifts are nearer; the
+//             narrowest hold a single mode. The stiffness against fast motions multiplies the rounding of a slow mode's entries: its
+//             residual is large though the mode is right. The inverse takes that out again: with d = (K - sigma M)^-1 r there is an
+//             eigenvalue within |lambda - sigma| ||d||_M, relative to itself, of lambda - sigma, as for any residual of the inverse.
 // Source:     Parlett, The symmetric eigenvalue problem, 1998, sections 4.2 (inverse iteration), 11.3 (Rayleigh-Ritz).
 // Deviations: none.
 #include "precompute/eigen/refine.hpp"

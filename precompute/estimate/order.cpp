@@ -1,11 +1,10 @@
-// Method: the k-th lowest of numbers that lie in intervals around their centres lies between the k-th lowest of all lower and of all upper
-//   ends. Modes that are not in the list take part: one above it, computed at F or higher, is really at F 2^(-b/1200) or higher, b being
-//   the bar of a mode there; one below it, at F or lower, really at F 2^(b/1200) or lower.
-// Source: -
+// Method:     the k-th lowest of numbers that lie in intervals around their centres lies between the k-th lowest of all lower and of all
+//             upper ends. Modes that are not in the list take part: one above it, computed at F or higher, is really at F 2^(-b/1200) or
+//             higher, b being the bar of a mode there; one below it, at F or lower, really at F 2^(b/1200) or lower.
+// Source:     -
 // Deviations: b is an estimate. Modes of different kinds (bending, stretching) differ in their bars a hundredfold and lie far apart, so b
-// is
-//   the widest bar of a whole octave next to the end, and where bars grow from octave to octave it grows on. F is where such a mode comes
-//   down furthest as long as b < 1731 cents times the power by which it grows; wider bars are off the scale anyhow.
+//             is the widest bar of a whole octave next to the end, and where bars grow from octave to octave it grows on. F is where such
+//             a mode comes down furthest as long as b < 1731 cents times the power by which it grows; wider bars are off the scale anyhow.
 #include "precompute/estimate/order.hpp"
 
 #include <algorithm>

@@ -1,6 +1,5 @@
-// Method:     every touching point that does not strike is a damped spring (resting.cpp). Which points there are changes from step to step;
-// the books
-//             of each pair see to it that no change brings energy.
+// Method:     every touching point that does not strike is a damped spring (resting.cpp). Which points there are changes from step to
+//             step; the books of each pair see to it that no change brings energy.
 // Source:     none.
 // Deviations: none.
 #include <algorithm>
