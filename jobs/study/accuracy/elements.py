@@ -8,7 +8,6 @@ from accuracy.section import Section
 
 PROGRAMS = ("carillon-mesh", "carillon-precompute", "carillon-bank")
 LEVELS = ((1, "one cent"), (10, "ten cents"), (100, "a semitone"))
-DEAR_NODES = 12000  # beyond, one repeat is enough to tell
 
 
 def measure(lab, bodies, kinds=None):
@@ -22,10 +21,9 @@ def measure(lab, bodies, kinds=None):
                 case = body.make_case(lab, kind, nodes)
                 if case.job["mesh"] not in seen:
                     seen.add(case.job["mesh"])
-                    cases[case.name] = (case, nodes)
+                    cases[case.name] = case
                     order[body.name].append((kind, case.name))
-    solves = lab.measure([case for case, nodes in cases.values() if nodes < DEAR_NODES])
-    solves |= lab.measure([case for case, nodes in cases.values() if nodes >= DEAR_NODES], repeats=1)
+    solves = lab.measure(list(cases.values()))
     return {name: [(kind, solves[case]) for kind, case in entries] for name, entries in order.items()}
 
 
@@ -71,7 +69,7 @@ def add_table(section, body, points, command):
         rows.append((point.kind, f"{point.nodes:,}", f"{point.unknowns:,}", f"{point.cpu_s:.2f}", "-" if point.spread is None else f"{100 * point.spread:.0f} %", f"{point.cents[0]:+.3g}", f"{point.median:.3g}", f"{point.worst:.3g}"))
     data = [("element", "nodes", "unknowns", "cpu_s", "mode", "error_cents")]
     data += [(point.kind, point.nodes, point.unknowns, point.cpu_s, index + 1, value) for point in points for index, value in enumerate(point.cents)]
-    section.add_table(f"{body.name}-modes", rows, f"The same as numbers; the CSV has every mode. Spread: half the distance of the extremes over the median; - where one run had to do.", data, command)
+    section.add_table(f"{body.name}-modes", rows, f"The same as numbers; the CSV has every mode. Spread: half the distance of the extremes over the median; - where there was one run.", data, command)
 
 
 def expect_rate(body, kind):
