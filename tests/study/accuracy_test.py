@@ -117,7 +117,7 @@ class Study(unittest.TestCase):
     def test_what_was_measured_is_kept_and_what_is_damaged_is_measured_again(self):
         shutil.rmtree(self.folder / "again", ignore_errors=True)
         shutil.copytree(self.out, self.folder / "again")
-        runs = sorted((self.folder / "again/work/runs").iterdir())
+        runs = sorted((self.folder / "again" / "work" / "runs").iterdir())
         (runs[0] / "kept.json").write_text('{"cpu_s": [1')
         before = {run: (run / "kept.json").stat().st_mtime_ns for run in runs[1:]}
         result = call(self.folder, "--quick", "--on", "cube", "ring", "--only", "elements", "-o", "again")

@@ -174,9 +174,9 @@ class Lab:
         find_kept = lambda case: None if is_fresh else read_kept(self.runs / keys[case.name] / "kept.json")
         kept = {case.name: find_kept(case) or {"cpu_s": [], "wall_s": []} for case in cases}
         rounds = [[case for case in cases if len(kept[case.name]["cpu_s"]) <= repeat and not kept[case.name].get("error")] for repeat in range(repeats)]
-        todo = sum(map(len, rounds))
-        if todo < repeats * len(cases) and todo:
-            self.say(f"{repeats * len(cases) - todo} of {repeats * len(cases)} solves are kept from before ({self.runs}); going on")
+        missing = sum(map(len, rounds))
+        if missing < repeats * len(cases) and missing:
+            self.say(f"{repeats * len(cases) - missing} of {repeats * len(cases)} solves are kept from before ({self.runs}); going on")
         weights = {case.name: self.find_weight(case) for case in cases}
         left, spent, done = sum(weights[case.name] for cases_now in rounds for case in cases_now), 0.0, 0
         all_weight, begin = left, time.monotonic()
@@ -189,7 +189,7 @@ class Lab:
                 spent = time.monotonic() - begin
                 seconds = kept[case.name]["cpu_s"][-1:] or [0.0]
                 minutes = spent / max(all_weight - left, 1e-9) * max(left, 0.0) / 60
-                self.say(f"{done}/{todo} {case.name}: {seconds[0]:.2f} CPU s; about {minutes:.1f} min left of these")
+                self.say(f"{done}/{missing} {case.name}: {seconds[0]:.2f} CPU s; about {minutes:.1f} min left of these")
         return {case.name: self.make_solve(kept[case.name], keys[case.name], repeats) for case in cases}
 
     def find_key(self, case):
