@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "precompute/eigen/local_columns.hpp"
+#include "precompute/petsc/diagonal.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 
@@ -29,19 +30,6 @@ using Row = NodeMatrix::Row;
 constexpr int kStrip = NodeMatrix::kStrip;
 constexpr int kWide = 4 * kStrip;  // Columns at a time in a Gram matrix: wide enough for BLAS to run at full speed.
 constexpr double kNear = 1e-4;     // Relative to lambda: nearer ones serve to measure a residual.
-
-std::vector<double> read_diagonal(Mat matrix) {
-  petsc::VecHandle diagonal;
-  check(MatCreateVecs(matrix, nullptr, diagonal.out()));
-  check(MatGetDiagonal(matrix, diagonal));
-  PetscInt rows = 0;
-  const PetscScalar* values = nullptr;
-  check(VecGetLocalSize(diagonal, &rows));
-  check(VecGetArrayRead(diagonal, &values));
-  std::vector<double> copy(values, values + rows);
-  check(VecRestoreArrayRead(diagonal, &values));
-  return copy;
-}
 
 void sum_over_ranks(MPI_Comm comm, std::vector<double>& values) {
   MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, comm);
@@ -110,7 +98,10 @@ void multiply_and_sum(const Operators& operators, const Columns& phi, int first,
 }  // namespace
 
 Operators::Operators(Mat stiffness_mat, Mat mass_mat)
-    : stiffness(stiffness_mat), mass(mass_mat), stiffness_diagonal(read_diagonal(stiffness_mat)), mass_diagonal(read_diagonal(mass_mat)) {
+    : stiffness(stiffness_mat),
+      mass(mass_mat),
+      stiffness_diagonal(petsc::read_diagonal(stiffness_mat)),
+      mass_diagonal(petsc::read_diagonal(mass_mat)) {
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness_mat), &comm));
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "precompute/petsc/diagonal.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::ldlt {
@@ -17,19 +18,12 @@ using petsc::check;
 
 constexpr double kWide = 1e6;  // Stiffest over softest node; meshes of one material, well shaped, span three decades.
 
-/// Of every own node the largest of the diagonal.
+/// Of every own node the largest of the diagonal. Collective.
 std::vector<double> find_stiffness(Mat matrix) {
-  petsc::VecHandle diagonal;
-  check(MatCreateVecs(matrix, nullptr, diagonal.out()));
-  check(MatGetDiagonal(matrix, diagonal));
-  PetscInt rows = 0;
-  const PetscScalar* values = nullptr;
-  check(VecGetLocalSize(diagonal, &rows));
-  check(VecGetArrayRead(diagonal, &values));
-  std::vector<double> stiffness(static_cast<std::size_t>(rows / 3));
+  const std::vector<double> diagonal = petsc::read_diagonal(matrix);
+  std::vector<double> stiffness(diagonal.size() / 3);
   for (std::size_t node = 0; node < stiffness.size(); ++node)
-    stiffness[node] = std::max({values[3 * node], values[3 * node + 1], values[3 * node + 2]});
-  check(VecRestoreArrayRead(diagonal, &values));
+    stiffness[node] = std::max({diagonal[3 * node], diagonal[3 * node + 1], diagonal[3 * node + 2]});
   return stiffness;
 }
 
