@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "precompute/ldlt/graded.hpp"
@@ -33,10 +35,14 @@ constexpr double kVanishedPivot = 64 * std::numeric_limits<double>::epsilon();  
 }  // namespace
 
 struct Factor::State {
-  State(Mat stiffness, Mat mass) : graded(stiffness, mass), plan(make_plan(stiffness, mass)) {}
+  State(Mat stiffness_mat, Mat mass_mat) : stiffness(stiffness_mat), mass(mass_mat), plan(make_plan(stiffness, mass)) {}
 
-  GradedPair graded;  // what is factorised, measured and refined with
+  const Mat stiffness;
+  const Mat mass;
   Plan plan;
+  std::optional<GradedPair> graded;  // what is factorised, measured and refined with; from the first factorisation on
+  double stiffness_norm = 0;         // of the graded K, and M
+  double mass_norm = 0;
   Numbers numbers;
   Workspace workspace;
   double sigma = 0;
@@ -48,8 +54,8 @@ struct Factor::State {
   /// Runs work, whose only SystemError is want of memory, and says how much is needed. Collective.
   template <typename Work>
   void name_need(Work&& work) const;
-  void allocate();
-  double calc_norm() const;
+  /// What all factorisations share. Collective.
+  void prepare();
   /// y = (K - sigma M) x on this rank's rows. Collective.
   void apply(Vec x, Vec y, Vec scratch) const;
   double measure_backward_error(bool is_refined);
@@ -72,7 +78,13 @@ void Factor::State::name_need(Work&& work) const {
   }
 }
 
-void Factor::State::allocate() {
+void Factor::State::prepare() {
+  if (!graded) {
+    GradedPair pair(stiffness, mass);
+    check(MatNorm(pair.get_stiffness(), NORM_INFINITY, &stiffness_norm));
+    check(MatNorm(pair.get_mass(), NORM_INFINITY, &mass_norm));
+    graded = std::move(pair);
+  }
   if (is_allocated) return;
   petsc::run_agreed(plan.comm, [&] {
     numbers = make_numbers(plan);
@@ -81,17 +93,9 @@ void Factor::State::allocate() {
   is_allocated = true;
 }
 
-double Factor::State::calc_norm() const {
-  double k = 0;
-  double m = 0;
-  check(MatNorm(graded.get_stiffness(), NORM_INFINITY, &k));
-  check(MatNorm(graded.get_mass(), NORM_INFINITY, &m));
-  return k + std::abs(sigma) * m;
-}
-
 void Factor::State::apply(Vec x, Vec y, Vec scratch) const {
-  check(MatMult(graded.get_stiffness(), x, y));
-  check(MatMult(graded.get_mass(), x, scratch));
+  check(MatMult(graded->get_stiffness(), x, y));
+  check(MatMult(graded->get_mass(), x, scratch));
   check(VecAXPY(y, -sigma, scratch));
 }
 
@@ -99,7 +103,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   petsc::VecHandle x;
   petsc::VecHandle b;
   petsc::VecHandle scratch;
-  check(MatCreateVecs(graded.get_stiffness(), x.out(), b.out()));
+  check(MatCreateVecs(graded->get_stiffness(), x.out(), b.out()));
   check(VecDuplicate(x, scratch.out()));
   PetscInt first = 0;
   PetscInt last = 0;
@@ -143,11 +147,10 @@ const Analysis& Factor::get_analysis() const { return state_->plan.analysis; }
 bool Factor::factorise(double sigma) {
   State& s = *state_;
   s.sigma = sigma;
-  s.graded.update();
-  s.norm = s.calc_norm();
   s.name_need([&] {
-    s.allocate();
-    factorise_fronts(s.plan, s.graded.get_stiffness(), s.graded.get_mass(), sigma, s.numbers);
+    s.prepare();
+    s.norm = s.stiffness_norm + std::abs(sigma) * s.mass_norm;
+    factorise_fronts(s.plan, s.graded->get_stiffness(), s.graded->get_mass(), sigma, s.numbers);
     petsc::add_flops(s.plan.analysis.ranks[static_cast<std::size_t>(s.plan.rank)].flops);
   });
   s.backward_error = std::numeric_limits<double>::infinity();
@@ -174,7 +177,7 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
   petsc::VecHandle from;
   petsc::VecHandle to;
   petsc::VecHandle scratch;
-  check(MatCreateVecs(graded.get_stiffness(), from.out(), to.out()));
+  check(MatCreateVecs(graded->get_stiffness(), from.out(), to.out()));
   check(VecDuplicate(from, scratch.out()));
   PetscInt rows = 0;
   check(VecGetLocalSize(from, &rows));
@@ -197,12 +200,12 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
 }
 
 void Factor::solve(double* x, int stride, int columns) {
-  state_->graded.scale(x, stride, columns);
+  state_->graded->scale(x, stride, columns);
   if (state_->needs_refinement)
     state_->solve_refined(x, stride, columns);
   else
     state_->solve(x, stride, columns);
-  state_->graded.scale(x, stride, columns);
+  state_->graded->scale(x, stride, columns);
 }
 
 }  // namespace carillon::ldlt

@@ -28,8 +28,8 @@ struct Analysis {
 /// L D L^T of K - sigma M with a fixed pattern and changing sigma, by the multifrontal method (docs/decisions/factorisation.md).
 ///
 /// K and M: (3n, 3n) real AIJ, symmetric with both triangles stored, rows in blocks of three per node, whole nodes per rank; a rank may
-/// have none. M is diagonal, in K's pattern, or any other. Their values are read at each factorise(), their patterns once.
-/// They must outlive the factor. Every member but the get_ ones is collective and fails on all ranks alike.
+/// have none. M is diagonal, in K's pattern, or any other. Patterns are taken at construction, values at the first factorise(); from there
+/// on they must stay, and outlive the factor. Every member but the get_ ones is collective and fails on all ranks alike.
 class Factor {
  public:
   /// Orders the nodes and plans fronts, memory and messages; computes no number. Symmetry is taken on trust. Throws InputError when the

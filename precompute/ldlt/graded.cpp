@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "precompute/petsc/diagonal.hpp"
 #include "precompute/petsc/session.hpp"
@@ -20,51 +19,48 @@ constexpr double kWide = 1e6;  // Stiffest over softest node; meshes of one mate
 
 /// Of every own node the largest of the diagonal. Collective.
 std::vector<double> find_stiffness(Mat matrix) {
-  const std::vector<double> diagonal = petsc::read_diagonal(matrix);
-  std::vector<double> stiffness(diagonal.size() / 3);
-  for (std::size_t node = 0; node < stiffness.size(); ++node)
-    stiffness[node] = std::max({diagonal[3 * node], diagonal[3 * node + 1], diagonal[3 * node + 2]});
-  return stiffness;
+  std::vector<double> largest = petsc::read_diagonal(matrix);
+  const std::size_t nodes = largest.size() / 3;
+  for (std::size_t node = 0; node < nodes; ++node)
+    largest[node] = std::max({largest[3 * node], largest[3 * node + 1], largest[3 * node + 2]});
+  largest.resize(nodes);
+  return largest;
 }
 
-/// A copy of the matrix, or its values once more in the copy there is, scaled from both sides.
-void copy_scaled(Mat from, Vec factor, petsc::MatHandle& to) {
-  if (to)
-    check(MatCopy(from, to, SAME_NONZERO_PATTERN));
-  else
-    check(MatDuplicate(from, MAT_COPY_VALUES, to.out()));
-  check(MatDiagonalScale(to, factor, factor));
+/// The stiffest over the softest of all nodes that have stiffness; 0 where none has. Collective.
+double find_width(MPI_Comm comm, const std::vector<double>& stiffness) {
+  std::array<double, 2> ends{0, 0};  // largest, and largest inverse
+  for (const double k : stiffness)
+    if (k > 0) ends = {std::max(ends[0], k), std::max(ends[1], 1 / k)};
+  MPI_Allreduce(MPI_IN_PLACE, ends.data(), 2, MPI_DOUBLE, MPI_MAX, comm);
+  return ends[0] * ends[1];
 }
 
 }  // namespace
 
-void GradedPair::update() {
-  const std::vector<double> stiffness = find_stiffness(given_stiffness_);
-  std::array<double, 2> ends{0, 0};  // largest, and largest inverse
-  for (const double k : stiffness)
-    if (k > 0) ends = {std::max(ends[0], k), std::max(ends[1], 1 / k)};
+GradedPair::GradedPair(Mat stiffness, Mat mass) : given_stiffness_(stiffness), given_mass_(mass) {
   MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(given_stiffness_), &comm));
-  MPI_Allreduce(MPI_IN_PLACE, ends.data(), 2, MPI_DOUBLE, MPI_MAX, comm);
-  if (!(ends[0] * ends[1] > kWide) || !std::isfinite(ends[0] * ends[1])) {
-    scaled_stiffness_.reset();
-    scaled_mass_.reset();
-    factor_.clear();
-    return;
-  }
-  factor_.resize(3 * stiffness.size());
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
+  const std::vector<double> node_stiffness = find_stiffness(stiffness);
+  const double width = find_width(comm, node_stiffness);
+  if (!(width > kWide) || !std::isfinite(width)) return;
+  petsc::VecHandle factor;
+  petsc::run_agreed(comm, [&] {  // One rank alone may have no memory for its part.
+    factor_.resize(3 * node_stiffness.size());
+    check(MatCreateVecs(stiffness, nullptr, factor.out()));
+    check(MatDuplicate(stiffness, MAT_COPY_VALUES, scaled_stiffness_.out()));
+    check(MatDuplicate(mass, MAT_COPY_VALUES, scaled_mass_.out()));
+  });
   for (std::size_t i = 0; i < factor_.size(); ++i) {
-    const double k = stiffness[i / 3];
+    const double k = node_stiffness[i / 3];
     factor_[i] = std::ldexp(1.0, k > 0 ? -static_cast<int>(std::lround(0.5 * std::log2(k))) : 0);
   }
-  petsc::VecHandle factor;
-  check(MatCreateVecs(given_stiffness_, nullptr, factor.out()));
   PetscScalar* values = nullptr;
   check(VecGetArray(factor, &values));
   std::copy(factor_.begin(), factor_.end(), values);
   check(VecRestoreArray(factor, &values));
-  copy_scaled(given_stiffness_, factor, scaled_stiffness_);
-  copy_scaled(given_mass_, factor, scaled_mass_);
+  check(MatDiagonalScale(scaled_stiffness_, factor, factor));
+  check(MatDiagonalScale(scaled_mass_, factor, factor));
 }
 
 void GradedPair::scale(double* x, int stride, int columns) const {

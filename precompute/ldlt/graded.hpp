@@ -11,13 +11,12 @@ namespace carillon::ldlt {
 
 /// S K S and S M S, S a power of two per node that brings the diagonal of K near one: a soft part beside a stiff one, or an element a
 /// thousand times thinner than its neighbours, then has pivots of its own size, not of the rounding of others. Bodies of one stiffness stay
-/// as they are, and cost nothing. Borrows K and M.
+/// as they are, and cost nothing. Borrows K and M, which must stay as they are: their values are read once, here.
 class GradedPair {
  public:
-  GradedPair(Mat stiffness, Mat mass) : given_stiffness_(stiffness), given_mass_(mass) {}
+  /// K, M: (3n, 3n) AIJ, whole nodes per rank. Collective. Throws SystemError on every rank when memory runs out.
+  GradedPair(Mat stiffness, Mat mass);
 
-  /// Reads the values of K and M again. Collective.
-  void update();
   Mat get_stiffness() const { return scaled_stiffness_ ? scaled_stiffness_.get() : given_stiffness_; }
   Mat get_mass() const { return scaled_mass_ ? scaled_mass_.get() : given_mass_; }
   /// X <- S X on this rank's rows, column-major.

@@ -123,6 +123,34 @@ TEST(factor, counts_and_solves_as_dense_solvers_do_when_the_mass_has_links_that_
   expect_counts_and_solves(pencil, 6);
 }
 
+// D K D and D M D have the eigenvalues of K and M, and here stiffness over sixteen decades.
+TEST(factor, counts_and_solves_at_every_shift_where_stiffness_spans_many_decades) {
+  Pencil pencil = make_lattice(6, 5, 4, 1, MassKind::kConsistent, 15);
+  const Eigen::MatrixXd even_k = pencil.dense_k, even_m = pencil.dense_m;
+  const Eigen::VectorXd lambda = calc_eigenvalues(pencil);
+  Eigen::VectorXd d = Eigen::VectorXd::Ones(pencil.dense_k.rows());
+  for (Eigen::Index node = 0; node < d.size() / 3; node += 2) d.segment(3 * node, 3).setConstant(1e8);
+  for (Eigen::MatrixXd* dense : {&pencil.dense_k, &pencil.dense_m}) *dense = (d.asDiagonal() * *dense * d.asDiagonal()).eval();
+  test::distribute(pencil);
+  Factor factor(pencil.k, pencil.m);
+  for (const double sigma : pick_shifts(lambda, 6)) {
+    ASSERT_TRUE(factor.factorise(sigma)) << sigma << ", backward error " << factor.get_backward_error();
+    EXPECT_EQ(factor.get_negative_pivots(), count_below(lambda, sigma)) << sigma;
+    EXPECT_LT(factor.get_backward_error(), kLatticeTolerance);
+    // D b to D^-1 x, and x to b.
+    Eigen::VectorXd b(d.size());
+    for (Eigen::Index i = 0; i < b.size(); ++i) b[i] = std::sin(1.0 + static_cast<double>(i));
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(d.size());
+    x.segment(pencil.first_row, pencil.rows) = b.cwiseProduct(d).segment(pencil.first_row, pencil.rows);
+    factor.solve(x.data() + pencil.first_row, pencil.rows, 1);
+    x = x.cwiseProduct(d).eval();
+    MPI_Allreduce(MPI_IN_PLACE, x.data(), static_cast<int>(x.size()), MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD);
+    const Eigen::MatrixXd a = even_k - sigma * even_m;
+    const double scale = a.cwiseAbs().rowwise().sum().maxCoeff() * x.cwiseAbs().maxCoeff() + b.cwiseAbs().maxCoeff();
+    EXPECT_LT((b - a * x).cwiseAbs().maxCoeff(), kSolveTolerance * scale) << sigma;
+  }
+}
+
 TEST(factor, solves_any_number_of_columns_alike) {
   const Pencil pencil = make_lattice(8, 5, 3, 1, MassKind::kConsistent, 5);
   Factor factor(pencil.k, pencil.m);
