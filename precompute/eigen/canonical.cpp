@@ -16,6 +16,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <string>
 
 #include "precompute/eigen/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
@@ -70,6 +71,26 @@ double calc_weight(const Box& box, const Vec3& x, std::int32_t component, std::s
   return std::sin(phase) + 0.31 * std::cos(1.8392867552 * phase + 0.5 * d);
 }
 
+// The eigenvalues, ascending, of a symmetric matrix (order, order) that every rank has; its eigenvectors take its place. The first rank's
+// are every rank's, so that all decide alike. Collective. Throws SolveError(failure) on every rank when LAPACK fails.
+std::vector<double> diagonalise(MPI_Comm comm, PetscBLASInt order, std::vector<double>& matrix, const std::string& failure) {
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  std::vector<double> values;
+  petsc::run_agreed(comm, [&] {
+    values.resize(static_cast<std::size_t>(order));
+    if (rank != 0) return;
+    PetscBLASInt room = 64 * order + 3 * order;
+    PetscBLASInt info = 0;
+    std::vector<double> work(static_cast<std::size_t>(room));
+    LAPACKsyev_("V", "L", &order, matrix.data(), &order, values.data(), work.data(), &room, &info);
+    if (info != 0) throw SolveError(failure + " (LAPACK dsyev failed).");
+  });
+  MPI_Bcast(matrix.data(), static_cast<int>(matrix.size()), MPI_DOUBLE, 0, comm);
+  MPI_Bcast(values.data(), static_cast<int>(order), MPI_DOUBLE, 0, comm);
+  return values;
+}
+
 struct Basis {
   std::vector<double> rotation;  // (count, count), columns by ascending eigenvalue
   double gap = 0;                // smallest distance of two eigenvalues
@@ -89,15 +110,8 @@ Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box&
   basis.rotation.assign(count * count, 0.0);
   multiply_transposed(phi, weighted, basis.rotation.data(), phi.count);
   MPI_Allreduce(MPI_IN_PLACE, basis.rotation.data(), static_cast<int>(basis.rotation.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
-  PetscBLASInt size = phi.count;
-  PetscBLASInt room = 64 * size + 3 * size;
-  PetscBLASInt info = 0;
-  std::vector<double> values(count);
-  std::vector<double> work(static_cast<std::size_t>(room));
-  LAPACKsyev_("V", "L", &size, basis.rotation.data(), &size, values.data(), work.data(), &room, &info);
-  if (info != 0) throw SolveError("A cluster of equal modes has no canonical basis (LAPACK dsyev failed).");
-  MPI_Bcast(basis.rotation.data(), static_cast<int>(basis.rotation.size()), MPI_DOUBLE, 0, operators.comm);
-  MPI_Bcast(values.data(), phi.count, MPI_DOUBLE, 0, operators.comm);
+  const std::vector<double> values =
+      diagonalise(operators.comm, phi.count, basis.rotation, "A cluster of equal modes has no canonical basis");
   basis.gap = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < count; ++i) basis.gap = std::min(basis.gap, values[i] - values[i - 1]);
   return basis;
@@ -129,16 +143,7 @@ std::vector<double> calc_differences(const Operators& operators, const Columns& 
   rotation.assign(count * count, 0.0);
   multiply_transposed(phi, k_phi, rotation.data(), phi.count);
   MPI_Allreduce(MPI_IN_PLACE, rotation.data(), static_cast<int>(rotation.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
-  PetscBLASInt order = phi.count;
-  PetscBLASInt room = 64 * order + 3 * order;
-  PetscBLASInt info = 0;
-  std::vector<double> differences(count);
-  std::vector<double> work(static_cast<std::size_t>(room));
-  LAPACKsyev_("V", "L", &order, rotation.data(), &order, differences.data(), work.data(), &room, &info);
-  if (info != 0) throw SolveError("A group of nearly equal modes cannot be parted (LAPACK dsyev failed).");
-  MPI_Bcast(rotation.data(), static_cast<int>(rotation.size()), MPI_DOUBLE, 0, operators.comm);
-  MPI_Bcast(differences.data(), phi.count, MPI_DOUBLE, 0, operators.comm);
-  return differences;
+  return diagonalise(operators.comm, phi.count, rotation, "A group of nearly equal modes cannot be parted");
 }
 
 }  // namespace
