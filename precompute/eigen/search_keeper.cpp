@@ -58,6 +58,8 @@ void SearchKeeper::start(std::int64_t rows, std::array<std::int64_t, 2> powers) 
     steps_.clear();
     kept_lambda_.clear();
     has_round_ = false;
+    uses_mumps_ = 0;
+    backward_error_ = 0;
     checkpoint_->reject(error.what());
   }
 }

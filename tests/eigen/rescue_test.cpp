@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "precompute/eigen/checkpoint.hpp"
 #include "precompute/eigen/local_columns.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/ldlt/factor.hpp"
@@ -91,6 +94,143 @@ TEST(Fallback, goes_to_mumps_where_pivoting_within_fronts_breaks_down) {
     ADD_FAILURE() << "solved";
   } catch (const SolveError& error) {
     EXPECT_NE(std::string(error.what()).find("singular all around"), std::string::npos) << error.what();
+  }
+}
+
+constexpr int kNever = 0;
+
+// A checkpoint in memory, of solves on as many ranks as before; asks every solve to stop at its safe point number `stop_at`, from 1, or
+// kNever.
+class MemoryCheckpoint {
+ public:
+  /// What to hand to the next solve, which goes on from what the last one has saved.
+  Checkpoint& begin(int stop_at) {
+    asked_ = 0;
+    rejected_.clear();
+    checkpoint_ = {};
+    checkpoint_.numbers = numbers_;
+    checkpoint_.column_count = static_cast<std::int64_t>(columns_.size());
+    checkpoint_.ask = [this, stop_at] { return Wish{++asked_ == stop_at, false}; };
+    checkpoint_.tell_news = [](bool) {};
+    checkpoint_.reject = [this](const std::string& why) { rejected_ = why; };
+    checkpoint_.save = [this](const std::string& numbers, const std::vector<Columns>& columns) {
+      numbers_ = numbers;
+      std::vector<std::vector<double>> copy;
+      for (const Columns& some : columns)
+        for (int j = 0; j < some.count; ++j) copy.emplace_back(some.column(j), some.column(j) + some.rows);
+      columns_ = std::move(copy);
+      return true;
+    };
+    // The solve may save before it has read all: what it began with stays as it was.
+    checkpoint_.read = [from = columns_](std::int64_t first, const Columns& into) {
+      for (int j = 0; j < into.count; ++j) std::ranges::copy(from.at(static_cast<std::size_t>(first + j)), into.column(j));
+    };
+    return checkpoint_;
+  }
+  void append(const char* bytes) { numbers_ += bytes; }
+  bool is_empty() const { return numbers_.empty(); }
+  bool has_columns() const { return !columns_.empty(); }
+  const std::string& why_rejected() const { return rejected_; }
+
+ private:
+  Checkpoint checkpoint_;
+  std::string numbers_;
+  std::vector<std::vector<double>> columns_;
+  std::string rejected_;
+  int asked_ = 0;
+};
+
+// The modes, or none where the solve was stopped.
+std::optional<Modes> solve_until_stopped(const Problem& problem, Options options, Checkpoint& checkpoint) {
+  options.checkpoint = &checkpoint;
+  try {
+    return solve_modes(problem, options);
+  } catch (const Stopped&) {
+    return std::nullopt;
+  }
+}
+
+// The same bank: modes, proof, and whose pivots it rests on.
+void expect_same_modes(const Modes& modes, const Modes& expected) {
+  ASSERT_EQ(modes.lambda.size(), expected.lambda.size());
+  for (std::size_t j = 0; j < modes.lambda.size(); ++j) EXPECT_NEAR(modes.lambda[j] / expected.lambda[j], 1.0, 1e-12) << j;
+  const LocalColumns shapes(modes.shapes), known(expected.shapes);
+  double largest = 0, difference = 0;
+  for (std::size_t j = 0; j < modes.lambda.size(); ++j)
+    for (PetscInt i = 0; i < shapes.rows; ++i) {
+      const double value = known.column(static_cast<PetscInt>(j))[i];
+      largest = std::max(largest, std::abs(value));
+      difference = std::max(difference, std::abs(shapes.column(static_cast<PetscInt>(j))[i] - value));
+    }
+  EXPECT_LE(difference, 1e-7 * largest);
+  EXPECT_EQ(modes.factor.solver, expected.factor.solver);
+  EXPECT_EQ(modes.factor.ordering, expected.factor.ordering);
+  EXPECT_EQ(modes.factor.entries, expected.factor.entries);
+  EXPECT_EQ(modes.proof.method, expected.proof.method);
+  EXPECT_EQ(modes.proof.found, expected.proof.found);
+  EXPECT_EQ(modes.band_count, expected.band_count);
+  EXPECT_EQ(modes.count_below_low, expected.count_below_low);
+  EXPECT_NEAR(modes.proof.factor_backward_error, expected.proof.factor_backward_error, 1e-6 * expected.proof.factor_backward_error);
+  ASSERT_EQ(modes.proof.counts.size(), expected.proof.counts.size());
+  for (std::size_t i = 0; i < modes.proof.counts.size(); ++i) {
+    EXPECT_EQ(modes.proof.counts[i].freq_hz, expected.proof.counts[i].freq_hz) << i;
+    EXPECT_EQ(modes.proof.counts[i].below, expected.proof.counts[i].below) << i;
+  }
+}
+
+// A count turns to MUMPS: the first one, at the upper end of the band, or the second, at the lower, after ours has counted once. Whether
+// a solve is stopped before or after that, goes on once or is stopped at every safe point: its modes and its proof are those of a solve
+// that was left alone, and once turned it does not try ours again.
+TEST(Fallback, is_gone_on_with_from_a_checkpoint) {
+  constexpr double kTuned = 1000;
+  const Network network = make_bunches(25, kTuned, 4e-8);
+  const std::vector<double> all = test::calc_all_eigenvalues(network);
+  const test::System system = test::make_system(network);
+  for (const bool is_upper : {true, false}) {
+    SCOPED_TRACE(is_upper ? "turned at the upper end" : "turned at the lower end");
+    Options options;
+    options.low_hz = to_hz(is_upper ? 100 : kTuned * (1 + 1.4e-6));  // counts are taken a millionth outside, and from there upwards
+    options.high_hz = to_hz(is_upper ? kTuned * (1 - 1.4e-6) : 1.5 * kTuned);
+    const Modes whole = solve_modes(system.problem, options);
+    ASSERT_NE(whole.factor.solver.find("MUMPS"), std::string::npos) << whole.factor.solver;
+    expect_eigenvalues(whole, pick(all, options.low_hz, options.high_hz));
+
+    bool was_iterating = false;
+    for (int stop_at = 1;; ++stop_at) {
+      SCOPED_TRACE("stopped at safe point " + std::to_string(stop_at));
+      MemoryCheckpoint memory;
+      if (solve_until_stopped(system.problem, options, memory.begin(stop_at))) {
+        EXPECT_GT(stop_at, 4) << "a safe point after either count, and in the iteration";
+        break;
+      }
+      ASSERT_FALSE(memory.is_empty());
+      was_iterating = was_iterating || memory.has_columns();
+      const std::optional<Modes> modes = solve_until_stopped(system.problem, options, memory.begin(kNever));
+      ASSERT_TRUE(modes.has_value());
+      EXPECT_EQ(memory.why_rejected(), "");
+      expect_same_modes(*modes, whole);
+      const int in_vain = is_upper || stop_at > 1 ? 5 : 0;  // The state has turned.
+      EXPECT_LT(modes->factor.factorisations, whole.factor.factorisations - in_vain);
+    }
+    EXPECT_TRUE(was_iterating);
+
+    MemoryCheckpoint memory;
+    std::optional<Modes> modes;
+    int stops = 0;
+    for (; !modes && stops < 1000; ++stops) modes = solve_until_stopped(system.problem, options, memory.begin(1));
+    EXPECT_GT(stops, 4);
+    ASSERT_TRUE(modes.has_value());
+    expect_same_modes(*modes, whole);
+
+    // What is refused leaves nothing behind: the solve begins with our factorisation again, and turns again.
+    MemoryCheckpoint damaged;
+    EXPECT_FALSE(solve_until_stopped(system.problem, options, damaged.begin(3)).has_value());
+    damaged.append("x");
+    modes = solve_until_stopped(system.problem, options, damaged.begin(kNever));
+    EXPECT_NE(damaged.why_rejected(), "");
+    ASSERT_TRUE(modes.has_value());
+    expect_same_modes(*modes, whole);
+    EXPECT_EQ(modes->factor.factorisations, whole.factor.factorisations);
   }
 }
 
