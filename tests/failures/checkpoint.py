@@ -187,21 +187,32 @@ def kills(folder):
     body.resume(2, "after all kills")
 
 
-def damage(folder):
-    """Cut at many lengths, bytes flipped, of another job, mesh or program, no checkpoint at all: said in one line, and the bank is right."""
-    folder.mesh("--shape", "plate", "--length", 0.3, "--width", 0.21, "--thickness", 0.02, "--nodes", 1500, "--order", 2, "-o", "body.msh")
-    body = Body(folder, band_hz=[20, 30000])
+def catch_checkpoint(folder, body):
+    """The largest that a run was seen to leave on its way; empty where none was."""
     with subprocess.Popen(body.command(1, "--checkpoint-every", 0), cwd=folder.path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
         whole = b""
-        while run.poll() is None:  # The largest that it leaves on its way.
+        while run.poll() is None:
             try:
                 seen = (folder / "state").read_bytes()
                 whole = seen if len(seen) > len(whole) else whole
             except OSError:
                 pass
         check(run.returncode == 0, run.stdout.read())
+    return whole
+
+
+def damage(folder):
+    """Cut at many lengths, bytes flipped, of another job, mesh or program, no checkpoint at all: said in one line, and the bank is right."""
+    folder.mesh("--shape", "plate", "--length", 0.3, "--width", 0.21, "--thickness", 0.02, "--nodes", 1500, "--order", 2, "-o", "body.msh")
+    body = Body(folder, band_hz=[20, 30000])
+    whole = b""
+    for _ in range(20):  # The solve is short, and where cores are busy all that it saves may come and go between two looks.
+        seen = catch_checkpoint(folder, body)
+        whole = seen if len(seen) > len(whole) else whole
+        (folder / "out.bank").unlink()
+        if len(whole) > 100000:
+            break
     check(len(whole) > 100000, "no checkpoint was seen")
-    (folder / "out.bank").unlink()
     (folder / "state").write_bytes(whole)
     text, _ = body.resume(3, "whole")
     check("goes on from" in text and "warning" not in text, text)
