@@ -5,6 +5,7 @@
 #include <slepcsys.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <limits>
@@ -85,6 +86,33 @@ void spare_the_search_for_networks() {
 // when such a server ends in between.
 void spare_the_search_for_displays() { setenv("HWLOC_COMPONENTS", "-gl", 0); }
 
+// PETSc writes zeros over whatever it shall clear. The system gives large pieces cleared, page by page when they are first touched: so room
+// that is never used takes neither time nor memory.
+PetscErrorCode allocate(size_t bytes, PetscBool clear, int, const char[], const char[], void** result) {
+  *result = nullptr;
+  if (bytes == 0) return 0;
+  *result = clear == PETSC_TRUE ? std::calloc(bytes, 1) : std::malloc(bytes);
+  if (*result == nullptr) SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "%.0f bytes", static_cast<double>(bytes));
+  return 0;
+}
+
+PetscErrorCode release(void* memory, int, const char[], const char[]) {
+  std::free(memory);
+  return 0;
+}
+
+PetscErrorCode reallocate(size_t bytes, int, const char[], const char[], void** memory) {
+  void* larger = std::realloc(*memory, std::max<size_t>(bytes, 1));
+  if (larger == nullptr) SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "%.0f bytes", static_cast<double>(bytes));
+  *memory = larger;
+  return 0;
+}
+
+// PETSc's own allocators, which these options ask for, and ours exclude each other.
+bool asks_for_allocator(const std::vector<std::string>& options) {
+  return std::any_of(options.begin(), options.end(), [](const std::string& option) { return option.rfind("-malloc", 0) == 0; });
+}
+
 }  // namespace
 
 Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_options) {
@@ -109,6 +137,7 @@ Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_
   own_argv.push_back(nullptr);
   int own_argc = static_cast<int>(own.size());
   char** own_args = own_argv.data();
+  if (!asks_for_allocator(petsc_options)) (void)PetscMallocSet(allocate, release, reallocate);
   if (SlepcInitialize(&own_argc, &own_args, nullptr, nullptr) != 0) throw SystemError("PETSc and SLEPc do not start.");
   (void)PetscPushErrorHandler(record_error, nullptr);
   MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
