@@ -14,7 +14,9 @@
 #include <slepc/private/epsimpl.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -50,6 +52,8 @@ constexpr double kAngle = 1e-7;            // Ritz vectors must be told apart fr
 constexpr double kSmallest = 1e-14;        // as far as residuals, relative to theta, can say.
 constexpr double kEigenFlops = 9;          // of n^3: a symmetric eigenproblem with its vectors (Golub, Van Loan, 8.3)
 constexpr int kNearest = 32;               // Converged pairs that the others are cleared of at the end.
+constexpr int kWide = 128;                 // Columns that are cleared at a time.
+constexpr double kLeft = 1e-12;            // Less of a locked mode may stay in the others.
 constexpr double kSame = 1e-9;             // Closer Ritz values are one.
 constexpr double kOrthonormal = 1e-6;      // An orthonormal block that was kept is no farther from being one.
 constexpr double kSeen = 1e-3;             // A Ritz value with this error is no phantom.
@@ -58,7 +62,7 @@ constexpr double kSeen = 1e-3;             // A Ritz value with this error is no
 struct Settings {
   PetscInt block = PETSC_DEFAULT;
   PetscBool knows_count = PETSC_TRUE;
-  Mat locked = nullptr;
+  const LockedModes* locked = nullptr;
   LanczosKeeper* keeper = nullptr;
 };
 
@@ -90,6 +94,8 @@ class Iteration {
   void invert();
   void project(bool is_first, Small& alpha);
   bool agree(bool opinion) const;
+  LockedRange agree(LockedRange opinion) const;
+  Small clear_of_locked(LockedRange range, const Columns& block, const Columns& block_mass) const;
   Orthogonality::State get_state() const { return {t_.data(), room_, size_, width_, previous_}; }
   int orthonormalise(Small& r);
   bool orthonormalise_by_cholesky(Small& r);
@@ -109,6 +115,7 @@ class Iteration {
   void restart(Ritz& ritz);
   void finish(Ritz& ritz);
   void clear_nearest(const Ritz& ritz, int count);
+  void clear_locked(int count);
   double& t(int i, int j) { return t_[static_cast<std::size_t>(j) * static_cast<std::size_t>(room_) + static_cast<std::size_t>(i)]; }
 
   EPS eps_;
@@ -119,7 +126,7 @@ class Iteration {
   Columns fixed_;         // deflation space; the basis follows it in memory
   Columns basis_;         // the first `size_` columns are in use
   Columns everything_;    // both
-  Columns locked_;
+  LockedModes locked_;
   int size_ = 0;
   int width_ = 0;     // of the current block, the last columns of the basis
   int previous_ = 0;  // first column of what the current block is coupled to
@@ -127,7 +134,6 @@ class Iteration {
   Small t_;         // projected operator, (room, room)
   Small coupling_;  // R of the next block, (next_width, width)
   petsc::MatHandle w_mat_, z_mat_, mass_;
-  std::unique_ptr<LocalColumns> locked_access_;
   Columns w_, z_;  // the next block and M times it; after a step they are the current block's
   int next_check_ = 0;
   int last_size_ = 0;
@@ -136,7 +142,9 @@ class Iteration {
   Orthogonality orthogonality_;
   LanczosKeeper* keeper_ = nullptr;  // may be null
   Wish wish_;                        // of all ranks, since the last save
-  bool is_spared_ = false;           // the step did without the projection against the whole basis
+  bool is_spared_ = false;           // the step did without the projection against the whole basis,
+  LockedRange lossy_;                // what is locked that the step was cleared of
+  LockedOrthogonality locked_orthogonality_;
 };
 
 Columns view(Mat dense) {
@@ -149,13 +157,8 @@ Iteration::Iteration(EPS eps) : eps_(eps) {
   const Settings& settings = get_settings(eps);
   PetscInt fixed = 0;
   check(BVGetNumConstraints(eps->V, &fixed));
-  PetscInt locked = 0;
-  if (settings.locked != nullptr) {
-    check(MatGetSize(settings.locked, nullptr, &locked));
-    locked_access_ = std::make_unique<LocalColumns>(settings.locked);
-    locked_ = locked_access_->view();
-  }
-  room_ = static_cast<int>(std::min(eps->ncv, eps->n - fixed - locked));
+  if (settings.locked != nullptr) locked_ = *settings.locked;
+  room_ = static_cast<int>(std::min(eps->ncv, eps->n - fixed - locked_.count()));
   keeper_ = settings.keeper;
   block_ = static_cast<int>(std::min<PetscInt>(settings.block, std::max<PetscInt>(room_, 1)));
   t_.assign(static_cast<std::size_t>(room_) * static_cast<std::size_t>(room_), 0.0);
@@ -163,6 +166,15 @@ Iteration::Iteration(EPS eps) : eps_(eps) {
   PetscBool inverts = PETSC_FALSE;
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps->st), STSINVERT, &inverts));
   inverts_ = inverts == PETSC_TRUE;
+  if (inverts_) {
+    PetscScalar sigma = 0;
+    check(STGetShift(eps->st, &sigma));
+    std::vector<double> theta = locked_.lambda;
+    for (double& x : theta) x = 1 / (x - sigma);
+    locked_orthogonality_ = LockedOrthogonality(theta, true);
+  } else {
+    locked_orthogonality_ = LockedOrthogonality(locked_.lambda, false);
+  }
   Mat mass = nullptr;
   check(BVGetMatrix(eps->V, &mass, nullptr));
   check(MatCreateDense(comm_, eps->nloc, PETSC_DECIDE, eps->n, block_, nullptr, w_mat_.out()));
@@ -333,23 +345,29 @@ void Iteration::project(bool is_first, Small& alpha) {
     subtract_product(basis_.part(previous_, coupled), local.data(), coupled, next);
   }
   is_spared_ = !is_first && agree(orthogonality_.is_good(get_state(), alpha.data()));
+  lossy_ = is_first ? locked_orthogonality_.get_all() : agree(locked_orthogonality_.find_lossy(get_state(), alpha.data()));
   const Columns against = is_spared_ ? basis_.part(previous_, size_ - previous_) : everything_.part(0, fixed_.count + size_);
   for (int pass = 0; pass < 3; ++pass) {
     multiply_mass();
     const std::vector<double> square = sum_squares(next, next_mass);
-    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, next_mass).data(), locked_.count, next);
+    const Small parts = clear_of_locked(lossy_, next, next_mass);
+    if (pass == 0 && !is_first) locked_orthogonality_.learn(lossy_, parts.data(), next.count);
     if (is_spared_ && fixed_.count > 0) subtract_product(fixed_, sum_products(fixed_, next_mass).data(), fixed_.count, next);
     const Small c = sum_products(against, next_mass);
     subtract_product(against, c.data(), against.count, next);
     if (pass == 0 && !is_first && !is_spared_) orthogonality_.learn(get_state(), c.data() + fixed_.count, against.count);
     double taken = 0;  // largest part of a column that this pass took away; its rounding is what it leaves behind
+    double largest = 0;
     for (int j = 0; j < next.count; ++j) {
       const double* column = c.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(against.count);
       if (!is_first) {
         for (int i = 0; i < width_; ++i) alpha[static_cast<std::size_t>(j * width_ + i)] += column[against.count - width_ + i];
       }
-      taken = std::max(taken, std::inner_product(column, column + against.count, column, 0.0) / square[static_cast<std::size_t>(j)]);
+      const double part = std::inner_product(column, column + against.count, column, 0.0);
+      taken = std::max(taken, part / square[static_cast<std::size_t>(j)]);
+      largest = std::max(largest, part);
     }
+    if (!is_spared_) orthogonality_.clear(std::sqrt(largest));
     if (taken < kTaken) break;
   }
 }
@@ -361,6 +379,20 @@ bool Iteration::agree(bool opinion) const {
   return value != 0;
 }
 
+LockedRange Iteration::agree(LockedRange opinion) const {
+  std::array<int, 2> ends{opinion.first, opinion.count};
+  MPI_Bcast(ends.data(), 2, MPI_INT, 0, comm_);
+  return {ends[0], ends[1]};
+}
+
+// block <- block - L (L^T M block) for a range of L; returns what was in the brackets.
+Small Iteration::clear_of_locked(LockedRange range, const Columns& block, const Columns& block_mass) const {
+  if (range.count == 0) return {};
+  Small parts = locked_.multiply_transposed(comm_, range, block_mass);
+  locked_.subtract_product(range, parts, block);
+  return parts;
+}
+
 // Makes the columns of w M-orthonormal: w <- w R^-1, z <- M w. Returns how many are left; fewer than there were when the space is
 // exhausted. r: (returned, as many as there were).
 int Iteration::orthonormalise(Small& r) {
@@ -368,7 +400,7 @@ int Iteration::orthonormalise(Small& r) {
   multiply_mass();
   r.assign(static_cast<std::size_t>(count) * static_cast<std::size_t>(count), 0.0);
   for (int i = 0; i < count; ++i) r[static_cast<std::size_t>(i * count + i)] = 1;
-  if (size_ + count <= eps_->n - fixed_.count - locked_.count && orthonormalise_by_cholesky(r)) return count;
+  if (size_ + count <= eps_->n - fixed_.count - locked_.count() && orthonormalise_by_cholesky(r)) return count;
   return orthonormalise_by_columns(r);
 }
 
@@ -425,7 +457,7 @@ double Iteration::orthogonalise_column(int i, double* coefficients) {
   const double before = std::sqrt(sum_products(column, image)[0]);
   for (int pass = 0; pass < 2; ++pass) {
     if (pass > 0) multiply_mass();
-    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, image).data(), locked_.count, column);
+    (void)clear_of_locked(locked_orthogonality_.get_all(), column, image);
     subtract_product(all, sum_products(all, image).data(), all.count, column);
     if (i > 0) {
       const Small c = sum_products(w_.part(0, i), image);
@@ -442,7 +474,7 @@ double Iteration::orthogonalise_column(int i, double* coefficients) {
 
 int Iteration::orthonormalise_by_columns(Small& r) {
   const int count = size_ == 0 ? block_ : width_;
-  const auto left = static_cast<int>(std::min<PetscInt>(count, eps_->n - fixed_.count - locked_.count - size_));
+  const auto left = static_cast<int>(std::min<PetscInt>(count, eps_->n - fixed_.count - locked_.count() - size_));
   PetscInt first_row = 0;
   check(MatGetOwnershipRange(w_mat_, &first_row, nullptr));
   double scale = 0;  // of the operator on the block: what is small beside it is rounding
@@ -476,15 +508,18 @@ int Iteration::orthonormalise_by_columns(Small& r) {
   return kept;
 }
 
-// The projection that a step was spared, of the block that came of it. What it takes away is rounding beside the operator.
+// The projection that a step was spared, or another two passes, of the block that came of it. What they take away is rounding beside the
+// operator.
 void Iteration::project_after_all() {
   is_spared_ = false;
+  orthogonality_.clear(0);
+  lossy_ = locked_orthogonality_.get_all();
   const Columns next = w_.part(0, width_);
   const Columns next_mass = z_.part(0, width_);
   const Columns all = everything_.part(0, fixed_.count + size_);
   for (int pass = 0; pass < 2; ++pass) {
     multiply_mass();
-    if (locked_.count > 0) subtract_product(locked_, sum_products(locked_, next_mass).data(), locked_.count, next);
+    (void)clear_of_locked(lossy_, next, next_mass);
     subtract_product(all, sum_products(all, next_mass).data(), all.count, next);
   }
   const Small before = coupling_;  // (width, width)
@@ -512,8 +547,13 @@ bool Iteration::step() {
     }
   }
   next_width_ = orthonormalise(coupling_);
-  if (is_spared_ && next_width_ == width_ && !agree(orthogonality_.is_still_good(get_state(), coupling_, next_width_))) project_after_all();
+  if (next_width_ == width_) {
+    const bool is_good = orthogonality_.is_still_good(get_state(), coupling_, next_width_, is_spared_) &&
+                         locked_orthogonality_.is_still_good(get_state(), coupling_, next_width_);
+    if (!agree(is_good)) project_after_all();
+  }
   orthogonality_.advance(get_state(), coupling_, next_width_, is_spared_);
+  locked_orthogonality_.advance(get_state(), coupling_, next_width_, lossy_);
   for (int j = next_width_; j < block_; ++j) {
     std::fill_n(w_.column(j), w_.rows, 0.0);
     std::fill_n(z_.column(j), z_.rows, 0.0);
@@ -659,7 +699,7 @@ void Iteration::plan_check(const Ritz& ritz) {
   }
   last_converged_ = ritz.converged;
   last_size_ = size_;
-  next_check_ = size_ + std::max(block_, static_cast<int>(ahead));
+  next_check_ = size_ + std::max(2 * block_, static_cast<int>(ahead));
 }
 
 bool Iteration::report(const Ritz& ritz) {
@@ -700,6 +740,7 @@ void Iteration::restart(Ritz& ritz) {
   size_ = width_ = kept;
   last_size_ = size_;
   orthogonality_.forget();
+  locked_orthogonality_.forget();
 }
 
 // The Ritz vectors once through the operator, y + V_next R s / theta, which costs next to nothing as V_next is at hand: what is left of
@@ -726,6 +767,7 @@ void Iteration::finish(Ritz& ritz) {
   }
   combine_columns(basis_.part(0, static_cast<int>(all)), purified.data(), static_cast<int>(count));
   clear_nearest(ritz, static_cast<int>(count));
+  clear_locked(static_cast<int>(count));
 }
 
 // What a spared projection leaves standing is rounding along the pairs nearest the shift, by their large theta. These are the most exact
@@ -750,6 +792,29 @@ void Iteration::clear_nearest(const Ritz& ritz, int count) {
   }
 }
 
+// What was left standing of locked modes.
+void Iteration::clear_locked(int count) {
+  const std::vector<double>& left = locked_orthogonality_.get_left();
+  const auto is_left = [](double x) { return x > kLeft; };
+  const auto first = std::find_if(left.begin(), left.end(), is_left);
+  const auto last = std::find_if(left.rbegin(), std::make_reverse_iterator(first), is_left).base();
+  const LockedRange range{static_cast<int>(first - left.begin()), static_cast<int>(last - first)};
+  if (range.count == 0) return;
+  const int wide = std::min(room_ + block_ - count, kWide);  // of the columns behind, which are free now
+  for (int first = 0; first < count; first += std::max(wide, block_)) {
+    const Columns some = basis_.part(first, std::min(std::max(wide, block_), count - first));
+    const Columns images = wide < block_ ? z_.part(0, some.count) : basis_.part(count, some.count);
+    for (int from = 0; from < some.count; from += block_) {
+      const int width = std::min(block_, some.count - from);
+      for (int j = 0; j < width; ++j) std::copy_n(some.column(from + j), some.rows, w_.column(j));
+      multiply_mass();
+      if (wide < block_) continue;
+      for (int j = 0; j < width; ++j) std::copy_n(z_.column(j), some.rows, images.column(from + j));
+    }
+    (void)clear_of_locked(range, some, images);
+  }
+}
+
 void Iteration::run() {
   bool is_resumed = false;
   if (keeper_ != nullptr && keeper_->start != nullptr) {
@@ -765,7 +830,7 @@ void Iteration::run() {
     PetscScalar* all = everything_.values;
     return check(BVRestoreArray(eps_->V, &all));
   }
-  if (!is_resumed) next_check_ = std::min(static_cast<int>(1.7 * static_cast<double>(eps_->nev)) + 2 * block_, room_);
+  if (!is_resumed) next_check_ = std::min(2 * static_cast<int>(eps_->nev) + 2 * block_, room_);
   while (true) {
     const bool goes_on = step();
     ++eps_->its;
@@ -869,7 +934,6 @@ PetscErrorCode view_settings(EPS eps, PetscViewer viewer) {
 }
 
 PetscErrorCode destroy(EPS eps) {
-  PetscCall(MatDestroy(&get_settings(eps).locked));
   delete static_cast<Settings*>(eps->data);
   eps->data = nullptr;
   return 0;
@@ -899,6 +963,29 @@ PetscErrorCode create(EPS eps) {
 
 }  // namespace
 
+std::vector<double> LockedModes::multiply_transposed(MPI_Comm comm, LockedRange range, const Columns& b) const {
+  std::vector<double> products(static_cast<std::size_t>(range.count) * static_cast<std::size_t>(b.count), 0.0);
+  for_parts(range, [&](const Columns& part, int at) { eigen::multiply_transposed(part, b, products.data() + at, range.count); });
+  MPI_Allreduce(MPI_IN_PLACE, products.data(), static_cast<int>(products.size()), MPI_DOUBLE, MPI_SUM, comm);
+  return products;
+}
+
+void LockedModes::subtract_product(LockedRange range, const std::vector<double>& s, const Columns& b) const {
+  for_parts(range, [&](const Columns& part, int at) { eigen::subtract_product(part, s.data() + at, range.count, b); });
+}
+
+// visit(columns, where they are in the range) for every set that has some.
+template <class Visit>
+void LockedModes::for_parts(LockedRange range, const Visit& visit) const {
+  int at = 0;  // first column of the set
+  for (const Columns& set : sets) {
+    const int from = std::max(range.first, at);
+    const int to = std::min(range.first + range.count, at + set.count);
+    if (from < to) visit(set.part(from - at, to - from), from - range.first);
+    at += set.count;
+  }
+}
+
 PetscErrorCode register_block_lanczos() { return EPSRegister(kBlockLanczosType, create); }
 
 PetscErrorCode set_block_size(EPS eps, PetscInt columns) {
@@ -919,13 +1006,10 @@ PetscErrorCode set_count_known(EPS eps, PetscBool known) {
   return 0;
 }
 
-PetscErrorCode set_locked(EPS eps, Mat columns) {
+PetscErrorCode set_locked(EPS eps, const LockedModes* locked) {
   PetscBool is_ours = PETSC_FALSE;
   PetscCall(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_ours));
-  if (is_ours == PETSC_FALSE) return 0;
-  if (columns != nullptr) PetscCall(PetscObjectReference(reinterpret_cast<PetscObject>(columns)));
-  PetscCall(MatDestroy(&get_settings(eps).locked));
-  get_settings(eps).locked = columns;
+  if (is_ours == PETSC_TRUE) get_settings(eps).locked = locked;
   return 0;
 }
 

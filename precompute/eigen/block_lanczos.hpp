@@ -1,6 +1,7 @@
 // Block Lanczos with shift and invert, as a type of SLEPc's eigensolver object.
 #pragma once
 
+#include <mpi.h>
 #include <slepceps.h>
 
 #include <array>
@@ -11,6 +12,7 @@
 
 #include "precompute/eigen/block_kernels.hpp"
 #include "precompute/eigen/checkpoint.hpp"
+#include "precompute/eigen/orthogonality.hpp"
 
 namespace carillon::eigen {
 
@@ -33,10 +35,26 @@ PetscErrorCode set_block_size(EPS eps, PetscInt columns);
 /// collective.
 PetscErrorCode set_count_known(EPS eps, PetscBool known);
 
-/// A dense matrix of M-orthonormal columns, beside the deflation space, that the iteration stays orthogonal to. They are taken as they are,
-/// which is what makes hundreds of them cheap (EPSSetDeflationSpace orthonormalises anew, vector by vector). Null: none. Logically
-/// collective.
-PetscErrorCode set_locked(EPS eps, Mat columns);
+/// Eigenvectors that are known, beside the deflation space: M-orthonormal columns of this rank's rows, and their eigenvalues.
+struct LockedModes {
+  std::vector<Columns> sets;   // somebody else's
+  std::vector<double> lambda;  // of all columns, set by set
+
+  int count() const { return static_cast<int>(lambda.size()); }
+  /// L^T B of all ranks for a range of columns of L, (range.count, b.count). Collective.
+  std::vector<double> multiply_transposed(MPI_Comm comm, LockedRange range, const Columns& b) const;
+  /// B <- B - L S for that range, S: (range.count, b.count). Local.
+  void subtract_product(LockedRange range, const std::vector<double>& s, const Columns& b) const;
+
+ private:
+  template <class Visit>
+  void for_parts(LockedRange range, const Visit& visit) const;
+};
+
+/// Modes that the iteration stays orthogonal to. They are taken as they are, which is what makes hundreds of them cheap
+/// (EPSSetDeflationSpace orthonormalises anew, vector by vector), and what they weigh in a step is foreseen (orthogonality.hpp). Must
+/// outlive the solve; null: none. Logically collective.
+PetscErrorCode set_locked(EPS eps, const LockedModes* locked);
 
 /// Where an iteration stands between two steps, beside its basis. The same on every rank.
 struct LanczosState {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 #include "precompute/eigen/block_lanczos.hpp"
@@ -182,11 +183,9 @@ void set_operator(EPS eps, const KrylovRequest& request, Family family, ShellCon
 }
 
 // Sizes for the type that the options left: the block method seeks the interval, the others what is nearest.
-void set_goal(EPS eps, const KrylovRequest& request, Family family) {
+void set_goal(EPS eps, const KrylovRequest& request, Family family, PetscInt locked) {
   PetscInt n = 0;
-  PetscInt locked = 0;
   check(MatGetSize(request.stiffness, &n, nullptr));
-  if (request.locked != nullptr) check(MatGetSize(request.locked, nullptr, &locked));
   const PetscInt room = n - locked;
   if (family == Family::block) {
     const PetscInt wanted = std::min(request.count, room);
@@ -213,37 +212,46 @@ void set_goal(EPS eps, const KrylovRequest& request, Family family) {
 }
 
 // For the types that know no locked columns.
-void set_deflation_space(EPS eps, const KrylovRequest& request) {
-  if (request.locked == nullptr) return;
-  PetscInt count = 0;
-  check(MatGetSize(request.locked, nullptr, &count));
-  std::vector<petsc::VecHandle> vectors(static_cast<std::size_t>(count));
+void set_deflation_space(EPS eps, const KrylovRequest& request, const LockedModes& locked) {
+  if (locked.count() == 0) return;
+  std::vector<petsc::VecHandle> vectors;
   std::vector<Vec> plain;
-  for (PetscInt j = 0; j < count; ++j) {
-    petsc::VecHandle& vector = vectors[static_cast<std::size_t>(j)];
-    Vec column = nullptr;
-    check(MatCreateVecs(request.stiffness, vector.out(), nullptr));
-    check(MatDenseGetColumnVecRead(request.locked, j, &column));
-    check(VecCopy(column, vector));
-    check(MatDenseRestoreColumnVecRead(request.locked, j, &column));
-    plain.push_back(vector);
+  for (const Columns& set : locked.sets) {
+    for (int j = 0; j < set.count; ++j) {
+      petsc::VecHandle& vector = vectors.emplace_back();
+      check(MatCreateVecs(request.stiffness, vector.out(), nullptr));
+      PetscScalar* values = nullptr;
+      check(VecGetArrayWrite(vector, &values));
+      std::copy_n(set.column(j), set.rows, values);
+      check(VecRestoreArrayWrite(vector, &values));
+      plain.push_back(vector);
+    }
   }
-  check(EPSSetDeflationSpace(eps, count, plain.data()));
+  check(EPSSetDeflationSpace(eps, static_cast<PetscInt>(plain.size()), plain.data()));
 }
 
 // For the types that know neither: takes the locked columns out of a vector. False if most of it goes with them: it is one of them.
-bool clear_of_locked(const KrylovRequest& request, Vec shape) {
-  if (request.locked == nullptr) return true;
-  petsc::VecHandle image, parts;
-  check(MatCreateVecs(request.locked, parts.out(), image.out()));
+bool clear_of_locked(const KrylovRequest& request, const LockedModes& locked, Vec shape) {
+  if (locked.count() == 0) return true;
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(shape), &comm));
+  const LockedRange all{0, locked.count()};
+  petsc::VecHandle image;
+  check(VecDuplicate(shape, image.out()));
   check(MatMult(request.mass, shape, image));
-  check(MatMultTranspose(request.locked, image, parts));
-  PetscReal known = 0;
-  check(VecNorm(parts, NORM_2, &known));
-  if (known * known > 0.5) return false;
-  check(VecScale(parts, -1));
-  check(MatMultAdd(request.locked, parts, shape, shape));
-  check(VecScale(shape, 1 / std::sqrt(1 - known * known)));
+  PetscInt rows = 0;
+  PetscScalar* x = nullptr;
+  PetscScalar* m_x = nullptr;
+  check(VecGetLocalSize(shape, &rows));
+  check(VecGetArray(image, &m_x));
+  const std::vector<double> parts = locked.multiply_transposed(comm, all, {m_x, rows, rows, 1});
+  check(VecRestoreArray(image, &m_x));
+  const double known = std::inner_product(parts.begin(), parts.end(), parts.begin(), 0.0);
+  if (known > 0.5) return false;
+  check(VecGetArray(shape, &x));
+  locked.subtract_product(all, parts, {x, rows, rows, 1});
+  check(VecRestoreArray(shape, &x));
+  check(VecScale(shape, 1 / std::sqrt(1 - known)));
   return true;
 }
 
@@ -263,11 +271,20 @@ petsc::MatHandle FoundModes::make_columns(PetscInt count) const {
   return columns;
 }
 
-void FoundModes::reset(Mat stiffness, PetscInt capacity) {
+void FoundModes::reset(Mat stiffness, PetscInt capacity, const std::vector<petsc::VecHandle>& rigid) {
   stiffness_ = stiffness;
   lambda.clear();
   capacity_ = capacity;
   columns_ = make_columns(capacity);
+  rigid_count_ = static_cast<int>(rigid.size());
+  rigid_ = make_columns(static_cast<PetscInt>(rigid.size()));
+  const LocalColumns to(rigid_);
+  for (std::size_t j = 0; j < rigid.size(); ++j) {
+    const PetscScalar* values = nullptr;
+    check(VecGetArrayRead(rigid[j], &values));
+    std::copy_n(values, to.rows, to.column(static_cast<PetscInt>(j)));
+    check(VecRestoreArrayRead(rigid[j], &values));
+  }
 }
 
 void FoundModes::make_room(PetscInt count) {
@@ -292,24 +309,15 @@ void FoundModes::add(double eigenvalue, const std::function<bool(Vec shape)>& wr
   if (is_new) lambda.push_back(eigenvalue);
 }
 
-petsc::MatHandle FoundModes::copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const {
-  std::vector<PetscInt> wanted;
-  for (std::size_t j = 0; j < lambda.size(); ++j) {
-    if (lambda[j] > low && lambda[j] < high) wanted.push_back(static_cast<PetscInt>(j));
-  }
-  if (wanted.empty() && others.empty()) return {};
-  petsc::MatHandle copy = make_columns(static_cast<PetscInt>(wanted.size() + others.size()));
-  const LocalColumns from(columns_);
-  const LocalColumns to(copy);
-  PetscInt at = 0;
-  for (const PetscInt j : wanted) std::copy_n(from.column(j), from.rows, to.column(at++));
-  for (const auto& other : others) {
-    const PetscScalar* values = nullptr;
-    check(VecGetArrayRead(other, &values));
-    std::copy_n(values, to.rows, to.column(at++));
-    check(VecRestoreArrayRead(other, &values));
-  }
-  return copy;
+LockedModes FoundModes::find_above(double low) const {
+  LockedModes locked;
+  const auto first = static_cast<int>(std::find_if(lambda.begin(), lambda.end(), [&](double x) { return x > low; }) - lambda.begin());
+  const int count = static_cast<int>(lambda.size()) - first;
+  locked.lambda.assign(static_cast<std::size_t>(rigid_count_), 0.0);
+  locked.lambda.insert(locked.lambda.end(), lambda.begin() + first, lambda.end());
+  if (rigid_count_ > 0) locked.sets.push_back(LocalColumns(rigid_).view());
+  if (count > 0) locked.sets.push_back(LocalColumns(columns_).view().part(first, count));
+  return locked;
 }
 
 petsc::MatHandle FoundModes::take(const std::vector<std::size_t>& order) {
@@ -344,6 +352,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   check(register_block_lanczos());
   ShellContext shell{&request, {}, 0};
   const petsc::MatHandle mass = make_mass_shell(request);
+  const LockedModes locked = found.find_above(request.locked_above);
   petsc::EpsHandle eps;
   check(EPSCreate(comm, eps.out()));
   check(EPSSetType(eps, request.method == Method::kKrylovSchur ? EPSKRYLOVSCHUR : kBlockLanczosType));
@@ -362,14 +371,14 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
     check(EPSSetConvergenceTestFunction(eps, calc_error, const_cast<KrylovRequest*>(&request), nullptr));
   if (family == Family::davidson)
     check(EPSSetConvergenceTestFunction(eps, calc_error_of_pair, const_cast<KrylovRequest*>(&request), nullptr));
-  set_goal(eps, request, family);
+  set_goal(eps, request, family, locked.count());
   check(EPSSetFromOptions(eps));
   if (family == Family::block) {
-    check(set_locked(eps, request.locked));
+    check(set_locked(eps, &locked));
     check(set_keeper(eps, request.keeper));
     set_starting_block(eps, request);
   } else if (family == Family::krylov || family == Family::davidson) {
-    set_deflation_space(eps, request);
+    set_deflation_space(eps, request, locked);
   }
   if (request.progress) check(EPSMonitorSet(eps, report_progress, &shell, nullptr));
 
@@ -387,7 +396,8 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
     if (lambda < request.low || lambda > request.high) continue;
     found.add(lambda, [&](Vec shape) {
       check(EPSGetEigenvector(eps, i, shape, nullptr));
-      return (family != Family::plain && family != Family::dense) || clear_of_locked(request, shape);
+      return (family != Family::plain && family != Family::dense) ||
+             clear_of_locked(request, found.find_above(request.locked_above), shape);
     });
     highest = std::max(highest, lambda);
   }

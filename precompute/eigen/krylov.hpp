@@ -17,12 +17,13 @@ namespace carillon::eigen {
 /// Modes found so far, in the order they came: M-orthonormal columns of one dense matrix with room for more.
 class FoundModes {
  public:
-  /// Forgets all modes and makes room for `capacity` with K's rows. Collective.
-  void reset(Mat stiffness, PetscInt capacity);
+  /// Forgets all modes and makes room for `capacity` with K's rows; `rigid` are found beforehand. Collective.
+  void reset(Mat stiffness, PetscInt capacity, const std::vector<petsc::VecHandle>& rigid);
   /// Adds a pair whose shape `write` puts into the vector it is given; nothing where that returns false. Collective.
   void add(double eigenvalue, const std::function<bool(Vec shape)>& write);
-  /// The modes with low < lambda < high and the other vectors in a matrix of their own; null if there are none. Collective.
-  petsc::MatHandle copy_between(double low, double high, const std::vector<petsc::VecHandle>& others) const;
+  /// The rigid modes, and those found from the first above `low` on: all modes above it, others perhaps. They stay this object's, and where
+  /// they are until a mode is added. Local.
+  LockedModes find_above(double low) const;
   /// The columns by the order given, and nothing else; this object is empty afterwards. Collective.
   petsc::MatHandle take(const std::vector<std::size_t>& order);
   /// Makes room for `count` modes in all. Collective.
@@ -36,6 +37,8 @@ class FoundModes {
   petsc::MatHandle make_columns(PetscInt count) const;
   Mat stiffness_ = nullptr;
   petsc::MatHandle columns_;
+  petsc::MatHandle rigid_;
+  int rigid_count_ = 0;
   PetscInt capacity_ = 0;
 };
 
@@ -52,7 +55,7 @@ struct KrylovRequest {
   PetscInt nearest = 0;                         // and so many nearest sigma cover them (for what can only seek the nearest)
   Method method = Method::kAutomatic;           // unless SLEPc's options say otherwise
   double tolerance = 1e-10;                     // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
-  Mat locked = nullptr;                         // M-orthonormal columns, the run stays M-orthogonal to them; may be null
+  double locked_above = 0;                      // modes found above this lambda, and the rigid ones: the run stays M-orthogonal to them
   const std::vector<Vec3>* position = nullptr;  // of the nodes: what the starting block is made of
   int round = 0;                                // starting blocks of different rounds differ
   /// Pairs converged and right-hand sides solved in this run so far; may be empty.

@@ -68,9 +68,9 @@ std::int64_t calc_kept_bytes(const Problem& problem) {
 
 std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count) {
   const bool is_cut = modes > kSliceModes;
-  const std::int64_t locked = is_cut ? kSliceModes / 2 : rigid_count;
+  const std::int64_t locked = rigid_count + (is_cut ? kSliceModes : 0);  // They are where they were found.
   const std::int64_t basis = calc_basis_size(std::min(modes, kSliceModes), locked, !is_cut);
-  return rows * 8 * (modes + locked + basis);
+  return rows * 8 * (modes + rigid_count + basis);
 }
 
 std::int64_t calc_dense_bytes(std::int64_t unknowns) {

@@ -15,7 +15,7 @@ namespace carillon::eigen {
 inline constexpr PetscInt kDenseRows = 300;       // Smaller problems are solved densely straight away,
 inline constexpr PetscInt kDenseRowsFull = 3000;  // and up to here when a larger part of the spectrum is wanted than this,
 inline constexpr double kDenseShare = 0.4;        // where Lanczos runs meet their own ends.
-inline constexpr std::int64_t kSliceModes = 320;  // Beyond, orthogonalisation costs more than another factorisation.
+inline constexpr std::int64_t kSliceModes = 420;  // Beyond, orthogonalisation costs more than another factorisation.
 
 inline constexpr double kEdgeNudge = 1e-6;  // Counts are taken this far outside the band, relative to lambda.
 

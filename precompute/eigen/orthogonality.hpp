@@ -28,9 +28,11 @@ class Orthogonality {
   /// After the first pass of a projection: c = V^T M w as it was measured, (size, width) with stride `stride`. What was not foreseen is
   /// rounding, and expected again.
   void learn(const State& state, const double* c, int stride);
-  /// After a step that was spared the projection: whether w, made a block with R (next_width, width), did without indeed. R is known only
-  /// then, and where the space is nearly exhausted it shrinks w by far more than the R before.
-  bool is_still_good(const State& state, const std::vector<double>& r, int next_width) const;
+  /// After the last pass of a projection, which took `norm` away from a column at most: V is not quite orthogonal, and leaves a part of it.
+  void clear(double norm);
+  /// After the step: whether w, made a block with R (next_width, width), did without the projection indeed, or with as many passes as it
+  /// had. R is known only then, and where the space is nearly exhausted it shrinks w by far more than the R before.
+  bool is_still_good(const State& state, const std::vector<double>& r, int next_width, bool is_spared) const;
   /// After the step: its R (next_width, width), and whether the projection was left out.
   void advance(const State& state, const std::vector<double>& r, int next_width, bool is_spared);
 
@@ -40,8 +42,51 @@ class Orthogonality {
   std::vector<double> last_;      // V^T M V_j, (size, width)
   std::vector<double> before_;    // V^T M V_{j-1}, (size, width of that block)
   double noise_ = 0;              // what rounding adds to V^T M w; 0: not yet measured
+  double worst_ = 0;              // entry of V^T M V - 1 so far
+  double left_ = 0;               // of V^T M w by the projection
   double divisor_ = 0;            // by which R shrinks w at most, from the last step
   int since_spared_ = 0;
+};
+
+/// Columns [first, first + count) of what is locked.
+struct LockedRange {
+  int first = 0;
+  int count = 0;
+};
+
+/// The same for eigenvectors of the operator that the basis is kept M-orthogonal to, L: L^T M of the last two blocks. Their rows obey
+/// recurrences of their own, and few of them grow: those of the columns nearest to what is sought. The others are left standing, about
+/// 1e-10 of them. Small matrices only; the same on every rank, not collective.
+class LockedOrthogonality {
+ public:
+  LockedOrthogonality() = default;
+  /// theta: (count) eigenvalues of the operator. is_known: false if they are not; no projection is spared then.
+  LockedOrthogonality(std::vector<double> theta, bool is_known);
+
+  /// As of Orthogonality.
+  void forget();
+  /// Before the projection: what w, made a block, must be cleared of; everything else it would do without. alpha: (width, width).
+  LockedRange find_lossy(const Orthogonality::State& state, const double* alpha);
+  /// c = L^T M w of a range as it was measured, (range.count, width).
+  void learn(LockedRange range, const double* c, int width);
+  bool is_still_good(const Orthogonality::State& state, const std::vector<double>& r, int next_width) const;
+  /// After the step, which was cleared of `range`.
+  void advance(const Orthogonality::State& state, const std::vector<double>& r, int next_width, LockedRange range);
+  LockedRange get_all() const { return {0, static_cast<int>(theta_.size())}; }
+  /// (count) the largest entries of L^T M V_j that were left standing, as foreseen.
+  const std::vector<double>& get_left() const { return left_; }
+
+ private:
+  std::vector<double> theta_;
+  bool is_known_ = false;
+  std::vector<double> foreseen_;  // L^T M w, (count, width)
+  double largest_ = 0;            // of its rows that are not lossy
+  std::vector<double> last_;      // L^T M V_j
+  std::vector<double> before_;    // L^T M V_{j-1}
+  std::vector<double> noise_;     // (count) what rounding, and the error of the eigenvector, add to a row
+  std::vector<double> left_;
+  double divisor_ = 0;
+  int clean_ = 0;  // blocks in a row that were cleared of everything
 };
 
 }  // namespace carillon::eigen

@@ -41,16 +41,16 @@ namespace {
 
 using petsc::check;
 
-constexpr double kSurelyApart = 1e-6;    // Modes farther apart than this, relative to lambda, are no group.
-constexpr double kEdgeTolerance = 1e-9;  // A mode this close to an end of the band (relative to lambda) is in it.
-constexpr double kSafeMargin = 1e-7;     // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
-constexpr double kDenseRounding = 1e4;   // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
-constexpr double kDenseStill = 1e3;      // Of the same: eigenvalues below are zero as far as LAPACK can tell,
-constexpr double kStill = 1e2;           // or a count by inertia.
-constexpr double kSlow = 1e-4;           // Of the band's lower end: no mechanism is faster.
-constexpr int kRounds = 60;              // Krylov runs per interval at most until its count is met,
-constexpr int kIdleRounds = 2;           // and so many without a new mode.
-constexpr double kLockedMargin = 0.5;    // Of a slice's width: modes found that near are held away (818 modes: 2,181 solves, at 0.1 2,272).
+constexpr double kSurelyApart = 1e-6;     // Modes farther apart than this, relative to lambda, are no group.
+constexpr double kEdgeTolerance = 1e-9;   // A mode this close to an end of the band (relative to lambda) is in it.
+constexpr double kSafeMargin = 1e-7;      // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
+constexpr double kDenseRounding = 1e4;    // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
+constexpr double kDenseStill = 1e3;       // Of the same: eigenvalues below are zero as far as LAPACK can tell,
+constexpr double kStill = 1e2;            // or a count by inertia.
+constexpr double kSlow = 1e-4;            // Of the band's lower end: no mechanism is faster.
+constexpr int kRounds = 60;               // Krylov runs per interval at most until its count is met,
+constexpr int kIdleRounds = 2;            // and so many without a new mode.
+constexpr double kLockedMargin = 1;       // Of a slice's width: modes found that near are held away.
 constexpr double kKrylovTolerance = 0.1;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
 constexpr double kWorstResidual = 1e-4;   // Of a mode that rounding alone has spoilt: a bank takes none above.
 constexpr int kBases = 3;                 // of equal modes that are tried anew, because their residuals added up.
@@ -315,7 +315,7 @@ void BandSolver::solve_sparse_band() {
   check(MatGetLocalSize(problem_.stiffness, &rows, nullptr));
   check_memory(comm_, calc_search_bytes(rows, wanted.count(), modes_.rigid_count), options_.memory_limit_bytes,
                fmt::format("The search for {} modes", wanted.count()));
-  found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted.count()));
+  found_.reset(problem_.stiffness, petsc::to_petsc_int(wanted.count()), rigid_);
   keeper_.load_found();
   solve_in_slices(wanted);
   prove();
@@ -359,9 +359,7 @@ double BandSolver::run_round(const Slice& slice, ShiftedFactor* cholmod, double 
   request.round = round;
   // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be held away, and fewer
   // neighbours make the iteration shorter.
-  const double margin = kLockedMargin * (slice.high - slice.low);
-  const petsc::MatHandle locked = found_.copy_between(slice.low - margin, slice.high + margin, rigid_);
-  request.locked = locked;
+  request.locked_above = slice.low - kLockedMargin * (slice.high - slice.low);
   const auto before = static_cast<std::int64_t>(found_.lambda.size());
   request.progress = [&](std::int64_t converged, std::int64_t solves) { report(Phase::kIterate, before + converged, solves); };
   request.keeper = keeper_.begin_round(step);

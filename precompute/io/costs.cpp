@@ -11,10 +11,11 @@
 #include <ctime>
 #include <vector>
 
+#include "precompute/eigen/needs.hpp"
+
 namespace carillon::io {
 namespace {
 
-constexpr std::int64_t kSliceModes = 320;  // of a slice at most, see eigen/solve_modes.cpp
 constexpr std::int64_t kUsualModes = 200;  // of a band that was not counted
 constexpr double kUsualEntries = 270, kUsualEntryPower = 1.33;
 constexpr double kUsualFlops = 2.0e10, kUsualFlopPower = 1.7;  // of 100,000 unknowns
@@ -38,12 +39,9 @@ double to_double(std::int64_t value) { return static_cast<double>(value); }
 
 }  // namespace
 
-std::int64_t count_slices(std::int64_t modes) { return std::max<std::int64_t>(1, (modes + kSliceModes - 1) / kSliceModes); }
+std::int64_t count_slices(std::int64_t modes) { return std::max<std::int64_t>(1, (modes + eigen::kSliceModes - 1) / eigen::kSliceModes); }
 
-std::int64_t predict_solves(std::int64_t modes) {
-  const std::int64_t slices = count_slices(modes);
-  return 110 * slices + (slices > 1 ? 235 : 200) * modes / 100;
-}
+std::int64_t predict_solves(std::int64_t modes) { return 110 * count_slices(modes) + 2 * modes; }
 
 std::int64_t predict_factorisations(std::int64_t modes) {
   if (modes == 0) return 3;

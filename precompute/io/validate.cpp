@@ -191,7 +191,7 @@ void Validation::predict_memory() {
   // has, what is not used takes no memory.
   const bool is_cut = modes > eigen::kSliceModes;
   const std::int64_t found = is_cut ? 8 * rows * modes : 0;
-  const std::int64_t columns = eigen::kSliceModes / 2 + 5 * predict_solves(modes) / (4 * count_slices(modes));
+  const std::int64_t columns = 5 * predict_solves(modes) / (4 * count_slices(modes));
   const std::int64_t search =
       outlook_.factor_kept_bytes + (is_cut ? found + 8 * rows * columns : eigen::calc_search_bytes(rows, modes, outlook_.rigid_count));
   const std::int64_t sparse = std::max(outlook_.copies_bytes, outlook_.copies_kept_bytes + std::max(outlook_.factor_bytes + found, search));
