@@ -801,8 +801,9 @@ void Iteration::clear_locked(int count) {
   const LockedRange range{static_cast<int>(first - left.begin()), static_cast<int>(last - first)};
   if (range.count == 0) return;
   const int wide = std::min(room_ + block_ - count, kWide);  // of the columns behind, which are free now
-  for (int first = 0; first < count; first += std::max(wide, block_)) {
-    const Columns some = basis_.part(first, std::min(std::max(wide, block_), count - first));
+  const int step = std::max(wide, block_);
+  for (int at = 0; at < count; at += step) {
+    const Columns some = basis_.part(at, std::min(step, count - at));
     const Columns images = wide < block_ ? z_.part(0, some.count) : basis_.part(count, some.count);
     for (int from = 0; from < some.count; from += block_) {
       const int width = std::min(block_, some.count - from);
