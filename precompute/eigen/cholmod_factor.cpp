@@ -3,6 +3,7 @@
 // Deviations: none.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "precompute/eigen/shifted_factor.hpp"
@@ -54,9 +55,10 @@ class CholmodFactor final : public ShiftedFactor {
     return true;
   }
 
-  void solve(double* x, std::ptrdiff_t stride, int columns) override {
+  void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
     PetscInt n = 0;
     check(MatGetSize(stiffness_, &n, nullptr));
+    for (int j = 0; j < columns && b != x; ++j) std::copy_n(b + j * stride, n, x + j * stride);
     petsc::MatHandle solution;
     petsc::MatHandle right;
     check(MatCreateSeqDense(PETSC_COMM_SELF, n, columns, x, solution.out()));

@@ -100,10 +100,9 @@ std::int64_t InertiaCounter::count_below() {
     check(MatMult(problem_.mass, rigid_[static_cast<std::size_t>(j)], image));
     check(VecGetArrayRead(image, &values));
     std::copy_n(values, rows, images.column(j));
-    std::copy_n(values, rows, solved.column(j));
     check(VecRestoreArrayRead(image, &values));
   }
-  factor_->solve(solved.values, solved.stride, rigid);
+  factor_->solve(images.values, solved.values, solved.stride, rigid);
   statistics_.solves += rigid;
   std::vector<double> products(rigid_.size() * rigid_.size());
   multiply_transposed(images, solved, products.data(), rigid);

@@ -37,10 +37,11 @@ struct ShellContext {
   }
 };
 
-void solve_columns(ShellContext& context, const Columns& x) {
+// x = (K - sigma M)^-1 b
+void solve_columns(ShellContext& context, const Columns& b, const Columns& x) {
   const petsc::WorkScope scope(petsc::WorkPhase::kSolve);
   const double start = MPI_Wtime();
-  context.request->factor->solve(x.values, x.stride, x.count);
+  context.request->factor->solve(b.values, x.values, x.stride, x.count);
   context.statistics.solve_seconds += MPI_Wtime() - start;
   context.statistics.solves += x.count;
   context.report();
@@ -55,7 +56,8 @@ PetscErrorCode apply_inverse(PC pc, Vec b, Vec x) {
     PetscScalar* values = nullptr;
     check(VecGetLocalSize(x, &rows));
     check(VecGetArray(x, &values));
-    solve_columns(*context, {values, rows, rows, 1});
+    const Columns column{values, rows, rows, 1};
+    solve_columns(*context, column, column);
     check(VecRestoreArray(x, &values));
   });
 }
@@ -64,9 +66,13 @@ PetscErrorCode apply_inverse_to_block(PC pc, Mat b, Mat x) {
   return guard([&] {
     ShellContext* context = nullptr;
     check(PCShellGetContext(pc, &context));
-    check(MatCopy(b, x, SAME_NONZERO_PATTERN));
-    const LocalColumns columns(x);
-    solve_columns(*context, columns.view());
+    const LocalColumns to(x);
+    {
+      const LocalColumns from(b);
+      if (from.stride == to.stride) return solve_columns(*context, from.view(), to.view());
+      for (int j = 0; j < to.view().count; ++j) std::copy_n(from.view().column(j), to.rows, to.view().column(j));
+    }
+    solve_columns(*context, to.view(), to.view());
   });
 }
 

@@ -16,7 +16,9 @@ class LdltFactor final : public ShiftedFactor {
   }
 
   bool factorise(double sigma) override { return factor_.factorise(sigma); }
-  void solve(double* x, std::ptrdiff_t stride, int columns) override { factor_.solve(x, petsc::to_petsc_int(stride), columns); }
+  void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
+    factor_.solve(b, x, petsc::to_petsc_int(stride), columns);
+  }
   std::int64_t get_negative_pivots() const override { return factor_.get_negative_pivots(); }
   double get_backward_error() const override { return factor_.get_backward_error(); }
   std::int64_t get_peak_bytes() const override { return factor_.get_analysis().ranks[static_cast<std::size_t>(rank_)].peak_bytes; }

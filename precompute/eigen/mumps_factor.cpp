@@ -101,7 +101,7 @@ class MumpsFactor final : public ShiftedFactor {
   ~MumpsFactor() override;
 
   bool factorise(double sigma) override;
-  void solve(double* x, std::ptrdiff_t stride, int columns) override;
+  void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override;
   std::int64_t get_negative_pivots() const override;
   double get_backward_error() const override { return 0; }
   std::int64_t get_peak_bytes() const override;
@@ -273,8 +273,9 @@ void MumpsFactor::State::make_scatter() {
   check(VecScatterCreate(solution_vec, from, result_vec, to, scatter.out()));
 }
 
-void MumpsFactor::solve(double* x, std::ptrdiff_t stride, int columns) {
+void MumpsFactor::solve(const double* b, double* x, std::ptrdiff_t stride, int columns) {
   State& s = *state_;
+  for (int j = 0; j < columns && b != x; ++j) std::copy_n(b + j * stride, s.own_rows.size(), x + j * stride);
   s.mumps.nrhs = columns;
   const auto leading = static_cast<MUMPS_INT>(std::max<std::ptrdiff_t>(stride, 1));
   if (s.size == 1) {

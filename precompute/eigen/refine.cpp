@@ -124,7 +124,7 @@ struct Corrections {
       double* residual = d.column(static_cast<int>(j));
       for (std::size_t i = 0; i < rows; ++i) residual[i] -= lambda[group[j]] * m_phi[i];
     }
-    request.get_factor().solve(d.values, d.stride, d.count);
+    request.get_factor().solve(d.values, d.values, d.stride, d.count);
     cost.solves += d.count;
   }
   Corrections(const Corrections&) = delete;
@@ -186,7 +186,7 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
     const Columns work{space.data(), x.rows, x.rows, x.count};
     for (std::size_t j = 0; j < bad.size(); ++j)
       operators.mass.multiply(all.part(static_cast<int>(bad[j]), 1), x.part(static_cast<int>(j), 1));
-    request.at_hand->solve(x.values, x.stride, x.count);
+    request.at_hand->solve(x.values, x.values, x.stride, x.count);
     cost.solves += x.count;
     for (int pass = 0; pass < 3; ++pass) {
       normalise(operators, x, work);

@@ -20,8 +20,8 @@ class ShiftedFactor {
   /// Factorises K - sigma M. False if a pivot vanished: sigma hits an eigenvalue, take another. Throws SolveError when the factorisation
   /// breaks down otherwise, SystemError when memory runs out.
   virtual bool factorise(double sigma) = 0;
-  /// X <- (K - sigma M)^-1 X: this rank's rows, column-major.
-  virtual void solve(double* x, std::ptrdiff_t stride, int columns) = 0;
+  /// X <- (K - sigma M)^-1 B: this rank's rows, column-major, both with the same stride. b may be x, and shares no part of it else.
+  virtual void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) = 0;
   /// Number of eigenvalues below the sigma of the last factorise (Sylvester's law of inertia).
   virtual std::int64_t get_negative_pivots() const = 0;
   /// Relative residual of a solve with the last factorisation; 0 if it is not measured.

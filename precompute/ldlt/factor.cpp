@@ -59,9 +59,9 @@ struct Factor::State {
   /// y = (K - sigma M) x on this rank's rows. Collective.
   void apply(Vec x, Vec y, Vec scratch) const;
   double measure_backward_error(bool is_refined);
-  /// X <- A^-1 X, A graded, with the factorisation alone. Collective.
-  void solve(double* x, int stride, int columns);
-  /// The same, and one step of iterative refinement. Collective.
+  /// X <- A^-1 B, A graded, with the factorisation alone. Collective.
+  void solve(const double* b, double* x, int stride, int columns);
+  /// X <- A^-1 X with one step of iterative refinement. Collective.
   void solve_refined(double* x, int stride, int columns);
 };
 
@@ -119,7 +119,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   if (is_refined)
     solve_refined(values, stride, 1);
   else
-    solve(values, stride, 1);
+    solve(values, values, stride, 1);
   check(VecRestoreArray(x, &values));
   double b_norm = 0;
   double x_norm = 0;
@@ -166,11 +166,12 @@ std::int64_t Factor::get_negative_pivots() const { return state_->numbers.negati
 double Factor::get_backward_error() const { return state_->backward_error; }
 double Factor::get_growth() const { return state_->numbers.growth; }
 
-void Factor::State::solve(double* x, int stride, int columns) {
+void Factor::State::solve(const double* b, double* x, int stride, int columns) {
   petsc::add_flops(4.0 * static_cast<double>(plan.analysis.ranks[static_cast<std::size_t>(plan.rank)].entries) * columns);
-  for (int first = 0; first < columns; first += kSolveColumns)
-    solve_columns(plan, numbers, workspace, x + static_cast<std::ptrdiff_t>(first) * stride, stride,
-                  std::min(kSolveColumns, columns - first));
+  for (int first = 0; first < columns; first += kSolveColumns) {
+    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(first) * stride;
+    solve_columns(plan, numbers, workspace, b + at, x + at, stride, std::min(kSolveColumns, columns - first));
+  }
 }
 
 void Factor::State::solve_refined(double* x, int stride, int columns) {
@@ -184,7 +185,7 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
   const std::ptrdiff_t n = rows;
   std::vector<double> rest(static_cast<std::size_t>(n * columns));  // B - A X
   for (int j = 0; j < columns; ++j) std::copy_n(x + std::ptrdiff_t{j} * stride, n, rest.data() + j * n);
-  solve(x, stride, columns);
+  solve(x, x, stride, columns);
   for (int j = 0; j < columns; ++j) {
     check(VecPlaceArray(from, x + std::ptrdiff_t{j} * stride));
     apply(from, to, scratch);
@@ -194,18 +195,26 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
     for (std::ptrdiff_t i = 0; i < n; ++i) rest[static_cast<std::size_t>(j * n + i)] -= image[i];
     check(VecRestoreArrayRead(to, &image));
   }
-  solve(rest.data(), std::max<int>(rows, 1), columns);
+  solve(rest.data(), rest.data(), std::max<int>(rows, 1), columns);
   for (int j = 0; j < columns; ++j)
     for (std::ptrdiff_t i = 0; i < n; ++i) x[std::ptrdiff_t{j} * stride + i] += rest[static_cast<std::size_t>(j * n + i)];
 }
 
-void Factor::solve(double* x, int stride, int columns) {
-  state_->graded->scale(x, stride, columns);
-  if (state_->needs_refinement)
-    state_->solve_refined(x, stride, columns);
+void Factor::solve(const double* b, double* x, int stride, int columns) {
+  State& s = *state_;
+  if (s.graded->is_scaled() || s.needs_refinement) {
+    for (int j = 0; j < columns && b != x; ++j) {
+      const std::ptrdiff_t at = std::ptrdiff_t{j} * stride;
+      std::copy_n(b + at, 3 * s.plan.own_nodes, x + at);
+    }
+    b = x;
+  }
+  s.graded->scale(x, stride, columns);
+  if (s.needs_refinement)
+    s.solve_refined(x, stride, columns);
   else
-    state_->solve(x, stride, columns);
-  state_->graded->scale(x, stride, columns);
+    s.solve(b, x, stride, columns);
+  s.graded->scale(x, stride, columns);
 }
 
 }  // namespace carillon::ldlt

@@ -54,9 +54,10 @@ class Factor {
   /// Largest magnitude in L: how far pivoting inside the blocks let the numbers grow.
   double get_growth() const;
 
-  /// X <- (K - sigma M)^-1 X. x: this rank's rows, column-major (stride >= own rows), any number of columns; fastest in multiples of 16.
+  /// X <- (K - sigma M)^-1 B. b, x: this rank's rows, column-major (stride >= own rows), any number of columns; fastest in multiples of 16.
+  /// b may be x, and shares no part of it else.
   /// With one step of iterative refinement, at twice the price, where the backward error of the factorisation is above 3e-13.
-  void solve(double* x, int stride, int columns);
+  void solve(const double* b, double* x, int stride, int columns);
 
  private:
   struct State;

@@ -16,9 +16,22 @@ namespace {
 
 typedef double Vector __attribute__((vector_size(64)));
 
-/// Numbers of L to call from memory ahead of their use: the order of use inside a tile is not what the processor foresees.
-constexpr int kAhead = 1024;
+/// Numbers of L to call ahead of their use, from memory to the second-level cache and then to the first: the order of use inside a tile is
+/// not what the processor foresees.
+constexpr int kFar = 512;
+constexpr int kNear = 256;
 constexpr int kLine = 8;
+inline void call(const double* far, const double* near) {
+  __builtin_prefetch(far, 0, 2);
+  __builtin_prefetch(near);
+}
+
+/// What is read from one end to the other, and what will be read then.
+struct Reading {
+  const double* end;
+  const double* next;
+  const double* find_ahead(const double* at, long ahead) const { return end - at > ahead ? at + ahead : next + (ahead - (end - at)); }
+};
 
 /// The 12 rows of right-hand sides that belong to a tile: three for each of four nodes.
 template <int kStride>
@@ -60,7 +73,7 @@ inline void multiply_rows(const double* tile, int n, const Vector* in, const Til
 #pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) row[v] = in[k * kStride + first + v];
     const double* a = tile + k * kHeight + kBegin;
-    for (int i = 0; i < kCount; i += kLine) __builtin_prefetch(a + kAhead + i);
+    for (int i = 0; i < kCount; i += kLine) call(a + kFar + i, a + kNear + i);
 #pragma GCC unroll 12
     for (int i = 0; i < kCount; ++i)
 #pragma GCC unroll 2
@@ -112,14 +125,16 @@ void set_triangle(const double* tiles, int n, const double* in_rows, double* out
 }
 
 template <int kHeight, int kCount, int kUsed, int kStride, bool kAdd>
-inline void multiply_columns(const double* tile, const TileRows<kStride>& in, int first, Vector* out) {
+inline void multiply_columns(const double* tile, const Reading& reading, const TileRows<kStride>& in, int first, Vector* out) {
+  const double* far = reading.find_ahead(tile, kFar);
+  const double* near = reading.find_ahead(tile, kNear);
   Vector sum[kCount][kUsed];
 #pragma GCC unroll 12
   for (int k = 0; k < kCount; ++k)
 #pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) sum[k][v] = out[k * kStride + first + v];
-  for (int i = 0; i < kHeight * kCount; i += kLine) __builtin_prefetch(tile + kAhead + i);
   for (int i = 0; i < kHeight; ++i) {
+    for (int line = i * kCount / kLine; line < (i + 1) * kCount / kLine; ++line) call(far + kLine * line, near + kLine * line);
     Vector row[kUsed];
 #pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) row[v] = in.at(i, first + v);
@@ -137,55 +152,56 @@ inline void multiply_columns(const double* tile, const TileRows<kStride>& in, in
 
 /// out (n rows) (-= or, with kAdd, +=) tile^T in.
 template <int kHeight, int kStride, bool kAdd>
-inline void multiply_tile_transposed(const double* tile, int n, const TileRows<kStride>& in, Vector* out) {
+inline void multiply_tile_transposed(const double* tile, const Reading& reading, int n, const TileRows<kStride>& in, Vector* out) {
   constexpr int kUsed = kStride < kVectors ? kStride : kVectors;
   for (int v = 0; v < kStride; v += kUsed) {
     int k = 0;
-    for (; k + kRows <= n; k += kRows) multiply_columns<kHeight, kRows, kUsed, kStride, kAdd>(tile + k * kHeight, in, v, out + k * kStride);
-    for (; k < n; k += 3) multiply_columns<kHeight, 3, kUsed, kStride, kAdd>(tile + k * kHeight, in, v, out + k * kStride);
+    for (; k + kRows <= n; k += kRows)
+      multiply_columns<kHeight, kRows, kUsed, kStride, kAdd>(tile + k * kHeight, reading, in, v, out + k * kStride);
+    for (; k < n; k += 3) multiply_columns<kHeight, 3, kUsed, kStride, kAdd>(tile + k * kHeight, reading, in, v, out + k * kStride);
   }
 }
 
 template <int kStride>
-void subtract_transposed(const double* tiles, int m, int n, const int* nodes, double* all, double* out_rows) {
+void subtract_transposed(const double* tiles, int m, int n, const int* nodes, double* all, double* out_rows, const double* next) {
   auto* out = reinterpret_cast<Vector*>(out_rows);
+  const Reading reading{tiles + static_cast<long>(m) * n, next};
   int i = 0;
-  for (; i + kTileRows <= m; i += kTileRows, nodes += kTileRows / 3)
-    multiply_tile_transposed<kTileRows, kStride, false>(tiles + static_cast<long>(i) * n, n, find_rows<kStride>(all, nodes, (m - i) / 3),
-                                                        out);
+  for (; i + kTileRows <= m; i += kTileRows, nodes += kTileRows / 3, tiles += kTileRows * n)
+    multiply_tile_transposed<kTileRows, kStride, false>(tiles, reading, n, find_rows<kStride>(all, nodes, (m - i) / 3), out);
   if (i == m) return;
-  tiles += static_cast<long>(i) * n;
   const auto in = find_rows<kStride>(all, nodes, (m - i) / 3);
-  if (m - i == 9) multiply_tile_transposed<9, kStride, false>(tiles, n, in, out);
-  if (m - i == 6) multiply_tile_transposed<6, kStride, false>(tiles, n, in, out);
-  if (m - i == 3) multiply_tile_transposed<3, kStride, false>(tiles, n, in, out);
+  if (m - i == 9) multiply_tile_transposed<9, kStride, false>(tiles, reading, n, in, out);
+  if (m - i == 6) multiply_tile_transposed<6, kStride, false>(tiles, reading, n, in, out);
+  if (m - i == 3) multiply_tile_transposed<3, kStride, false>(tiles, reading, n, in, out);
 }
 
 template <int kStride>
-void add_triangle_transposed(const double* tiles, int n, double* in_rows, double* out_rows) {
+void add_triangle_transposed(const double* tiles, int n, double* in_rows, double* out_rows, const double* next) {
   auto* in = reinterpret_cast<Vector*>(in_rows);
   auto* out = reinterpret_cast<Vector*>(out_rows);
+  const Reading reading{tiles + count_triangle(n), next};
   int i = 0;
   for (; i + kTileRows <= n; i += kTileRows, in += kTileRows * kStride) {
-    multiply_tile_transposed<kTileRows, kStride, true>(tiles, i + kTileRows, find_rows<kStride>(in), out);
+    multiply_tile_transposed<kTileRows, kStride, true>(tiles, reading, i + kTileRows, find_rows<kStride>(in), out);
     tiles += kTileRows * (i + kTileRows);
   }
-  if (n - i == 9) multiply_tile_transposed<9, kStride, true>(tiles, n, find_rows<kStride>(in), out);
-  if (n - i == 6) multiply_tile_transposed<6, kStride, true>(tiles, n, find_rows<kStride>(in), out);
-  if (n - i == 3) multiply_tile_transposed<3, kStride, true>(tiles, n, find_rows<kStride>(in), out);
+  if (n - i == 9) multiply_tile_transposed<9, kStride, true>(tiles, reading, n, find_rows<kStride>(in), out);
+  if (n - i == 6) multiply_tile_transposed<6, kStride, true>(tiles, reading, n, find_rows<kStride>(in), out);
+  if (n - i == 3) multiply_tile_transposed<3, kStride, true>(tiles, reading, n, find_rows<kStride>(in), out);
 }
 
 void subtract_product(const double* tiles, int m, int n, int vectors, const double* in, const int* nodes, double* rows) {
   vectors == 1 ? subtract_product<1>(tiles, m, n, in, nodes, rows) : subtract_product<2>(tiles, m, n, in, nodes, rows);
 }
-void subtract_transposed(const double* tiles, int m, int n, int vectors, const int* nodes, double* rows, double* out) {
-  vectors == 1 ? subtract_transposed<1>(tiles, m, n, nodes, rows, out) : subtract_transposed<2>(tiles, m, n, nodes, rows, out);
+void subtract_transposed(const double* tiles, int m, int n, int vectors, const int* nodes, double* rows, double* out, const double* next) {
+  vectors == 1 ? subtract_transposed<1>(tiles, m, n, nodes, rows, out, next) : subtract_transposed<2>(tiles, m, n, nodes, rows, out, next);
 }
 void set_triangle(const double* tiles, int n, int vectors, const double* in, double* out) {
   vectors == 1 ? set_triangle<1>(tiles, n, in, out) : set_triangle<2>(tiles, n, in, out);
 }
-void add_triangle_transposed(const double* tiles, int n, int vectors, double* in, double* out) {
-  vectors == 1 ? add_triangle_transposed<1>(tiles, n, in, out) : add_triangle_transposed<2>(tiles, n, in, out);
+void add_triangle_transposed(const double* tiles, int n, int vectors, double* in, double* out, const double* next) {
+  vectors == 1 ? add_triangle_transposed<1>(tiles, n, in, out, next) : add_triangle_transposed<2>(tiles, n, in, out, next);
 }
 
 inline double magnitude(double x) { return __builtin_fabs(x); }

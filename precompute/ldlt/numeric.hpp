@@ -58,8 +58,8 @@ struct Workspace {
 
 inline constexpr int kSolveColumns = 32;  // at a time
 
-/// x <- A^-1 x for at most kSolveColumns columns. Collective.
-void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, double* x, int stride, int columns);
+/// x <- A^-1 b for at most kSolveColumns columns, `stride` apart; b may be x. Collective.
+void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, const double* b, double* x, int stride, int columns);
 Workspace make_workspace(const Plan& plan);
 
 }  // namespace carillon::ldlt

@@ -34,14 +34,15 @@ class Solver {
     }
   }
 
-  void load(const double* x, std::ptrdiff_t stride) const {
+  void load(const double* b, std::ptrdiff_t stride) const {
     for (const Block& block : blocks_) {
       std::memset(
           find_row(block, plan_.interior_nodes), 0,
           sizeof(double) * 3 * static_cast<std::size_t>(plan_.local_nodes - plan_.interior_nodes) * static_cast<std::size_t>(block.width));
       for (std::ptrdiff_t v = 0; v < plan_.own_nodes; ++v) {
-        double* row = find_row(block, plan_.node_of_own[static_cast<std::size_t>(v)]);
-        const double* from = x + block.first_column * stride + 3 * v;
+        double* row = find_own(block, v);
+        call_rows(block, v, true);
+        const double* from = b + block.first_column * stride + 3 * v;
         for (int d = 0; d < 3; ++d, row += block.width, ++from) {
           for (int c = 0; c < block.columns; ++c) row[c] = from[c * stride];
           for (int c = block.columns; c < block.width; ++c) row[c] = 0;
@@ -50,13 +51,22 @@ class Solver {
     }
   }
 
+  /// By strips of nodes that stay in the first-level cache. Columns are written in whole runs: one number of each at a time would wait for
+  /// memory at every line.
   void store(double* x, std::ptrdiff_t stride) const {
+    constexpr std::ptrdiff_t kStrip = 64;
+    alignas(64) double strip[16][3 * kStrip];
     for (const Block& block : blocks_)
-      for (std::ptrdiff_t v = 0; v < plan_.own_nodes; ++v) {
-        const double* row = find_row(block, plan_.node_of_own[static_cast<std::size_t>(v)]);
-        double* to = x + block.first_column * stride + 3 * v;
-        for (int d = 0; d < 3; ++d, row += block.width, ++to)
-          for (int c = 0; c < block.columns; ++c) to[c * stride] = row[c];
+      for (std::ptrdiff_t first = 0; first < plan_.own_nodes; first += kStrip) {
+        const std::ptrdiff_t nodes = std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
+        for (std::ptrdiff_t v = 0; v < nodes; ++v) {
+          const double* row = find_own(block, first + v);
+          call_rows(block, first + v, false);
+          for (std::ptrdiff_t d = 0; d < 3; ++d, row += block.width)
+            for (int c = 0; c < block.columns; ++c) strip[c][3 * v + d] = row[c];
+        }
+        for (int c = 0; c < block.columns; ++c)
+          std::memcpy(x + (block.first_column + c) * stride + 3 * first, strip[c], sizeof(double) * 3 * static_cast<std::size_t>(nodes));
       }
   }
 
@@ -89,6 +99,15 @@ class Solver {
  private:
   static double* find_row(const Block& block, std::int32_t node) {
     return block.rows + 3 * static_cast<std::ptrdiff_t>(node) * block.width;
+  }
+
+  double* find_own(const Block& block, std::ptrdiff_t v) const { return find_row(block, plan_.node_of_own[static_cast<std::size_t>(v)]); }
+
+  /// Calls the rows of a later own node from memory: they lie anywhere.
+  void call_rows(const Block& block, std::ptrdiff_t v, bool is_written) const {
+    constexpr std::ptrdiff_t kAhead = 12;
+    const double* rows = find_own(block, std::min<std::ptrdiff_t>(v + kAhead, plan_.own_nodes - 1));
+    for (int i = 0; i < 3 * block.width; i += 8) is_written ? __builtin_prefetch(rows + i, 1) : __builtin_prefetch(rows + i);
   }
 
   const std::uint8_t* find_order(const Front& front, int begin) const {
@@ -143,15 +162,25 @@ class Solver {
       const int m = 3 * front.size() - end;
       const std::uint8_t* order = find_order(front, begin);
       tiles -= count_triangle(n) + static_cast<std::ptrdiff_t>(n) * m;
+      const double* next = tiles - find_below(s, p);
       for (const Block& block : blocks_) {
         double* own = find_row(block, front.first) + begin * block.width;
         divide_by_pivots(3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin), n, block.width, own, pivots);
-        kernels_.subtract_transposed(tiles + count_triangle(n), m, n, block.width / 8, nodes_.data() + end / 3, block.rows, pivots);
+        kernels_.subtract_transposed(tiles + count_triangle(n), m, n, block.width / 8, nodes_.data() + end / 3, block.rows, pivots, tiles);
         std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * block.width));
-        kernels_.add_triangle_transposed(tiles, n, block.width / 8, pivots, solution);
+        kernels_.add_triangle_transposed(tiles, n, block.width / 8, pivots, solution, next);
         for (int k = 0; k < n; ++k) copy_row(solution + k * block.width, block.width, own + order[k] * block.width);
       }
     }
+  }
+
+  /// Numbers of L21 of the panel that stands before panel p of front s.
+  std::ptrdiff_t find_below(std::int32_t s, std::int32_t p) const {
+    if (p == 0 && s == 0) return 0;
+    const Front& front = plan_.fronts[p > 0 ? s : s - 1];
+    if (p == 0) p = count_panels(front.width);
+    const int end = 3 * find_panel_start(front.width, p);
+    return static_cast<std::ptrdiff_t>(end - 3 * find_panel_start(front.width, p - 1)) * (3 * front.size() - end);
   }
 
   /// to <- D^-1 from, n rows of kWidth.
@@ -217,9 +246,9 @@ Workspace make_workspace(const Plan& plan) {
   return workspace;
 }
 
-void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, double* x, int stride, int columns) {
+void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, const double* b, double* x, int stride, int columns) {
   Solver solver(plan, numbers, workspace, columns);
-  solver.load(x, stride);
+  solver.load(b, stride);
   solver.forward();
   solver.backward();
   solver.store(x, stride);
