@@ -2,11 +2,15 @@
 #include "precompute/petsc/session.hpp"
 
 #include <fmt/core.h>
+#include <malloc.h>
 #include <slepcsys.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
 #include <string_view>
@@ -86,6 +90,18 @@ void spare_the_search_for_networks() {
 // when such a server ends in between.
 void spare_the_search_for_displays() { setenv("HWLOC_COMPONENTS", "-gl", 0); }
 
+// SuperLU_DIST, which PETSc brings along, forbids malloc when it is loaded to take pages of its own for large pieces, and to give any back:
+// what is freed stays with the process, and calloc writes zeros over it. Large pieces get their pages again, but not those that come and go
+// in every step: their pages would, too.
+void let_malloc_give_back() {
+  constexpr int kMostMaps = 65536;  // glibc's own
+  constexpr int kLarge = 4 << 20;
+  constexpr int kKept = 64 << 20;
+  (void)mallopt(M_MMAP_MAX, kMostMaps);
+  (void)mallopt(M_MMAP_THRESHOLD, kLarge);
+  (void)mallopt(M_TRIM_THRESHOLD, kKept);
+}
+
 // PETSc writes zeros over whatever it shall clear. The system gives large pieces cleared, page by page when they are first touched: so room
 // that is never used takes neither time nor memory.
 PetscErrorCode allocate(size_t bytes, PetscBool clear, int, const char[], const char[], void** result) {
@@ -137,6 +153,7 @@ Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_
   own_argv.push_back(nullptr);
   int own_argc = static_cast<int>(own.size());
   char** own_args = own_argv.data();
+  let_malloc_give_back();
   if (!asks_for_allocator(petsc_options)) (void)PetscMallocSet(allocate, release, reallocate);
   if (SlepcInitialize(&own_argc, &own_args, nullptr, nullptr) != 0) throw SystemError("PETSc and SLEPc do not start.");
   (void)PetscPushErrorHandler(record_error, nullptr);
@@ -215,6 +232,13 @@ PetscInt to_petsc_int(std::int64_t value) {
     throw SystemError(fmt::format("{} does not fit PETSc's index type of this build. Take a coarser mesh.", value));
   }
   return static_cast<PetscInt>(value);
+}
+
+void give_back_pages(void* begin, void* end) {
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(begin) + page - 1) / page * page;
+  const std::uintptr_t last = reinterpret_cast<std::uintptr_t>(end) / page * page;
+  if (first < last) (void)madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED);
 }
 
 std::int64_t get_peak_memory_bytes() {

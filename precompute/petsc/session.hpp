@@ -66,6 +66,9 @@ void run_agreed(MPI_Comm comm, Work&& work) {
 /// Narrows a count to PETSc's (32-bit) index type. Throws SystemError when it does not fit.
 PetscInt to_petsc_int(std::int64_t value);
 
+/// Gives the memory of the whole pages between two addresses back to the system; what is read there afterwards is zero. Local.
+void give_back_pages(void* begin, void* end);
+
 /// Highest resident memory of this process so far [byte]. Local.
 std::int64_t get_peak_memory_bytes();
 

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 #include <petscmat.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
 #include <limits>
 #include <type_traits>
 #include <vector>
@@ -113,6 +117,61 @@ TEST(PeakMemory, grows_with_what_is_touched) {
   std::vector<char> block(kBytes);
   for (std::size_t i = 0; i < kBytes; i += 512) block[i] = static_cast<char>(i);
   EXPECT_GE(get_peak_memory_bytes(), std::max<std::int64_t>(before, kBytes));
+}
+
+// Of this process, now.
+std::int64_t get_resident_bytes() {
+  std::int64_t whole = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> whole >> resident;
+  return resident * sysconf(_SC_PAGESIZE);
+}
+
+constexpr std::size_t kLarge = 64 << 20;
+constexpr std::int64_t kLittle = 8 << 20;
+
+TEST(Memory, of_large_pieces_goes_back_when_they_are_freed) {
+  const std::int64_t before = get_resident_bytes();
+  for (int repeat = 0; repeat < 3; ++repeat) {
+    char* piece = nullptr;
+    check(PetscMalloc1(kLarge, &piece));
+    std::fill_n(piece, kLarge, '\1');
+    EXPECT_GT(get_resident_bytes(), before + static_cast<std::int64_t>(kLarge) - kLittle);
+    std::vector<char> behind(1 << 20, '\1');  // keeps the heap from shrinking, if the piece is of it
+    check(PetscFree(piece));
+    EXPECT_LT(get_resident_bytes(), before + kLittle);
+  }
+}
+
+TEST(Memory, that_petsc_clears_is_not_taken_before_it_is_used) {
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    const std::int64_t before = get_resident_bytes();
+    char* piece = nullptr;
+    check(PetscCalloc1(kLarge, &piece));
+    EXPECT_LT(get_resident_bytes(), before + kLittle);
+    EXPECT_EQ(std::count(piece, piece + kLarge, '\0'), static_cast<std::ptrdiff_t>(kLarge));
+    std::fill_n(piece, kLarge, '\1');
+    check(PetscFree(piece));
+  }
+}
+
+TEST(Memory, is_given_back_in_whole_pages_and_no_more) {
+  const std::ptrdiff_t page = sysconf(_SC_PAGESIZE);
+  char* piece = nullptr;
+  check(PetscMalloc1(kLarge, &piece));
+  std::fill_n(piece, kLarge, '\1');
+  const std::int64_t before = get_resident_bytes();
+  char* const begin = piece + page / 2;
+  char* const end = piece + kLarge - page / 2;
+  give_back_pages(begin, end);
+  EXPECT_LT(get_resident_bytes(), before - static_cast<std::int64_t>(kLarge) + kLittle);
+  EXPECT_EQ(std::count(piece, begin, '\1'), begin - piece);
+  EXPECT_EQ(std::count(end, piece + kLarge, '\1'), piece + kLarge - end);
+  EXPECT_EQ(std::count(begin + page, end - page, '\0'), end - begin - 2 * page);
+  piece[4 * page] = '\2';
+  give_back_pages(piece + 4 * page, piece + 4 * page);          // nothing,
+  give_back_pages(piece + 4 * page - 1, piece + 5 * page - 1);  // and no whole page
+  EXPECT_EQ(piece[4 * page], '\2');
+  check(PetscFree(piece));
 }
 
 TEST(Blas, has_a_name_that_agrees_with_its_verdict) {
