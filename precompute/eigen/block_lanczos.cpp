@@ -86,6 +86,7 @@ class Iteration {
   };
 
   void open_basis();
+  void close_basis();
   void start();
   bool go_on();
   bool keep();
@@ -94,7 +95,8 @@ class Iteration {
   void invert();
   void project(bool is_first, Small& alpha);
   bool agree(bool opinion) const;
-  LockedRange agree(LockedRange opinion) const;
+  void agree(bool& is_spared, LockedRange& lossy) const;
+  void place(int first);
   Small clear_of_locked(LockedRange range, const Columns& block, const Columns& block_mass) const;
   Orthogonality::State get_state() const { return {t_.data(), room_, size_, width_, previous_}; }
   int orthonormalise(Small& r);
@@ -102,7 +104,7 @@ class Iteration {
   void project_after_all();
   int orthonormalise_by_columns(Small& r);
   Small sum_products(const Columns& a, const Columns& b) const;
-  std::vector<double> sum_squares(const Columns& a, const Columns& b);
+  Small sum_products_and_wishes(const Columns& a, const Columns& b);
   double orthogonalise_column(int i, double* coefficients);
   Ritz calc_ritz();
   void calc_errors(Ritz& ritz) const;
@@ -123,6 +125,7 @@ class Iteration {
   int block_ = 1;
   int room_ = 0;          // columns the basis may have
   bool inverts_ = false;  // the operator is A^-1 M, and M times the block is at hand
+  PC direct_ = nullptr;   // A^-1 itself, where it is a shell: KSPMatSolve would write zeros over the block first
   Columns fixed_;         // deflation space; the basis follows it in memory
   Columns basis_;         // the first `size_` columns are in use
   Columns everything_;    // both
@@ -134,7 +137,8 @@ class Iteration {
   Small t_;         // projected operator, (room, room)
   Small coupling_;  // R of the next block, (next_width, width)
   petsc::MatHandle w_mat_, z_mat_, mass_;
-  Columns w_, z_;  // the next block and M times it; after a step they are the current block's
+  Columns w_;  // the next block, behind the basis in its memory,
+  Columns z_;  // and M times it; after a step they are the current block's
   int next_check_ = 0;
   int last_size_ = 0;
   std::size_t last_converged_ = 0;
@@ -152,6 +156,19 @@ Columns view(Mat dense) {
   return access.view();
 }
 
+// The preconditioner of a transformation that does nothing but apply it, if it is a shell; null otherwise.
+PC find_direct(ST st) {
+  KSP ksp = nullptr;
+  PC pc = nullptr;
+  PetscBool applies = PETSC_FALSE;
+  PetscBool is_shell = PETSC_FALSE;
+  check(STGetKSP(st, &ksp));
+  check(KSPGetPC(ksp, &pc));
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(ksp), KSPPREONLY, &applies));
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &is_shell));
+  return applies == PETSC_TRUE && is_shell == PETSC_TRUE ? pc : nullptr;
+}
+
 Iteration::Iteration(EPS eps) : eps_(eps) {
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(eps), &comm_));
   const Settings& settings = get_settings(eps);
@@ -167,6 +184,7 @@ Iteration::Iteration(EPS eps) : eps_(eps) {
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps->st), STSINVERT, &inverts));
   inverts_ = inverts == PETSC_TRUE;
   if (inverts_) {
+    direct_ = find_direct(eps->st);
     PetscScalar sigma = 0;
     check(STGetShift(eps->st, &sigma));
     std::vector<double> theta = locked_.lambda;
@@ -187,7 +205,6 @@ Iteration::Iteration(EPS eps) : eps_(eps) {
   } else {
     check(MatDuplicate(w_mat_, MAT_COPY_VALUES, z_mat_.out()));
   }
-  w_ = view(w_mat_);
   z_ = view(z_mat_);
 }
 
@@ -198,24 +215,27 @@ Small Iteration::sum_products(const Columns& a, const Columns& b) const {
   return products;
 }
 
-// a_j^T b_j
-std::vector<double> Iteration::sum_squares(const Columns& a, const Columns& b) {
-  const auto count = static_cast<std::size_t>(a.count);
-  std::vector<double> squares(count + (keeper_ != nullptr ? 2 : 0));
-  if (keeper_ != nullptr) {  // What this rank wants of it goes along: no message of its own.
-    const Wish wish = keeper_->ask();
-    squares[count] = wish.stop ? 1 : 0;
-    squares[count + 1] = wish.save ? 1 : 0;
-  }
-  for (int j = 0; j < a.count; ++j)
-    squares[static_cast<std::size_t>(j)] = std::inner_product(a.column(j), a.column(j) + a.rows, b.column(j), 0.0);
-  MPI_Allreduce(MPI_IN_PLACE, squares.data(), static_cast<int>(squares.size()), MPI_DOUBLE, MPI_SUM, comm_);
-  if (keeper_ != nullptr) {
-    wish_.stop = wish_.stop || squares[count] > 0;
-    wish_.save = wish_.save || squares[count + 1] > 0;
-    squares.resize(count);
-  }
-  return squares;
+// A^T B, and what the ranks want of the keeper, which goes along: no message of its own.
+Small Iteration::sum_products_and_wishes(const Columns& a, const Columns& b) {
+  if (keeper_ == nullptr) return sum_products(a, b);
+  const std::size_t count = static_cast<std::size_t>(a.count) * static_cast<std::size_t>(b.count);
+  Small products(count + 2, 0.0);
+  multiply_transposed(a, b, products.data(), a.count);
+  const Wish wish = keeper_->ask();
+  products[count] = wish.stop ? 1 : 0;
+  products[count + 1] = wish.save ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, products.data(), static_cast<int>(products.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  wish_.stop = wish_.stop || products[count] > 0;
+  wish_.save = wish_.save || products[count + 1] > 0;
+  products.resize(count);
+  return products;
+}
+
+// From here on w is what stands in the basis from column `first` on.
+void Iteration::place(int first) {
+  if (w_.values != nullptr) check(MatDenseResetArray(w_mat_));
+  check(MatDensePlaceArray(w_mat_, basis_.column(first)));
+  w_ = basis_.part(first, block_);
 }
 
 // z = M w.
@@ -233,10 +253,8 @@ void Iteration::multiply_mass() {
 void Iteration::invert() {
   check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(w_mat_.get())));
   check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(z_mat_.get())));
-  if (inverts_) {
-    check(STMatMatSolve(eps_->st, z_mat_, w_mat_));
-    return;
-  }
+  if (direct_ != nullptr) return check(PCMatApply(direct_, z_mat_, w_mat_));
+  if (inverts_) return check(STMatMatSolve(eps_->st, z_mat_, w_mat_));
   petsc::MatHandle block;
   check(MatDuplicate(w_mat_, MAT_COPY_VALUES, block.out()));
   check(STApplyMat(eps_->st, block, w_mat_));
@@ -253,6 +271,13 @@ void Iteration::open_basis() {
   everything_ = {array, rows, rows, static_cast<int>(fixed) + room_ + block_};
 }
 
+void Iteration::close_basis() {
+  if (w_.values != nullptr) check(MatDenseResetArray(w_mat_));
+  w_ = {};
+  PetscScalar* array = everything_.values;
+  check(BVRestoreArray(eps_->V, &array));
+}
+
 // From where the keeper's iteration stood. False where it does not fit this one: what is read has no effect then.
 bool Iteration::go_on() {
   const LanczosState& state = *keeper_->start;
@@ -264,14 +289,13 @@ bool Iteration::go_on() {
     keeper_->reject("its iteration is not this one");
     return false;
   }
+  const Columns initial = basis_.part(0, static_cast<int>(eps_->nini));
+  Small initial_space(static_cast<std::size_t>(initial.rows) * static_cast<std::size_t>(initial.count));
+  std::copy_n(initial.values, initial_space.size(), initial_space.data());
   keeper_->read(basis_.part(0, static_cast<int>(size)));
   width_ = static_cast<int>(width);
-  for (int j = 0; j < block_; ++j) {
-    if (j < width_)
-      std::copy_n(basis_.column(static_cast<int>(size - width) + j), w_.rows, w_.column(j));
-    else
-      std::fill_n(w_.column(j), w_.rows, 0.0);
-  }
+  place(static_cast<int>(size - width));
+  for (int j = width_; j < block_; ++j) std::fill_n(w_.column(j), w_.rows, 0.0);
   multiply_mass();
   const Small gram = sum_products(w_.part(0, width_), z_.part(0, width_));
   double error = 0;
@@ -279,6 +303,7 @@ bool Iteration::go_on() {
     for (int i = 0; i < width_; ++i) error = std::max(error, std::abs(gram[static_cast<std::size_t>(j * width_ + i)] - (i == j ? 1 : 0)));
   }
   if (!(error < kOrthonormal)) {
+    std::copy_n(initial_space.data(), initial_space.size(), initial.values);
     keeper_->reject("its basis is not orthonormal");
     return false;
   }
@@ -313,8 +338,7 @@ bool Iteration::keep() {
 void Iteration::start() {
   for (PetscInt j = eps_->nini; j < block_; ++j) check(BVSetRandomColumn(eps_->V, j));
   open_basis();
-  const auto rows = static_cast<std::ptrdiff_t>(eps_->nloc);
-  for (int j = 0; j < block_; ++j) std::copy_n(basis_.column(j), rows, w_.column(j));
+  place(0);
   multiply_mass();
   invert();
   size_ = width_ = previous_ = 0;
@@ -322,7 +346,6 @@ void Iteration::start() {
   project(true, alpha);
   Small r;
   next_width_ = orthonormalise(r);
-  for (int j = 0; j < next_width_; ++j) std::copy_n(w_.column(j), rows, basis_.column(j));
   size_ = width_ = next_width_;
   previous_ = 0;
 }
@@ -344,27 +367,32 @@ void Iteration::project(bool is_first, Small& alpha) {
     }
     subtract_product(basis_.part(previous_, coupled), local.data(), coupled, next);
   }
-  is_spared_ = !is_first && agree(orthogonality_.is_good(get_state(), alpha.data()));
-  lossy_ = is_first ? locked_orthogonality_.get_all() : agree(locked_orthogonality_.find_lossy(get_state(), alpha.data()));
+  is_spared_ = false;
+  lossy_ = locked_orthogonality_.get_all();
+  if (!is_first) {
+    is_spared_ = orthogonality_.is_good(get_state(), alpha.data());
+    lossy_ = locked_orthogonality_.find_lossy(get_state(), alpha.data());
+    agree(is_spared_, lossy_);
+  }
   const Columns against = is_spared_ ? basis_.part(previous_, size_ - previous_) : everything_.part(0, fixed_.count + size_);
+  const int stride = against.count + next.count;  // w follows them in memory, and its squares come with the products
   for (int pass = 0; pass < 3; ++pass) {
     multiply_mass();
-    const std::vector<double> square = sum_squares(next, next_mass);
+    const Small c = sum_products_and_wishes(against.part(0, stride), next_mass);
     const Small parts = clear_of_locked(lossy_, next, next_mass);
     if (pass == 0 && !is_first) locked_orthogonality_.learn(lossy_, parts.data(), next.count);
     if (is_spared_ && fixed_.count > 0) subtract_product(fixed_, sum_products(fixed_, next_mass).data(), fixed_.count, next);
-    const Small c = sum_products(against, next_mass);
-    subtract_product(against, c.data(), against.count, next);
-    if (pass == 0 && !is_first && !is_spared_) orthogonality_.learn(get_state(), c.data() + fixed_.count, against.count);
+    subtract_product(against, c.data(), stride, next);
+    if (pass == 0 && !is_first && !is_spared_) orthogonality_.learn(get_state(), c.data() + fixed_.count, stride);
     double taken = 0;  // largest part of a column that this pass took away; its rounding is what it leaves behind
     double largest = 0;
     for (int j = 0; j < next.count; ++j) {
-      const double* column = c.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(against.count);
+      const double* column = c.data() + static_cast<std::ptrdiff_t>(j) * stride;
       if (!is_first) {
         for (int i = 0; i < width_; ++i) alpha[static_cast<std::size_t>(j * width_ + i)] += column[against.count - width_ + i];
       }
       const double part = std::inner_product(column, column + against.count, column, 0.0);
-      taken = std::max(taken, part / square[static_cast<std::size_t>(j)]);
+      taken = std::max(taken, part / column[against.count + j]);
       largest = std::max(largest, part);
     }
     if (!is_spared_) orthogonality_.clear(std::sqrt(largest));
@@ -379,10 +407,11 @@ bool Iteration::agree(bool opinion) const {
   return value != 0;
 }
 
-LockedRange Iteration::agree(LockedRange opinion) const {
-  std::array<int, 2> ends{opinion.first, opinion.count};
-  MPI_Bcast(ends.data(), 2, MPI_INT, 0, comm_);
-  return {ends[0], ends[1]};
+void Iteration::agree(bool& is_spared, LockedRange& lossy) const {
+  std::array<int, 3> opinion{is_spared ? 1 : 0, lossy.first, lossy.count};
+  MPI_Bcast(opinion.data(), 3, MPI_INT, 0, comm_);
+  is_spared = opinion[0] != 0;
+  lossy = {opinion[1], opinion[2]};
 }
 
 // block <- block - L (L^T M block) for a range of L; returns what was in the brackets.
@@ -537,6 +566,7 @@ void Iteration::project_after_all() {
 
 // One block more. False when the space is exhausted.
 bool Iteration::step() {
+  place(size_);
   invert();
   Small alpha;
   project(false, alpha);
@@ -737,6 +767,7 @@ void Iteration::restart(Ritz& ritz) {
   std::fill(t_.begin(), t_.end(), 0.0);
   for (int j = 0; j < kept; ++j) t(j, j) = ritz.theta[static_cast<std::size_t>(ritz.order[static_cast<std::size_t>(j)])];
   coupling_ = coupling;
+  for (int j = 0; j < next_width_; ++j) std::copy_n(w_.column(j), w_.rows, basis_.column(kept + j));
   size_ = width_ = kept;
   last_size_ = size_;
   orthogonality_.forget();
@@ -750,7 +781,6 @@ void Iteration::finish(Ritz& ritz) {
   const auto count = static_cast<std::size_t>(eps_->nconv);
   const Small picked = pick_vectors(ritz, count);
   const int extra = next_width_;
-  for (int j = 0; j < extra; ++j) std::copy_n(w_.column(j), w_.rows, basis_.column(size_ + j));
   const auto n = static_cast<std::size_t>(size_);
   const std::size_t all = n + static_cast<std::size_t>(extra);
   Small purified(all * count, 0.0);
@@ -766,8 +796,12 @@ void Iteration::finish(Ritz& ritz) {
     }
   }
   combine_columns(basis_.part(0, static_cast<int>(all)), purified.data(), static_cast<int>(count));
+  place(static_cast<int>(count));  // to work in
   clear_nearest(ritz, static_cast<int>(count));
   clear_locked(static_cast<int>(count));
+  close_basis();
+  if (basis_.rows > 0)
+    petsc::give_back_pages(basis_.column(static_cast<int>(count)), basis_.column(room_ + block_));  // before they are copied
 }
 
 // What a spared projection leaves standing is rounding along the pairs nearest the shift, by their large theta. These are the most exact
@@ -800,11 +834,11 @@ void Iteration::clear_locked(int count) {
   const auto last = std::find_if(left.rbegin(), std::make_reverse_iterator(first), is_left).base();
   const LockedRange range{static_cast<int>(first - left.begin()), static_cast<int>(last - first)};
   if (range.count == 0) return;
-  const int wide = std::min(room_ + block_ - count, kWide);  // of the columns behind, which are free now
+  const int wide = std::min(room_ - count, kWide);  // of the columns behind w, which are free now
   const int step = std::max(wide, block_);
   for (int at = 0; at < count; at += step) {
     const Columns some = basis_.part(at, std::min(step, count - at));
-    const Columns images = wide < block_ ? z_.part(0, some.count) : basis_.part(count, some.count);
+    const Columns images = wide < block_ ? z_.part(0, some.count) : basis_.part(count + block_, some.count);
     for (int from = 0; from < some.count; from += block_) {
       const int width = std::min(block_, some.count - from);
       for (int j = 0; j < width; ++j) std::copy_n(some.column(from + j), some.rows, w_.column(j));
@@ -821,15 +855,13 @@ void Iteration::run() {
   if (keeper_ != nullptr && keeper_->start != nullptr) {
     open_basis();
     is_resumed = go_on();
-    PetscScalar* array = everything_.values;
-    if (!is_resumed) check(BVRestoreArray(eps_->V, &array));
+    if (!is_resumed) close_basis();
   }
   if (!is_resumed) start();
   if (width_ == 0) {  // nothing beside what is deflated
     eps_->nconv = 0;
     eps_->reason = EPS_CONVERGED_TOL;
-    PetscScalar* all = everything_.values;
-    return check(BVRestoreArray(eps_->V, &all));
+    return close_basis();
   }
   if (!is_resumed) next_check_ = std::min(2 * static_cast<int>(eps_->nev) + 2 * block_, room_);
   while (true) {
@@ -839,10 +871,7 @@ void Iteration::run() {
     if (!goes_on || is_full || size_ >= next_check_ || eps_->its >= eps_->max_it) {
       Ritz ritz = calc_ritz();
       if (!goes_on) ritz.done = true;
-      if (report(ritz)) {
-        finish(ritz);
-        break;
-      }
+      if (report(ritz)) return finish(ritz);
       if (is_full) restart(ritz);
       plan_check(ritz);
     }
@@ -851,18 +880,15 @@ void Iteration::run() {
         t(size_ + i, size_ - width_ + j) = t(size_ - width_ + j, size_ + i) = coupling_[static_cast<std::size_t>(j * next_width_ + i)];
       }
     }
-    for (int j = 0; j < next_width_; ++j) std::copy_n(w_.column(j), w_.rows, basis_.column(size_ + j));
     previous_ = size_ - width_;
     size_ += next_width_;
     width_ = next_width_;
     if (keep()) {
       eps_->nconv = 0;
       eps_->reason = EPS_CONVERGED_USER;
-      break;
+      return close_basis();
     }
   }
-  PetscScalar* array = everything_.values;
-  check(BVRestoreArray(eps_->V, &array));
 }
 
 // ---- what SLEPc calls.
