@@ -92,7 +92,7 @@ class Iteration {
   bool keep();
   bool step();
   void multiply_mass();
-  void invert();
+  void invert(int to);
   void project(bool is_first, Small& alpha);
   bool agree(bool opinion) const;
   void agree(bool& is_spared, LockedRange& lossy) const;
@@ -123,12 +123,11 @@ class Iteration {
   EPS eps_;
   MPI_Comm comm_ = MPI_COMM_NULL;
   int block_ = 1;
-  int room_ = 0;          // columns the basis may have
-  bool inverts_ = false;  // the operator is A^-1 M, and M times the block is at hand
-  PC direct_ = nullptr;   // A^-1 itself, where it is a shell: KSPMatSolve would write zeros over the block first
-  Columns fixed_;         // deflation space; the basis follows it in memory
-  Columns basis_;         // the first `size_` columns are in use
-  Columns everything_;    // both
+  int room_ = 0;         // columns the basis may have
+  PC direct_ = nullptr;  // A^-1 itself, where it is a shell: KSPMatSolve would write zeros over the block first
+  Columns fixed_;        // deflation space; the basis follows it in memory
+  Columns basis_;        // the first `size_` columns are in use
+  Columns everything_;   // both
   LockedModes locked_;
   int size_ = 0;
   int width_ = 0;     // of the current block, the last columns of the basis
@@ -138,6 +137,7 @@ class Iteration {
   Small coupling_;  // R of the next block, (next_width, width)
   petsc::MatHandle w_mat_, z_mat_, mass_;
   Columns w_;  // the next block, behind the basis in its memory,
+  bool is_placed_ = false;
   Columns z_;  // and M times it; after a step they are the current block's
   int next_check_ = 0;
   int last_size_ = 0;
@@ -156,14 +156,23 @@ Columns view(Mat dense) {
   return access.view();
 }
 
-// The preconditioner of a transformation that does nothing but apply it, if it is a shell; null otherwise.
+// The preconditioner of a transformation that does nothing but apply it, if it is a shell; null otherwise, and where the user has set any
+// option of the KSP, which may want to report.
 PC find_direct(ST st) {
   KSP ksp = nullptr;
   PC pc = nullptr;
+  const char* prefix = nullptr;
+  char* options = nullptr;
   PetscBool applies = PETSC_FALSE;
   PetscBool is_shell = PETSC_FALSE;
   check(STGetKSP(st, &ksp));
   check(KSPGetPC(ksp, &pc));
+  check(KSPGetOptionsPrefix(ksp, &prefix));
+  check(PetscOptionsGetAll(nullptr, &options));
+  const std::string of_ksp = std::string("-") + (prefix != nullptr ? prefix : "") + "ksp_";
+  const bool is_set = std::string(options).find(of_ksp) != std::string::npos;
+  check(PetscFree(options));
+  if (is_set) return nullptr;
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(ksp), KSPPREONLY, &applies));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCSHELL, &is_shell));
   return applies == PETSC_TRUE && is_shell == PETSC_TRUE ? pc : nullptr;
@@ -180,19 +189,12 @@ Iteration::Iteration(EPS eps) : eps_(eps) {
   block_ = static_cast<int>(std::min<PetscInt>(settings.block, std::max<PetscInt>(room_, 1)));
   t_.assign(static_cast<std::size_t>(room_) * static_cast<std::size_t>(room_), 0.0);
 
-  PetscBool inverts = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps->st), STSINVERT, &inverts));
-  inverts_ = inverts == PETSC_TRUE;
-  if (inverts_) {
-    direct_ = find_direct(eps->st);
-    PetscScalar sigma = 0;
-    check(STGetShift(eps->st, &sigma));
-    std::vector<double> theta = locked_.lambda;
-    for (double& x : theta) x = 1 / (x - sigma);
-    locked_orthogonality_ = LockedOrthogonality(theta, true);
-  } else {
-    locked_orthogonality_ = LockedOrthogonality(locked_.lambda, false);
-  }
+  direct_ = find_direct(eps->st);
+  PetscScalar sigma = 0;
+  check(STGetShift(eps->st, &sigma));
+  std::vector<double> theta = locked_.lambda;
+  for (double& x : theta) x = 1 / (x - sigma);
+  locked_orthogonality_ = LockedOrthogonality(theta);
   Mat mass = nullptr;
   check(BVGetMatrix(eps->V, &mass, nullptr));
   check(MatCreateDense(comm_, eps->nloc, PETSC_DECIDE, eps->n, block_, nullptr, w_mat_.out()));
@@ -233,8 +235,9 @@ Small Iteration::sum_products_and_wishes(const Columns& a, const Columns& b) {
 
 // From here on w is what stands in the basis from column `first` on.
 void Iteration::place(int first) {
-  if (w_.values != nullptr) check(MatDenseResetArray(w_mat_));
+  if (is_placed_) check(MatDenseResetArray(w_mat_));
   check(MatDensePlaceArray(w_mat_, basis_.column(first)));
+  is_placed_ = true;
   w_ = basis_.part(first, block_);
 }
 
@@ -249,15 +252,13 @@ void Iteration::multiply_mass() {
   }
 }
 
-// w = operator times the current block, whose M multiple is in z.
-void Iteration::invert() {
+// w = A^-1 z, z being M times the current block; w stands at column `to` of the basis then.
+void Iteration::invert(int to) {
+  place(to);
   check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(w_mat_.get())));
   check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(z_mat_.get())));
   if (direct_ != nullptr) return check(PCMatApply(direct_, z_mat_, w_mat_));
-  if (inverts_) return check(STMatMatSolve(eps_->st, z_mat_, w_mat_));
-  petsc::MatHandle block;
-  check(MatDuplicate(w_mat_, MAT_COPY_VALUES, block.out()));
-  check(STApplyMat(eps_->st, block, w_mat_));
+  check(STMatMatSolve(eps_->st, z_mat_, w_mat_));
 }
 
 void Iteration::open_basis() {
@@ -272,7 +273,8 @@ void Iteration::open_basis() {
 }
 
 void Iteration::close_basis() {
-  if (w_.values != nullptr) check(MatDenseResetArray(w_mat_));
+  if (is_placed_) check(MatDenseResetArray(w_mat_));
+  is_placed_ = false;
   w_ = {};
   PetscScalar* array = everything_.values;
   check(BVRestoreArray(eps_->V, &array));
@@ -340,7 +342,7 @@ void Iteration::start() {
   open_basis();
   place(0);
   multiply_mass();
-  invert();
+  invert(0);
   size_ = width_ = previous_ = 0;
   Small alpha;
   project(true, alpha);
@@ -566,8 +568,7 @@ void Iteration::project_after_all() {
 
 // One block more. False when the space is exhausted.
 bool Iteration::step() {
-  place(size_);
-  invert();
+  invert(size_);
   Small alpha;
   project(false, alpha);
   for (int j = 0; j < width_; ++j) {
@@ -799,9 +800,9 @@ void Iteration::finish(Ritz& ritz) {
   place(static_cast<int>(count));  // to work in
   clear_nearest(ritz, static_cast<int>(count));
   clear_locked(static_cast<int>(count));
+  // The room behind what was found, before that is copied.
+  if (basis_.rows > 0) petsc::give_back_pages(basis_.column(static_cast<int>(count)), basis_.column(room_ + block_));
   close_basis();
-  if (basis_.rows > 0)
-    petsc::give_back_pages(basis_.column(static_cast<int>(count)), basis_.column(room_ + block_));  // before they are copied
 }
 
 // What a spared projection leaves standing is rounding along the pairs nearest the shift, by their large theta. These are the most exact
@@ -895,16 +896,13 @@ void Iteration::run() {
 
 PetscErrorCode set_up(EPS eps) {
   EPSCheckHermitianDefinite(eps);
+  EPSCheckSinvert(eps);
   EPSCheckUnsupported(eps,
                       EPS_FEATURE_ARBITRARY | EPS_FEATURE_REGION | EPS_FEATURE_EXTRACTION | EPS_FEATURE_TWOSIDED | EPS_FEATURE_BALANCE);
   return guard([&] {
     Settings& settings = get_settings(eps);
     if (settings.block == PETSC_DEFAULT) settings.block = kDefaultBlock;
-    if (eps->which == 0) {
-      PetscBool inverts = PETSC_FALSE;
-      check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps->st), STSINVERT, &inverts));
-      eps->which = inverts == PETSC_TRUE ? EPS_TARGET_MAGNITUDE : EPS_LARGEST_MAGNITUDE;
-    }
+    if (eps->which == 0) eps->which = EPS_TARGET_MAGNITUDE;
     if (eps->ncv == PETSC_DEFAULT) eps->ncv = std::min(eps->n, 2 * eps->nev + 8 * settings.block);
     eps->ncv = std::min(eps->n, std::max(eps->ncv, std::min(eps->n, eps->nev + 3 * settings.block)));
     if (eps->mpd == PETSC_DEFAULT) eps->mpd = eps->ncv;

@@ -122,8 +122,8 @@ void Orthogonality::advance(const State& state, const std::vector<double>& r, in
   last_ = std::move(product);
 }
 
-LockedOrthogonality::LockedOrthogonality(std::vector<double> theta, bool is_known)
-    : theta_(std::move(theta)), is_known_(is_known), noise_(theta_.size(), 0.0), left_(theta_.size(), 0.0) {}
+LockedOrthogonality::LockedOrthogonality(std::vector<double> theta)
+    : theta_(std::move(theta)), noise_(theta_.size(), 0.0), left_(theta_.size(), 0.0) {}
 
 void LockedOrthogonality::forget() {
   last_.clear();
@@ -146,7 +146,7 @@ LockedRange LockedOrthogonality::find_lossy(const Orthogonality::State& state, c
   }
   BLASgemm_("N", "N", &m, &b, &b, &minus, last_.data(), &m, alpha, &b, &one, foreseen_.data(), &m);
   BLASgemm_("N", "N", &m, &b, &k, &minus, before_.data(), &m, r, &stride, &one, foreseen_.data(), &m);
-  if (!is_known_ || clean_ < kCleanBlocks) return get_all();
+  if (clean_ < kCleanBlocks) return get_all();
   std::vector<double> loss = noise_;
   for (std::size_t j = 0; j < width; ++j) {
     for (std::size_t i = 0; i < rows; ++i) loss[i] = std::max(loss[i], std::abs(foreseen_[j * rows + i]));

@@ -60,8 +60,8 @@ struct LockedRange {
 class LockedOrthogonality {
  public:
   LockedOrthogonality() = default;
-  /// theta: (count) eigenvalues of the operator. is_known: false if they are not; no projection is spared then.
-  LockedOrthogonality(std::vector<double> theta, bool is_known);
+  /// theta: (count) eigenvalues of the operator.
+  explicit LockedOrthogonality(std::vector<double> theta);
 
   /// As of Orthogonality.
   void forget();
@@ -78,7 +78,6 @@ class LockedOrthogonality {
 
  private:
   std::vector<double> theta_;
-  bool is_known_ = false;
   std::vector<double> foreseen_;  // L^T M w, (count, width)
   double largest_ = 0;            // of its rows that are not lossy
   std::vector<double> last_;      // L^T M V_j

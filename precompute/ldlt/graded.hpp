@@ -19,7 +19,7 @@ class GradedPair {
 
   Mat get_stiffness() const { return scaled_stiffness_ ? scaled_stiffness_.get() : given_stiffness_; }
   Mat get_mass() const { return scaled_mass_ ? scaled_mass_.get() : given_mass_; }
-  bool is_scaled() const { return !factor_.empty(); }
+  bool is_scaled() const { return static_cast<bool>(scaled_stiffness_); }
   /// X <- S X on this rank's rows, column-major.
   void scale(double* x, int stride, int columns) const;
 

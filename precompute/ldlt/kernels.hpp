@@ -18,7 +18,7 @@ static_assert(kStripColumns % kTileRows == 0);
 inline constexpr int kMaxBlock = 72;
 
 /// Numbers stored of a lower triangle of order n: tiles as above, each only as far as its last row reaches.
-constexpr std::int64_t count_triangle(std::int64_t n) {
+[[gnu::always_inline]] constexpr std::int64_t count_triangle(std::int64_t n) {
   const std::int64_t whole = n / kTileRows;
   const std::int64_t rest = n - whole * kTileRows;
   return kTileRows * kTileRows * (whole * (whole + 1) / 2) + rest * n;

@@ -168,7 +168,8 @@ class Solver {
         divide_by_pivots(3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin), n, block.width, own, pivots);
         kernels_.subtract_transposed(tiles + count_triangle(n), m, n, block.width / 8, nodes_.data() + end / 3, block.rows, pivots, tiles);
         std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * block.width));
-        kernels_.add_triangle_transposed(tiles, n, block.width / 8, pivots, solution, next);
+        kernels_.add_triangle_transposed(tiles, n, block.width / 8, pivots, solution,
+                                         &block == &blocks_.back() ? next : tiles + count_triangle(n));
         for (int k = 0; k < n; ++k) copy_row(solution + k * block.width, block.width, own + order[k] * block.width);
       }
     }

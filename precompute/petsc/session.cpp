@@ -91,8 +91,8 @@ void spare_the_search_for_networks() {
 void spare_the_search_for_displays() { setenv("HWLOC_COMPONENTS", "-gl", 0); }
 
 // SuperLU_DIST, which PETSc brings along, forbids malloc when it is loaded to take pages of its own for large pieces, and to give any back:
-// what is freed stays with the process, and calloc writes zeros over it. Large pieces get their pages again, but not those that come and go
-// in every step: their pages would, too.
+// what is freed stays with the process, and calloc writes zeros over it. Large pieces get their pages again; smaller ones, which come and
+// go in every step, stay in the heap.
 void let_malloc_give_back() {
   constexpr int kMostMaps = 65536;  // glibc's own
   constexpr int kLarge = 4 << 20;

@@ -22,7 +22,7 @@ WORK = [("-eps_type blocklanczos", 1), ("-eps_type krylovschur", 1), ("-eps_type
         ("-eps_type jd", 2), ("-eps_type lapack", 2), ("-eps_type lanczos -eps_lanczos_reorthog selective", 1), ("-eps_ncv 5", 1), ("-eps_mpd 10", 1),
         ("-eps_type krylovschur -eps_ncv 45", 1), ("-eps_type krylovschur -eps_mpd 12", 1), ("-eps_type arnoldi -eps_ncv 40", 1), ("-eps_tol 1e-4", 1),
         ("-eps_tol 1e-14", 1), ("-eps_conv_abs", 1), ("-eps_purify 1", 1), ("-eps_blocklanczos_block_size 5", 1), ("-bv_type vecs", 1),
-        ("-st_ksp_type gmres -st_ksp_rtol 1e-12", 1), ("-eps_type gd -eps_gd_blocksize 4", 1)]
+        ("-st_ksp_type gmres -st_ksp_rtol 1e-12", 1), ("-st_ksp_converged_reason", 1), ("-eps_type gd -eps_gd_blocksize 4", 1)]
 # Those that cannot: (options, words of the message).
 REFUSED = [("-eps_type nonsense", ["-eps_type nonsense", "no such type", "blocklanczos", "krylovschur"]),
            ("-eps_type", ["names no type", "krylovschur"]),

@@ -143,8 +143,8 @@ TEST(Memory, of_large_pieces_goes_back_when_they_are_freed) {
 }
 
 TEST(Memory, that_petsc_clears_is_not_taken_before_it_is_used) {
+  const std::int64_t before = get_resident_bytes();
   for (int repeat = 0; repeat < 2; ++repeat) {
-    const std::int64_t before = get_resident_bytes();
     char* piece = nullptr;
     check(PetscCalloc1(kLarge, &piece));
     EXPECT_LT(get_resident_bytes(), before + kLittle);
