@@ -58,11 +58,17 @@ void InertiaCounter::make_factor() {
   check_memory(comm_, factor_->get_peak_bytes(), options_.memory_limit_bytes, "The factorisation of K - sigma M");
 }
 
+bool InertiaCounter::is_refused(double sigma) const {
+  if (uses_mumps_ || !options_.refused_shifts_hz) return false;
+  const auto [low, high] = *options_.refused_shifts_hz;
+  return to_hz_(sigma) >= low && to_hz_(sigma) <= high;
+}
+
 bool InertiaCounter::try_factorise(double sigma) {
   const petsc::WorkScope scope(petsc::WorkPhase::kFactor);
   const Timer timer(seconds_.factor);
   ++statistics_.factorisations;
-  stands_ = factor_->factorise(sigma);
+  stands_ = !is_refused(sigma) && factor_->factorise(sigma);
   if (!stands_) return false;
   standing_ = sigma;
   statistics_.entries = factor_->get_entries();

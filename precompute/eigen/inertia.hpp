@@ -63,6 +63,7 @@ class InertiaCounter {
 
  private:
   void make_factor();
+  bool is_refused(double sigma) const;
   bool try_factorise(double sigma);
   bool try_around(double lambda, double reach);
   std::int64_t count_below();

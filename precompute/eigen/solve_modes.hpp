@@ -79,6 +79,9 @@ struct Options {
   Method method = Method::kAutomatic;
   /// What the ranks of one host may use together [byte]; 0: what the machine, its cgroup and the process limits leave.
   std::int64_t memory_limit_bytes = 0;
+  /// Frequencies [Hz] between which our L D L^T refuses every shift, as if a pivot vanished there. For tests and benches of the way over
+  /// MUMPS: where a pivot really vanishes depends on the rounding of the processor. Empty: nowhere.
+  std::optional<std::array<double, 2>> refused_shifts_hz;
   std::function<void(const Progress&)> progress;  // may be empty
   Checkpoint* checkpoint = nullptr;               // may be null
 };

@@ -41,9 +41,10 @@ struct EnergyAudit {
 
 /// What a world has cost so far.
 struct Statistics {
-  std::int64_t steps = 0;    // integrations, those that were thrown away again included
-  std::int64_t islands = 0;  // groups of moving bodies at present
-  std::int64_t made = 0;     // Simbody systems made so far
+  std::int64_t steps = 0;       // integrations, those that were thrown away again included
+  std::int64_t body_steps = 0;  // of each, the bodies that moved in it, summed
+  std::int64_t islands = 0;     // groups of moving bodies at present
+  std::int64_t made = 0;        // Simbody systems made so far
   double seconds_cpu = 0.0;
   EnergyAudit energy;  // zeros unless asked for
 };

@@ -111,6 +111,10 @@ void Island::remember(const Snapshot& now, const std::vector<TouchPoint>& touche
   for (const TouchPoint& t : touches) recent_.push_back({t.a, t.b, ~now.poses[t.a] * t.where, time});
 }
 
+std::int64_t Island::calc_body_steps() const {
+  return steps_ * std::count_if(world_.bodies.begin(), world_.bodies.end(), [](const BodyModel& body) { return !body.fixed; });
+}
+
 /// Touches that were not there when the step began and approach faster than that.
 std::vector<TouchPoint> Island::find_fresh(const Snapshot& now, double faster_than) const {
   std::vector<TouchPoint> fresh;

@@ -41,6 +41,8 @@ class Island {
   double get_moved_m(std::size_t i) const { return moved_m_[i]; }
   const std::vector<stream::Event>& get_events() const { return events_; }
   std::int64_t get_steps() const { return steps_; }
+  /// The same, each times the bodies that it moved.
+  std::int64_t calc_body_steps() const;
   /// Engine::calc_energy_j now, Engine::calc_kinetic_j, and what hits have taken since begin_window, all of them and the one that took
   /// least (below 0: gave). What hits took is only kept where WorldOptions::audits_energy asks for it.
   double calc_energy_j() const { return engine_.calc_energy_j(state_); }

@@ -85,6 +85,7 @@ class Runner::Parts {
   void add_island(const std::vector<int>& moving);
   std::vector<std::vector<int>> list_groups(Groups& groups) const;
   std::vector<int> find_moving(const Island& island) const;
+  void retire(const std::vector<std::unique_ptr<Island>>& gone);
   void audit();
   void emit(std::vector<stream::Event>& events, double mark_s, const Sink& sink) const;
   stream::Motion make_motion(std::size_t body, double time_s) const;
@@ -105,7 +106,7 @@ class Runner::Parts {
   double reached_s_ = 0.0;   // start of the window
   double until_s_ = 0.0;     // its end
   std::int64_t window_ = 0;
-  std::int64_t old_steps_ = 0;  // of islands that are no more
+  std::int64_t old_steps_ = 0, old_body_steps_ = 0;  // of islands that are no more
   std::int64_t made_ = 0;
   double seconds_cpu_ = 0.0;
   EnergyAudit energy_;
@@ -245,7 +246,7 @@ void Runner::Parts::open_window() {
     }
     for (const int body : moving) group_[body] = moving.front();
   }
-  for (const auto& gone : before) old_steps_ += gone ? gone->get_steps() : 0;
+  retire(before);
   for (const auto& island : islands_) island->begin_window();
 }
 
@@ -280,7 +281,7 @@ bool Runner::Parts::join_what_met() {
       anew.push_back(moving);
     }
   }
-  for (const auto& gone : before) old_steps_ += gone ? gone->get_steps() : 0;
+  retire(before);
   current_ = islands_.size();  // those that met nobody are through
   for (const std::vector<int>& moving : anew) {
     add_island(moving);
@@ -350,10 +351,23 @@ double Runner::Parts::advance(double until_s, double cpu_s, const Sink& sink) {
   return reached_s_;
 }
 
+/// Keeps the cost of islands that go; those that live on have left an empty place.
+void Runner::Parts::retire(const std::vector<std::unique_ptr<Island>>& gone) {
+  for (const auto& island : gone) {
+    if (!island) continue;
+    old_steps_ += island->get_steps();
+    old_body_steps_ += island->calc_body_steps();
+  }
+}
+
 Statistics Runner::Parts::get_statistics() const {
   Statistics s;
   s.steps = old_steps_;
-  for (const auto& island : islands_) s.steps += island->get_steps();
+  s.body_steps = old_body_steps_;
+  for (const auto& island : islands_) {
+    s.steps += island->get_steps();
+    s.body_steps += island->calc_body_steps();
+  }
   s.islands = static_cast<std::int64_t>(islands_.size());
   s.made = made_;
   s.seconds_cpu = seconds_cpu_;

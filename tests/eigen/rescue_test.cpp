@@ -180,18 +180,19 @@ void expect_same_modes(const Modes& modes, const Modes& expected) {
 }
 
 // A count turns to MUMPS: the first one, at the upper end of the band, or the second, at the lower, after ours has counted once. Whether
-// a solve is stopped before or after that, goes on once or is stopped at every safe point: its modes and its proof are those of a solve
+// a solve is stopped before or after that, resumes once or is stopped at every safe point: its modes and its proof are those of a solve
 // that was left alone, and once turned it does not try ours again.
-TEST(Fallback, is_gone_on_with_from_a_checkpoint) {
-  constexpr double kTuned = 1000;
-  const Network network = make_bunches(25, kTuned, 4e-8);
-  const std::vector<double> all = test::calc_all_eigenvalues(network);
-  const test::System system = test::make_system(network);
+TEST(Fallback, resumes_from_a_checkpoint) {
+  const Network block = make_block(6, 7, 11);
+  const std::vector<double> all = test::calc_all_eigenvalues(block);
+  const test::System system = test::make_system(block);
   for (const bool is_upper : {true, false}) {
     SCOPED_TRACE(is_upper ? "turned at the upper end" : "turned at the lower end");
     Options options;
-    options.low_hz = to_hz(is_upper ? 100 : kTuned * (1 + 1.4e-6));  // counts are taken a millionth outside, and from there upwards
-    options.high_hz = to_hz(is_upper ? kTuned * (1 - 1.4e-6) : 1.5 * kTuned);
+    options.low_hz = to_hz(0.5 * (all[40] + all[41]));
+    options.high_hz = to_hz(0.5 * (all[60] + all[61]));
+    const double end_hz = is_upper ? options.high_hz : options.low_hz;
+    options.refused_shifts_hz = {0.9999 * end_hz, 1.0001 * end_hz};
     const Modes whole = solve_modes(system.problem, options);
     ASSERT_NE(whole.factor.solver.find("MUMPS"), std::string::npos) << whole.factor.solver;
     expect_eigenvalues(whole, pick(all, options.low_hz, options.high_hz));

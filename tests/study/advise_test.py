@@ -111,7 +111,7 @@ class Program(unittest.TestCase):
             self.assertAlmostEqual(told["reached"]["cents"], worst, 6)
             self.assertEqual((told["reached"]["how"], told["reached"]["is_met"]), ("known", True))
             self.assertLessEqual(told["predicted"]["cents"], cents)
-            self.assertTrue(1 / 3 < told["reached"]["cpu_seconds"] / told["predicted"]["cpu_seconds"] < 3, told)  # a busy machine; the bench holds it to 2
+            self.assertGreater(told["reached"]["cpu_seconds"], 0)  # How near the predicted seconds come is for tests/bench/accuracy/advise to say.
             job = json.loads(pathlib.Path(told["job"]).read_text())
             self.assertEqual((job["element"], job["solver"]["tolerance"]), (told["setting"]["element"], told["setting"]["tolerance"]))
 

@@ -29,8 +29,8 @@ class Measuring(unittest.TestCase):
         busy = measuring.run_measured([sys.executable, "-c", "import time\nwhile time.process_time() < 0.4: pass"], ".")
         asleep = measuring.run_measured([sys.executable, "-c", "import time; time.sleep(0.5)"], ".")
         self.assertGreaterEqual(busy.cpu_s, 0.39)
-        self.assertLess(asleep.cpu_s, 0.3)
         self.assertGreater(asleep.wall_s, 0.49)
+        self.assertLess(asleep.cpu_s, asleep.wall_s - 0.49)  # on any machine: one thread cannot compute while it sleeps
 
     def test_the_children_of_a_child_count_too(self):
         cost = measuring.run_measured(["sh", "-c", f"{sys.executable} -c 'import time\nwhile time.process_time() < 0.4: pass'; true"], ".")
