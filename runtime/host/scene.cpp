@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
-#include <set>
 #include <span>
 
 namespace carillon::host {
@@ -174,22 +174,23 @@ contact::GroundSpec parse_ground(config::Object& object) {
   return ground;
 }
 
+using Names = std::map<std::string, std::size_t>;  // of bodies, and their places in the list
+
 /// The body that "body" names.
-std::size_t find_body(config::Object& object, const std::vector<SceneBody>& bodies) {
+std::size_t find_body(config::Object& object, const Names& bodies) {
   const std::string name = object.string("body");
+  if (const auto found = bodies.find(name); found != bodies.end()) return found->second;
   std::vector<std::string> names;
-  for (const SceneBody& body : bodies) names.push_back(body.name);
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  for (const auto& [known, index] : bodies) names.push_back(known);
   const std::string nearest = config::find_nearest(name, names);
   object.fail("body", fmt::format("no body is called \"{}\"; {}", name,
                                   nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
 }
 
-SceneStrike parse_strike(config::Object& object, const Scene& scene) {
+SceneStrike parse_strike(config::Object& object, const Scene& scene, const Names& names) {
   SceneStrike strike;
   strike.place = object.find_place("");
-  strike.body = find_body(object, scene.bodies);
+  strike.body = find_body(object, names);
   strike.time_s = object.number("time_s");
   strike.duration_s = read_within(object, "duration_s", strike.duration_s, 0.0, kLongestPulseS);
   if (!(strike.time_s - 0.5 * strike.duration_s >= 0.0 && strike.time_s <= scene.duration_s)) {
@@ -336,18 +337,18 @@ Scene parse_scene(const config::Document& document) {
                                     kMostBodies));
   if (root.has("effects")) scene.wish = read_effects(root);
   scene.effects = find_usual(scene.wish);
-  std::set<std::string> names;
+  Names names;
   for (config::Object& object : bodies) {
     scene.bodies.push_back(parse_body(object, scene.wish));
     const std::string& name = scene.bodies.back().name;
-    if (!names.insert(name).second)
+    if (!names.emplace(name, names.size()).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
   }
   std::vector<config::Object> strikes = root.objects("strikes");
   if (strikes.size() > kMostStrikes) {
     root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMostStrikes));
   }
-  for (config::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene));
+  for (config::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene, names));
   if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
