@@ -158,6 +158,8 @@ void run(const ProgramOptions& options) {
   const Course course = options.contacts ? read_course(*options.contacts, scene)
                                          : simulate(scene, has_contacts, options.audit, Progress("physics", options.quiet));
   figures.physics_s = get_seconds_since(started);
+  scene.warnings.insert(scene.warnings.end(), course.warnings.begin(), course.warnings.end());
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", config::printable(warning));
   figures.physics_cpu_s = static_cast<double>(std::clock() - ticks) / CLOCKS_PER_SEC;
   const bool measures = options.plan || options.report.has_value();
   const Plan plan = make_plan(std::move(facts), course.recording.events, measures ? plan::measure_costs() : plan::Costs{});

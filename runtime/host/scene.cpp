@@ -10,6 +10,8 @@
 #include <numbers>
 #include <span>
 
+#include "runtime/config/solids.hpp"
+
 namespace carillon::host {
 namespace {
 
@@ -26,6 +28,8 @@ constexpr std::size_t kMostMicrophones = 16;
 constexpr std::size_t kMostStrikes = 100000;
 constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
+constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body lasts as long as a person's step on less
+constexpr double kStiffestGroundPa = 1e13;  // ten times a diamond
 constexpr double kRoughestM = 1e-3;  // what is higher is no roughness but a shape
 
 using Quaternion = std::array<double, 4>;
@@ -161,12 +165,18 @@ SceneBody parse_body(config::Object& object, const plan::Wish& wish) {
   return body;
 }
 
-contact::GroundSpec parse_ground(config::Object& object) {
+contact::GroundSpec parse_ground(config::Object& object, std::vector<std::string>& warnings) {
   contact::GroundSpec ground;
   ground.height_m = read_within(object, "height_m", ground.height_m, -kFarthestM, kFarthestM);
   ground.young_modulus_pa = object.number_or("young_modulus_pa", ground.young_modulus_pa, config::kPositive);
+  ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1.0, 3e4);
+  const auto question = config::ask_about_solid(ground.young_modulus_pa, ground.density_kg_m3);
+  if (!(ground.young_modulus_pa >= kSoftestGroundPa && ground.young_modulus_pa <= kStiffestGroundPa)) {
+    object.fail("young_modulus_pa", fmt::format("{:g} Pa is the stiffness of no ground; give {:g} to {:g}{}", ground.young_modulus_pa,
+                                                kSoftestGroundPa, kStiffestGroundPa, question ? ": " + *question : ""));
+  }
+  if (question) warnings.push_back(fmt::format("{}: \"ground\": {}", object.find_place("young_modulus_pa"), *question));
   ground.poisson_ratio = object.number_or("poisson_ratio", ground.poisson_ratio, {-1.0, 0.5});
-  ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1e-3, 1e6);
   ground.restitution = read_within(object, "restitution", ground.restitution, 0.0, 1.0);
   ground.friction = read_within(object, "friction", ground.friction, 0.0, 10.0);
   ground.roughness_m = read_within(object, "roughness_m", ground.roughness_m, 0.0, kRoughestM);
@@ -324,7 +334,7 @@ Scene parse_scene(const config::Document& document) {
   }
   scene.sample_rate_hz = static_cast<int>(root.integer_if("sample_rate_hz", 8000, 192000).value_or(scene.sample_rate_hz));
   scene.gravity_m_s2 = read_vector(root, "gravity_m_s2", scene.gravity_m_s2, 1e4);
-  if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground);
+  if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground, scene.warnings);
 
   std::vector<config::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
