@@ -16,6 +16,7 @@ constexpr double kMostHz = 1e12;
 constexpr std::size_t kMostFixed = 1000, kMostRegions = 10000;
 constexpr long long kMostRanks = 1'000'000;
 constexpr double kMostGb = 1e9, kMostSeconds = 1e9;
+constexpr double kLeastScale = 1e-9, kMostScale = 1e6;
 constexpr double kLeastCents = 1e-3, kMostCents = 1200;
 
 /// The words of a schema and their meaning; a job may write `words` only.
@@ -77,6 +78,7 @@ std::vector<Fixed> read_all_fixed(config::Object& job) {
 }
 
 void read_materials(config::Object& job, JobSpec& spec) {
+  const auto read = [&](config::Object object) { return read_material(std::move(object), spec.band_hz, spec.warnings); };
   if (auto materials = job.object_if("materials")) {
     if (materials->keys().empty() || materials->keys().size() > kMostRegions)
       job.fail("materials",
@@ -85,11 +87,11 @@ void read_materials(config::Object& job, JobSpec& spec) {
                            kMostRegions));
     for (const std::string& region : materials->keys()) {
       if (region.empty()) materials->fail("", "a region's name is empty; give its tag or its name");
-      spec.materials[region] = read_material(materials->object(region), spec.band_hz);
+      spec.materials[region] = read(materials->object(region));
     }
   }
   spec.has_material = spec.materials.empty() || job.has("material");
-  spec.material = spec.has_material ? read_material(job.object("material"), spec.band_hz) : spec.materials.begin()->second;
+  spec.material = spec.has_material ? read(job.object("material")) : spec.materials.begin()->second;
 }
 
 void read_solver(config::Object& job, JobSpec& spec) {
@@ -115,9 +117,15 @@ void read_resources(config::Object& job, JobSpec& spec) {
 void read_geometry(config::Object& job, JobSpec& spec) {
   if (job.has("body")) {
     if (job.has("mesh")) job.fail("body", "\"mesh\" names the body already; give one of \"mesh\" (a file) and \"body\"");
+    if (job.has("mesh_scale"))
+      job.fail("mesh_scale", "is for a \"mesh\" file; a surface has \"scale\" inside \"body\", and shapes are in metres");
     spec.body = read_body(job.object("body"));
   } else {
     spec.mesh = job.path("mesh");
+    spec.mesh_scale = job.number_or("mesh_scale", spec.mesh_scale, config::kPositive);
+    if (spec.mesh_scale < kLeastScale || spec.mesh_scale > kMostScale)
+      job.fail("mesh_scale", fmt::format("metres per unit of the mesh file, from {:g} to {:g} (0.001 for millimetres), and is {:g}",
+                                         kLeastScale, kMostScale, spec.mesh_scale));
   }
   if (!spec.accuracy_cents) return;
   if (job.has("element")) job.fail("element", "\"accuracy_cents\" chooses the element; give one of the two");

@@ -52,6 +52,7 @@ struct Resources {
 struct JobSpec {
   std::filesystem::path file;                 // where it was read from
   std::filesystem::path mesh;                 // absolute; empty when the job names a body
+  double mesh_scale = 1.0;                    // metres per unit of the mesh file
   std::optional<Body> body;                   // in place of mesh
   std::filesystem::path bank;                 // absolute; empty: none given
   Material material;                          // of the whole body, or of the regions that `materials` does not name
@@ -67,6 +68,7 @@ struct JobSpec {
   Method method = Method::automatic;     // solver.method
   Factorisation factorisation = Factorisation::automatic;  // solver.factorisation
   Resources resources;
+  std::vector<std::string> warnings;  // "file:line: ..." of numbers that may be meant, but seldom are
 };
 
 /// Whether a job without "bank" can be used: `carillon` keeps banks in its store.

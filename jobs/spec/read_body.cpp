@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <limits>
 
 namespace carillon::spec {
 namespace {
@@ -10,7 +11,7 @@ namespace {
 // As carillon-mesh has them.
 constexpr double kLeastLength = 1e-6, kMostLength = 1e4;      // [m]
 constexpr double kLeastOpening = 20.0, kMostOpening = 340.0;  // [degrees]
-constexpr long long kMostNodes = 700'000'000;
+constexpr long long kMostNodes = 20'000'000;
 
 double read_length(config::Object& body, const std::string& key) {
   const double value = body.number(key, config::kPositive);
@@ -83,7 +84,10 @@ Body read_body(config::Object body) {
     read_shape(body, result);
   else
     read_surface(body, result);
-  result.nodes = body.integer_if("nodes", 4, kMostNodes);
+  result.nodes = body.integer_if("nodes", 4, std::numeric_limits<long long>::max());
+  if (result.nodes.value_or(0) > kMostNodes)
+    body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
+                                   kMostNodes, *result.nodes));
   result.edge_m = read_length_if(body, "edge_m");
   if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" says how fine the mesh is already; give one of them");
   body.finish();

@@ -5,26 +5,30 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <utility>
+
+#include "runtime/config/solids.hpp"
 
 namespace carillon::spec {
 namespace {
 
 // Far beyond every solid: what lies outside is a slip of the unit, and would only end in overflow later.
-constexpr double kMostStiffnessPa = 1e16;
-constexpr double kMostDensityKgM3 = 1e8;
-constexpr double kLeast = 1e-6;
+using config::kLeastDensityKgM3, config::kLeastStiffnessPa, config::kMostDensityKgM3, config::kMostStiffnessPa;
 constexpr double kMostDampingS = 1e6, kMostDampingPerS = 1e12;
 constexpr double kMostLossFactor = 2;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
 constexpr double kMostPower = 8;
 
 [[noreturn]] void fail_unit(const config::Object& object, std::string_view key, double value) {
-  object.fail(key, fmt::format("must be from {:g} to {:g} as no solid is outside, and is {:g}; check the unit", kLeast,
-                               key == "density_kg_m3" ? kMostDensityKgM3 : kMostStiffnessPa, value));
+  const bool is_density = key == "density_kg_m3";
+  object.fail(key, fmt::format("must be from {:g} to {:g} as no solid is outside, and is {:g}; check the unit{}",
+                               is_density ? kLeastDensityKgM3 : kLeastStiffnessPa, is_density ? kMostDensityKgM3 : kMostStiffnessPa, value,
+                               is_density && value < kLeastDensityKgM3 ? " (steel is 7850 kg/m^3, or 7.85e-9 t/mm^3)" : ""));
 }
 
 double read_positive(config::Object& object, std::string_view key, double most) {
   const double value = object.number(key, config::kPositive);
-  if (value < kLeast || value > most) fail_unit(object, key, value);
+  if (value < std::max(kLeastStiffnessPa, kLeastDensityKgM3) || value > most) fail_unit(object, key, value);
   return value;
 }
 
@@ -138,7 +142,7 @@ void read_orthotropic(config::Object object, Material& result) {
        {std::pair{"young_modulus_pa", &o.young_modulus_pa}, std::pair{"shear_modulus_pa", &o.shear_modulus_pa}}) {
     *values = object.numbers<3>(key);
     for (const double value : *values)
-      if (!(value >= kLeast && value <= kMostStiffnessPa)) fail_unit(object, key, value);
+      if (!(value >= kLeastStiffnessPa && value <= kMostStiffnessPa)) fail_unit(object, key, value);
   }
   o.poisson_ratio = object.numbers<3>("poisson_ratio");
   if (object.has("axes")) read_axes(object, o);
@@ -262,14 +266,58 @@ void read_damping(config::Object damping, Material& result, const std::array<dou
   damping.finish();
 }
 
+/// The number of the stiffness that the job gives, by its key.
+std::pair<std::string, double> find_stiffness(config::Object& material, const Material& result) {
+  if (result.orthotropic) {
+    const auto& e = result.orthotropic->young_modulus_pa;
+    return {"orthotropic.young_modulus_pa", *std::max_element(e.begin(), e.end())};
+  }
+  if (material.has("lame_mu_pa")) return {"lame_mu_pa", result.lame_mu_pa()};
+  return {"young_modulus_pa", result.young_modulus_pa};
+}
+
+void ask_about_units(config::Object& material, const Material& result, std::vector<std::string>& warnings) {
+  const auto [key, stiffness] = find_stiffness(material, result);
+  const double young = result.orthotropic ? stiffness : result.young_modulus_pa;
+  if (const auto question = config::ask_about_solid(young, result.density_kg_m3, key, "density_kg_m3", stiffness))
+    warnings.push_back(fmt::format("{}: {}", material.find_place(key.substr(0, key.find('.'))), *question));
+}
+
+/// On a grid of the band: no damping at all, or so much that most of the band does not swing.
+void ask_about_damping(config::Object& material, const Material& result, const std::array<double, 2>& band_hz,
+                       std::vector<std::string>& warnings) {
+  constexpr int kSteps = 60;
+  int swinging = 0;
+  double most = 0.0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double omega = 2 * std::numbers::pi * band_hz[0] * std::pow(band_hz[1] / band_hz[0], static_cast<double>(i) / kSteps);
+    const double decay = result.calc_decay_per_s(omega * omega);
+    most = std::max(most, decay);
+    if (decay < omega) ++swinging;
+  }
+  const std::string place = material.find_place("damping");
+  if (most == 0.0) {
+    warnings.push_back(fmt::format(
+        "{}: \"damping\" is zero: what is struck rings for ever; steel has \"internal_friction\" {{\"tan_phi\": 1e-4}}", place));
+  } else if (2 * swinging < kSteps + 1) {
+    warnings.push_back(fmt::format("{}: \"damping\" is so strong that {} of the band of {:g} to {:g} Hz swings: check the units{}", place,
+                                   swinging == 0 ? "nothing" : "less than half", band_hz[0], band_hz[1],
+                                   result.law == DampingLaw::rayleigh && result.alpha1_s > 1e-3
+                                       ? fmt::format(" (alpha1_s is {:g} s; 1e-8 to 1e-6 s is usual)", result.alpha1_s)
+                                       : ""));
+  }
+}
+
 }  // namespace
 
-Material read_material(config::Object material, const std::array<double, 2>& band_hz) {
+Material read_material(config::Object material, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings) {
   Material result;
   result.place = material.find_place("");
   read_elasticity(material, result);
   result.density_kg_m3 = read_positive(material, "density_kg_m3", kMostDensityKgM3);
   read_damping(material.object("damping"), result, band_hz);
+  ask_about_units(material, result, warnings);
+  ask_about_damping(material, result, band_hz, warnings);
   if (material.has_string("name")) result.name = material.string_or("name", "");
   material.ignore("name");
   material.finish();

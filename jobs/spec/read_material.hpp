@@ -2,13 +2,16 @@
 #pragma once
 
 #include <array>
+#include <string>
+#include <vector>
 
 #include "jobs/spec/material.hpp"
 #include "runtime/config/document.hpp"
 
 namespace carillon::spec {
 
-/// Reads and validates one material. The damping must not be negative anywhere on `band_hz`. Throws InputError.
-Material read_material(config::Object material, const std::array<double, 2>& band_hz);
+/// Reads and validates one material. The damping must not be negative anywhere on `band_hz`. What may be meant but seldom is (units of
+/// another system, no damping at all, damping under which nothing swings) is added to `warnings`, a line each. Throws InputError.
+Material read_material(config::Object material, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings);
 
 }  // namespace carillon::spec

@@ -109,6 +109,7 @@ std::string resolved_json(const JobSpec& job, const fs::path& folder, const std:
     root["body"] = write_body(*job.body, base);
   else
     root["mesh"] = relative_to(job.mesh, base);
+  if (job.mesh_scale != 1.0) root["mesh_scale"] = job.mesh_scale;
   if (!job.bank.empty()) root["bank"] = relative_to(job.bank, base);
   if (job.has_material) root["material"] = write_material(job.material);
   for (const auto& [region, material] : job.materials) root["materials"][region] = write_material(material);

@@ -18,7 +18,7 @@ import report
 import scaling
 import work
 from accuracy import advise, study
-from errors import InputError, RunError
+from errors import InputError, RunError, printable
 
 
 def read_numbers(name, least):
@@ -117,7 +117,7 @@ def main():
         return 130
     if "--json" in sys.argv[1:]:
         print(json.dumps({"error": str(text), "exit_code": code}, indent=2))
-    print(f"carillon-study: error: {text}", file=sys.stderr)
+    print(f"carillon-study: error: {printable(text)}", file=sys.stderr)
     return code
 
 

@@ -22,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import unicodedata
 
 import h5py
 import numpy
@@ -42,6 +43,16 @@ class InputError(Exception):
 
 class SystemError_(Exception):
     """The machine refused."""
+
+
+def printable(text):
+    """`text` on one line, without what a terminal obeys: control and format characters as escapes (as config::printable does for the other programs)."""
+    def show(letter):
+        if 0xDC80 <= ord(letter) <= 0xDCFF:  # a byte of a file name that is no UTF-8
+            return f"\\x{ord(letter) - 0xDC00:02x}"
+        hidden = unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Zl", "Zp") and letter not in "\u00ad\u200c\u200d"
+        return f"\\u{ord(letter):04x}" if hidden else letter
+    return "".join(map(show, str(text)))
 
 
 # ------------------------------------------------------------------ what is drawn
@@ -72,13 +83,40 @@ class Bank:
                 self.freq_hz = file["modes/frequency_hz"][:]
                 self.centre = file["rigid/centre_m"][:]
                 self.note = f"{file['solve/element'][()].decode()}, {int(file['solve/nodes'][()]):,} nodes"
-        except (OSError, KeyError) as error:
+                self.shape_extent = file["modes/shape"].shape
+        except (OSError, KeyError, TypeError, ValueError, AttributeError, OverflowError, RuntimeError, MemoryError) as error:
             raise InputError(f"{path}: the bank cannot be read ({error}); run carillon-bank check on it") from None
+        self.check()
+
+    def check(self):
+        """InputError unless everything can be drawn that is not drawn yet: shapes of arrays, finite numbers, triangles of vertices that there are."""
+        def refuse(what):
+            raise InputError(f"{self.path}: {what}; run carillon-bank check on it")
+        numbers = [self.vertices, self.freq_hz, self.centre]
+        if any(not numpy.issubdtype(values.dtype, numpy.number) for values in [*numbers, self.triangles]):
+            refuse("mesh, frequencies or centre are no numbers")
+        if self.vertices.ndim != 2 or self.vertices.shape[1] != 3 or self.triangles.ndim != 2 or self.triangles.shape[1] != 3 or not len(self.triangles):
+            refuse("the surface is no list of vertices and triangles")
+        if self.freq_hz.ndim != 1 or self.shape_extent != (len(self.vertices), len(self.freq_hz), 3):
+            refuse("frequencies, shapes and vertices do not fit each other")
+        if not all(numpy.isfinite(values).all() for values in numbers) or numpy.abs(self.vertices).max() > 1e12:
+            refuse("a coordinate or a frequency is no finite number")
+        if self.triangles.min() < 0 or self.triangles.max() >= len(self.vertices):
+            refuse("a triangle names a vertex that there is not")
+        if not numpy.ptp(self.vertices, axis=0).max() > 0:
+            refuse("the surface has no extent")
 
     def read_mode(self, number):
         """The displacement of mode `number`, counted from 1, at every surface vertex; any scale."""
-        with h5py.File(self.path, "r") as file:
-            return file["modes/shape"][:, number - 1, :].astype(float) * file["modes/shape_scale"][number - 1]
+        try:
+            with h5py.File(self.path, "r") as file:
+                steps, scale = file["modes/shape"][:, number - 1, :].astype(float), float(file["modes/shape_scale"][number - 1])
+        except (OSError, KeyError, TypeError, ValueError, IndexError, RuntimeError) as error:
+            raise InputError(f"{self.path}: mode {number} cannot be read ({error}); run carillon-bank check on it") from None
+        if not numpy.isfinite(steps).all() or not math.isfinite(scale):
+            raise InputError(f"{self.path}: mode {number} has a displacement that is no finite number; run carillon-bank check on it")
+        largest = numpy.abs(steps).max(initial=0.0)
+        return steps / largest if largest > 0 and scale != 0 else numpy.zeros_like(steps)
 
 
 class Trajectory:
@@ -88,6 +126,8 @@ class Trajectory:
         path = pathlib.Path(path)
         try:
             data = json.loads(path.read_text())
+        except RecursionError:
+            raise InputError(f"{path}: brackets are nested too deep; carillon-render --trajectory writes a trajectory") from None
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror}); carillon-render --trajectory writes it") from None
         except ValueError as error:
@@ -109,7 +149,11 @@ class Trajectory:
             self.ground = (data.get("ground") or {}).get("height_m")
             impulses = [(*i["world_m"], i["impulse_n_s"]) for i in data.get("impulses", [])]
             self.impulses = numpy.array(impulses, dtype=float).reshape(-1, 4)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            if not numpy.isfinite(self.impulses).all() or (self.ground is not None and not math.isfinite(self.ground)):
+                raise InputError(f"{path}: the ground or an impulse has a number that is not finite; render the scene again")
+            if any(numpy.abs(poses).max() > 1e12 for _, _, _, poses in self.bodies):
+                raise InputError(f"{path}: a body is farther away than can be drawn; render the scene again")
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(f"{path}: this is no trajectory ({type(error).__name__}: {error}); "
                              "carillon-render --trajectory writes one") from None
 
@@ -395,10 +439,14 @@ def draw_modes(bank, numbers, up):
     for number in numbers:
         mode = bank.read_mode(number)
         length = numpy.linalg.norm(mode, axis=1)
+        largest = length[used].max()
+        if not largest > 0:  # a mode at rest on the surface: drawn as it lies, in the colour of no motion
+            deformed.append((bank.vertices, numpy.zeros(len(bank.vertices))))
+            continue
         # A twelfth of the size is visible and does not turn it inside out; the sign makes the largest motion point outward.
         k = int(length[used].argmax())
         sign = 1.0 if mode[used][k] @ (place[k] - place.mean(axis=0)) >= 0 else -1.0
-        deformed.append((bank.vertices + sign * 0.08 * size / length[used].max() * mode, length / length[used].max()))
+        deformed.append((bank.vertices + sign * 0.08 * size / largest * mode, length / largest))
     seen = numpy.vstack([place] + [shape[used] for shape, _ in deformed]) @ view.axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     columns, width, height = choose_panels(len(numbers), (high[0] - low[0]) / max(high[1] - low[1], 0.05 * (high[0] - low[0])))
@@ -723,18 +771,21 @@ def run():
     load_vtk()
     image = draw_modes(bank, numbers, "xyz".index(arguments.up)) if arguments.command == "modes" else draw_scene(trajectory)
     write_png(image, arguments.output)
-    print(f"{arguments.output}: {image.shape[1]} x {image.shape[0]} pixels")
+    print(f"{printable(arguments.output)}: {image.shape[1]} x {image.shape[0]} pixels")
 
 
 def main():
     try:
         run()
     except InputError as error:
-        print(f"carillon-draw: {error}", file=sys.stderr)
+        print(f"carillon-draw: {printable(error)}", file=sys.stderr)
         return 2
     except (SystemError_, ImportError, MemoryError, OSError) as error:
-        print(f"carillon-draw: {error}", file=sys.stderr)
+        print(f"carillon-draw: {printable(error)}", file=sys.stderr)
         return 4
+    except Exception as error:  # numbers that nothing above looks for
+        print(f"carillon-draw: this cannot be drawn ({type(error).__name__}: {printable(error)}); run carillon-bank check on its banks", file=sys.stderr)
+        return 2
     return 0
 
 

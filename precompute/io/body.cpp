@@ -38,14 +38,25 @@ std::vector<std::int32_t> find_held_nodes(const mesh::TetMesh& mesh, const spec:
   return held;
 }
 
+/// What the check of the mesh found; of an odd size, with the key of the job that corrects it. Rank 0.
+void warn_of_mesh(Run& run, const Body& body) {
+  for (const std::string& line : body.check.warnings)
+    run.stations.warn(line.starts_with("the body measures") ? line + "; " + describe_scale_key(run.job) : line);
+}
+
 /// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
 mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   const bool quadratic = setting.element == spec::Element::T10;
   const spec::JobSpec& job = run.job;
   mesh::TetMesh mesh = job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}) : mesh::read_mesh(job.mesh);
+  if (job.mesh_scale != 1.0) {
+    for (mesh::Vec3& node : mesh.nodes) {
+      for (double& x : node) x *= job.mesh_scale;
+    }
+  }
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
-  for (const std::string& line : body.check.warnings) run.stations.warn(line);
+  warn_of_mesh(run, body);
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);
@@ -74,6 +85,7 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   body.source = run.job.mesh.string();
   run.stations.begin("read", body.source + ", by all ranks");
   slabs::Wish wish;
+  wish.scale = run.job.mesh_scale;
   wish.order = setting.element == spec::Element::T10 ? 2 : 1;
   for (const spec::Fixed& fixed : run.job.fixed)
     wish.hold.push_back({fixed.node_set, fixed.box_m, (fixed.place.empty() ? run.job.file.string() : fixed.place) + ": key 'fixed'"});
@@ -82,7 +94,7 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   body.check = std::move(mesh.check);
   body.held_nodes = mesh.held_nodes;
   body.surface = {std::move(mesh.boundary.vertices_m), std::move(mesh.boundary.triangles), std::move(mesh.boundary.row)};
-  for (const std::string& line : body.check.warnings) run.stations.warn(line);
+  warn_of_mesh(run, body);
   say_size(run, body.pieces.nodes, body.pieces.tets, body.pieces.components, body.held_nodes);
   run.stations.say(fem::describe(body.pieces.report));
   run.stations.end();
@@ -125,6 +137,13 @@ Body make_pieces(Run& run, const Setting& setting) {
 }
 
 }  // namespace
+
+std::string describe_scale_key(const spec::JobSpec& job) {
+  if (!job.body) return "\"mesh_scale\": 0.001 in the job takes the mesh file's numbers for millimetres";
+  return job.body->shape.empty()
+             ? "\"scale\": 0.001 inside \"body\" takes the surface's numbers for millimetres, and \"height_m\" gives it a size"
+             : "the dimensions of a shape are metres";
+}
 
 Setting get_setting(const spec::JobSpec& job) {
   Setting setting;

@@ -35,6 +35,9 @@ struct Body {
   std::string source;                                // "bunny.msh", "bar with 2000 nodes"; for messages
 };
 
+/// The key of the job that says in which unit its mesh is, and how, for messages about its size.
+std::string describe_scale_key(const spec::JobSpec& job);
+
 /// What is known of the cost of solving it: of a body that was not read yet (pieces empty) by the job and the size of the file. Rank 0.
 Extent find_extent(const Run& run, const Setting& setting, const Body& body);
 

@@ -50,6 +50,7 @@ void check_job(const Run& run) {
 void open_job(Run& run, const fs::path& file, spec::BankKey bank) {
   run.job = read_shared_job(run, file, bank);
   check_job(run);
+  for (const std::string& warning : run.job.warnings) run.stations.warn(warning);
 }
 
 }  // namespace carillon::io

@@ -16,6 +16,7 @@
 #include "precompute/io/git_id.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
+#include "runtime/config/printable.hpp"
 
 namespace carillon::io {
 namespace {
@@ -54,14 +55,14 @@ void Stations::begin(const std::string& name, const std::string& what) {
   start_cpu_s_ = find_cpu_seconds();
   if (listener_) listener_(name);
   if (!speaks_) return;
-  fmt::print("{:<10} {}\n", name, what);
+  fmt::print("{:<10} {}\n", name, config::printable(what));
   std::fflush(stdout);
 }
 
 void Stations::say(const std::string& text) const {
   if (!speaks_) return;
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) fmt::print("           {}\n", line);
+  for (std::string line; std::getline(lines, line);) fmt::print("           {}\n", config::printable(line));
   std::fflush(stdout);
 }
 
@@ -69,7 +70,7 @@ void Stations::warn(const std::string& text) {
   if (rank_ != 0) return;
   warnings_.push_back(text);
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-precompute: warning: {}\n", text);
+  fmt::print(stderr, "carillon-precompute: warning: {}\n", config::printable(text));
 }
 
 const Station& Stations::end() {

@@ -170,8 +170,8 @@ void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
   if (below <= 0 || find_low_hz(run.job, modes) > run.job.band_hz[0]) return;
   run.stations.warn(
       fmt::format("the fundamental is out of the band: {} mode{} below the band, which begins at {:g} Hz; the body measures {:.3g} m "
-                  "across: if its mesh is in millimetres, scale it by 0.001",
-                  below, below == 1 ? " lies" : "s lie", run.job.band_hz[0], calc_diagonal(body.check)));
+                  "across: if it was made in millimetres, {}",
+                  below, below == 1 ? " lies" : "s lie", run.job.band_hz[0], calc_diagonal(body.check), describe_scale_key(run.job)));
 }
 
 void warn_of_oddities(Run& run, const Body& body, const eigen::Modes& modes) {

@@ -21,6 +21,7 @@
 #include "precompute/shapes/shapes.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/file.hpp"
+#include "runtime/config/printable.hpp"
 
 namespace {
 
@@ -251,7 +252,7 @@ void make_mesh(const Order& order) {
   const auto start = Clock::now();
   const mesher::Progress progress = [&](std::string_view phase) {
     if (order.quiet) return;
-    fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), phase);
+    fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), config::printable(phase));
     std::fflush(stderr);
   };
   check_options(order);
@@ -277,10 +278,10 @@ void make_mesh(const Order& order) {
 
   const double total_s = calc_seconds(start);
   if (!order.json.empty()) config::write_file(order.json, format_json(order, result, check, total_s));
-  fmt::print("{}", format_report(order, result, check, total_s));
+  fmt::print("{}", config::printable_lines(format_report(order, result, check, total_s)));
   std::set<std::string> told;
   for (const std::string& note : result.notes) {
-    if (told.insert(note).second) fmt::print("  note      {}\n", note);
+    if (told.insert(note).second) fmt::print("  note      {}\n", config::printable(note));
   }
   if (std::fflush(stdout) != 0) throw SystemError("the report cannot be written");
 }
@@ -346,7 +347,7 @@ int run(int argc, char** argv) {
 
 int fail(const char* what, int code) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-mesh: {}\n", what);
+  fmt::print(stderr, "carillon-mesh: {}\n", carillon::config::printable(what));
   return code;
 }
 

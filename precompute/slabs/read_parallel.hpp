@@ -30,7 +30,8 @@ struct Hold {
 };
 
 struct Wish {
-  int order = 2;  // of the elements to compute with, whatever the file has
+  int order = 2;       // of the elements to compute with, whatever the file has
+  double scale = 1.0;  // metres per unit of the file; boxes are in metres
   std::vector<Hold> hold = {};
 };
 

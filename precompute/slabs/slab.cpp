@@ -138,11 +138,12 @@ void read_regions(const Source& source, const Layout& layout, std::int64_t begin
   }
 }
 
-void read_nodes(const Source& source, const std::string& name, const Layout& layout, std::int64_t begin, std::int64_t count, Slab& slab) {
+void read_nodes(const Source& source, const std::string& name, const Layout& layout, double scale, std::int64_t begin, std::int64_t count,
+                Slab& slab) {
   const auto values = source.read<double>(layout.points, begin, count);
   slab.nodes_m.resize(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < slab.nodes_m.size(); ++i) {
-    slab.nodes_m[i] = {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+    slab.nodes_m[i] = {scale * values[3 * i], scale * values[3 * i + 1], scale * values[3 * i + 2]};
     for (const double x : slab.nodes_m[i])
       if (!std::isfinite(x))
         throw InputError(fmt::format("{}: node {} has a coordinate that is not finite; mend the mesh where it was made", name,
@@ -333,7 +334,7 @@ Slab read_slab(MPI_Comm comm, const std::filesystem::path& file, const std::stri
       const std::int64_t begin = slab.corners.first[static_cast<std::size_t>(rank)],
                          end = slab.corners.first[static_cast<std::size_t>(rank) + 1];
       read_regions(*source, layout, first_element, slab);
-      read_nodes(*source, name, layout, begin, end - begin, slab);
+      read_nodes(*source, name, layout, wish.scale, begin, end - begin, slab);
     });
     read_held_sets(comm, *source, name, layout, wish, slab.corners.first[static_cast<std::size_t>(rank)], slab);
   }

@@ -12,6 +12,7 @@
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/report.hpp"
+#include "runtime/config/printable.hpp"
 
 namespace {
 
@@ -32,7 +33,7 @@ void check(const std::string& file) {
   }
   std::fflush(stdout);
   if (faults > 0) throw InputError(fmt::format("{}: {} fault{}; compute the bank again", file, faults, faults == 1 ? "" : "s"));
-  fmt::print("{}\n{}\n{}: whole and sane\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), file);
+  fmt::print("{}\n{}\n{}: whole and sane\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), config::printable(file));
 }
 
 /// What `carillon-bank edit` does to a bank.
@@ -78,6 +79,8 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
 int run(int argc, char** argv) {
   CLI::App app("Looks at a mode bank, and edits it.");
   app.name("carillon-bank");
+  app.failure_message(
+      [](const CLI::App* asked, const CLI::Error& error) { return config::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
   std::string file;
   bool json = false;
@@ -107,7 +110,7 @@ int run(int argc, char** argv) {
     edit(file, edited, wishes);
   } else {
     const bank::Bank bank = bank::read_bank(file);
-    fmt::print("{}", json ? bank::format_info_json(bank, file) : bank::format_info(bank, file, modes));
+    fmt::print("{}", json ? bank::format_info_json(bank, file) : config::printable_lines(bank::format_info(bank, file, modes)));
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;
@@ -115,7 +118,7 @@ int run(int argc, char** argv) {
 
 int fail(const char* what, int code) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-bank: {}\n", what);
+  fmt::print(stderr, "carillon-bank: {}\n", config::printable(what));
   return code;
 }
 

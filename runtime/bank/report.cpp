@@ -8,6 +8,8 @@
 #include <optional>
 #include <sstream>
 
+#include "runtime/config/printable.hpp"
+
 namespace carillon::bank {
 namespace {
 
@@ -24,14 +26,6 @@ std::optional<Json::Value> parse_json(const std::string& text) {
     return std::nullopt;
   }
   return value;
-}
-
-/// Text of a file on a terminal: control characters (escape sequences among them) become question marks.
-std::string calc_printable(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  }
-  return text;
 }
 
 /// "under", "critical" or "over": d against omega. Critical is what doubles cannot tell apart from d = omega.
@@ -51,7 +45,7 @@ std::string format_bytes(std::uintmax_t bytes) {
 std::string format_scalar(const std::string& key, const Json::Value& value) {
   if (value.isUInt64() && key.find("bytes") != std::string::npos) return format_bytes(value.asUInt64());
   if (value.isDouble()) return fmt::format("{:.6g}", value.asDouble());
-  if (value.isString()) return calc_printable(value.asString());
+  if (value.isString()) return config::printable(value.asString());
   std::string text = value.toStyledString();
   text.erase(std::remove(text.begin(), text.end(), '\n'), text.end());
   return text.size() > 100 ? text.substr(0, 97) + "..." : text;
@@ -74,15 +68,15 @@ void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) 
       value.removeMember("name");
     }
     if (!is_nested(value) || (value.isArray() && is_flat(value))) {
-      text += fmt::format("{}{}: {}\n", indent, calc_printable(key), format_scalar(key, value));
+      text += fmt::format("{}{}: {}\n", indent, config::printable(key), format_scalar(key, value));
     } else if (value.isObject() && is_flat(value) && value.size() <= 4) {
       std::string line;
       for (auto member = value.begin(); member != value.end(); ++member) {
-        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", calc_printable(member.name()), format_scalar(member.name(), *member));
+        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", config::printable(member.name()), format_scalar(member.name(), *member));
       }
-      text += fmt::format("{}{}: {}\n", indent, calc_printable(key), line);
+      text += fmt::format("{}{}: {}\n", indent, config::printable(key), line);
     } else {
-      text += fmt::format("{}{}:\n", indent, calc_printable(key));
+      text += fmt::format("{}{}:\n", indent, config::printable(key));
       append_tree(value, depth + 1, text);
     }
   }
@@ -114,7 +108,7 @@ std::string format_modes(const Bank& bank, std::size_t limit) {
 /// "rayleigh: alpha1 1e-07 s, alpha2 5 1/s"
 std::string format_damping(const Bank& bank) {
   const Damping& law = bank.damping;
-  std::string text = calc_printable(law.law);
+  std::string text = config::printable(law.law);
   if (law.law == "rayleigh")
     return text + fmt::format(", alpha1 {:.4g} s, alpha2 {:.4g} 1/s", bank.material.alpha1_s, bank.material.alpha2_per_s);
   if (law.law == "internal_friction") return text + fmt::format(", tan(phi) {:.4g}", law.coefficient[0]);
@@ -298,9 +292,9 @@ Check calc_provenance_check(const Bank& bank) {
 }
 
 std::string format_check(const Check& check) {
-  if (check.faults.empty()) return fmt::format("ok      {:<12} {}\n", check.property, calc_printable(check.figure));
+  if (check.faults.empty()) return fmt::format("ok      {:<12} {}\n", check.property, config::printable(check.figure));
   std::string text;
-  for (const std::string& fault : check.faults) text += fmt::format("FAULT   {:<12} {}\n", check.property, calc_printable(fault));
+  for (const std::string& fault : check.faults) text += fmt::format("FAULT   {:<12} {}\n", check.property, config::printable(fault));
   return text;
 }
 

@@ -6,6 +6,7 @@
 #include <json/json.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 
@@ -18,10 +19,16 @@ struct DocumentData {
   int first_line = 1;
   std::string text;
   Json::Value root;
+  mutable std::vector<std::size_t> line_ends;  // made when the first line is asked for, then searched
+  mutable std::size_t scanned_bytes = 0;       // of `text`, in search of line ends
 
   int line_at(std::ptrdiff_t offset) const {
-    const auto end = text.begin() + std::clamp<std::ptrdiff_t>(offset, 0, static_cast<std::ptrdiff_t>(text.size()));
-    return first_line + static_cast<int>(std::count(text.begin(), end, '\n'));
+    if (scanned_bytes == 0) {
+      scanned_bytes = text.size();
+      for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) line_ends.push_back(at);
+    }
+    const auto end = static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0));
+    return first_line + static_cast<int>(std::lower_bound(line_ends.begin(), line_ends.end(), end) - line_ends.begin());
   }
   [[noreturn]] void fail(std::ptrdiff_t offset, const std::string& message) const {
     throw InputError(fmt::format("{}:{}: {}", file.string(), line_at(offset), message));
@@ -78,12 +85,46 @@ std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& valu
                                line - 1 + data.first_line, column, reason.substr(0, 200)));
 }
 
-/// Depth of brackets outside strings and comments, so that the parser's recursion is bounded before it starts.
-void check_depth(const DocumentData& data) {
+/// What is wrong with a word that begins like a number, as part of a sentence; nullptr when it is one by the grammar of JSON.
+const char* find_number_fault(std::string_view word) {
+  const auto skip_digits = [&] {
+    const std::size_t digits = std::min(word.find_first_not_of("0123456789"), word.size());
+    word.remove_prefix(digits);
+    return digits;
+  };
+  const bool is_signed = word.starts_with('-');
+  if (word.starts_with('+')) return "a number has no plus sign; leave it away";
+  if (is_signed) word.remove_prefix(1);
+  const bool has_zero = word.starts_with('0');
+  const std::size_t whole = skip_digits();
+  if (whole == 0) {
+    if (word.starts_with('.')) return "there has to be a digit before the point: 0.5, not .5";
+    return is_signed ? "a minus sign is followed by digits" : "this is no number";
+  }
+  if (has_zero && whole > 1) return "a number does not begin with a zero (12, not 012); a point may be missing behind it";
+  if (has_zero && (word.starts_with('x') || word.starts_with('X') || word.starts_with('b') || word.starts_with('o')))
+    return "numbers are decimal here";
+  if (word.starts_with('.')) {
+    word.remove_prefix(1);
+    if (skip_digits() == 0) return "there has to be a digit behind the point: 1.0 or 1, not 1.";
+  }
+  if (word.starts_with('e') || word.starts_with('E')) {
+    word.remove_prefix(1);
+    if (word.starts_with('+') || word.starts_with('-')) word.remove_prefix(1);
+    if (skip_digits() == 0) return "there has to be a whole number behind the e of a power of ten";
+  }
+  return word.empty() ? nullptr : "there is something behind the number; separate values by commas, and give units no letters";
+}
+
+/// What jsoncpp is too lenient with: the depth of brackets outside strings and comments, so that the parser's recursion is bounded before
+/// it starts, and the form of numbers.
+void check_text(const DocumentData& data) {
+  constexpr std::string_view kWord = "0123456789+-._abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
+  const std::string_view text = data.text;
   int depth = 0;
   bool in_string = false;
-  for (std::size_t i = 0; i < data.text.size(); ++i) {
-    const char c = data.text[i];
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
     if (in_string) {
       if (c == '\\')
         ++i;
@@ -91,8 +132,18 @@ void check_depth(const DocumentData& data) {
         in_string = false;
     } else if (c == '"') {
       in_string = true;
-    } else if (c == '/' && i + 1 < data.text.size() && data.text[i + 1] == '/') {
-      while (i < data.text.size() && data.text[i] != '\n') ++i;
+    } else if (text.substr(i, 2) == "//") {
+      while (i < text.size() && text[i] != '\n') ++i;
+    } else if (text.substr(i, 2) == "/*") {
+      i = std::min(text.find("*/", i + 2), text.size());
+      ++i;  // on the slash
+    } else if (kWord.find(c) != std::string_view::npos) {
+      const std::string_view word = text.substr(i, text.find_first_not_of(kWord, i) - i);
+      const char* const fault = std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_' ? nullptr : find_number_fault(word);
+      if (fault != nullptr)
+        data.fail(static_cast<std::ptrdiff_t>(i),
+                  fmt::format("{}{} is not a number as JSON writes it: {}", word.substr(0, 40), word.size() > 40 ? "..." : "", fault));
+      i += word.size() - 1;
     } else if (c == '{' || c == '[') {
       if (++depth > kMaxDepth)
         data.fail(static_cast<std::ptrdiff_t>(i), fmt::format("more than {} brackets inside one another; flatten this", kMaxDepth));
@@ -107,6 +158,7 @@ void check_depth(const DocumentData& data) {
 Document::Document(std::shared_ptr<DocumentData> data) : data_(std::move(data)) {}
 Object Document::root() const { return Object(data_, &data_->root, ""); }
 const std::filesystem::path& Document::file() const { return data_->file; }
+std::size_t Document::count_scanned_bytes() const { return data_->scanned_bytes; }
 
 Document read_document(const std::filesystem::path& file, std::string_view too_long) {
   return parse_document(read_file(file, "JSON file", kMaxBytes, too_long), file);
@@ -122,7 +174,7 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
     const auto line = first_line + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
     throw InputError(fmt::format("{}:{}: there is a zero byte, which no text has; check that this is the right file", file.string(), line));
   }
-  check_depth(*data);
+  check_text(*data);
   Json::CharReaderBuilder builder;
   Json::CharReaderBuilder::strictMode(&builder.settings_);
   builder["allowComments"] = true;

@@ -124,6 +124,8 @@ class Document {
  public:
   Object root() const;
   const std::filesystem::path& file() const;
+  /// Bytes that were read so far to find the lines of its values: never more than the text has.
+  std::size_t count_scanned_bytes() const;
 
  private:
   friend Document parse_document(std::string_view, const std::filesystem::path&, int);

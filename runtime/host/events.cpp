@@ -12,11 +12,40 @@
 namespace carillon::host {
 namespace {
 
+stream::SurfaceMark mark_surface(const bank::Bank& bank) {
+  Vec3 low = bank.vertices_m.front(), high = low, sum{};
+  for (const Vec3& vertex : bank.vertices_m) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], vertex[k]);
+      high[k] = std::max(high[k], vertex[k]);
+    }
+  }
+  double weights = 0.0;
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
+    const auto weight = static_cast<double>(t + 1);
+    weights += weight;
+    for (const std::int32_t corner : bank.triangles[t]) {
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += weight / 3.0 * bank.vertices_m[static_cast<std::size_t>(corner)][k];
+    }
+  }
+  stream::SurfaceMark mark;
+  for (std::size_t k = 0; k < 3; ++k) {
+    mark.size_m[k] = high[k] - low[k];
+    mark.order_m[k] = sum[k] / weights;
+  }
+  return mark;
+}
+
 std::vector<stream::RecordedBody> list_bodies(const Scene& scene) {
   std::vector<stream::RecordedBody> bodies;
-  for (const SceneBody& body : scene.bodies) bodies.push_back({body.name, static_cast<std::int64_t>(body.spec.bank->triangles.size())});
+  for (const SceneBody& body : scene.bodies) {
+    const bank::Bank& bank = *body.spec.bank;
+    bodies.push_back({body.name, static_cast<std::int64_t>(bank.triangles.size()), mark_surface(bank)});
+  }
   return bodies;
 }
+
+std::string format_size(const Vec3& size_m) { return fmt::format("{:.4g} x {:.4g} x {:.4g} m", size_m[0], size_m[1], size_m[2]); }
 
 /// Where no body can move there is no physics: every body stays where the scene puts it.
 std::vector<stream::Event> make_still(const Scene& scene) {
@@ -88,7 +117,8 @@ Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::f
 }
 
 Course read_course(const std::filesystem::path& file, const Scene& scene) {
-  Course course{stream::read_recording(file), 0};
+  Course course;
+  course.recording = stream::read_recording(file);
   const std::vector<stream::RecordedBody>&theirs = course.recording.bodies, ours = list_bodies(scene);
   if (theirs.size() != ours.size()) {
     throw InputError(fmt::format("{}: is of {} bodies, and the scene has {}; play it with the scene that it was made for", file.string(),
@@ -104,6 +134,23 @@ Course read_course(const std::filesystem::path& file, const Scene& scene) {
           fmt::format("{}: was made for a bank of \"{}\" with {} triangles, and the scene's has {}; use banks of the same mesh",
                       file.string(), ours[i].name, theirs[i].triangles, ours[i].triangles));
     }
+    if (theirs[i].surface && !stream::is_same_surface(*theirs[i].surface, *ours[i].surface)) {
+      const std::string were = format_size(theirs[i].surface->size_m), are = format_size(ours[i].surface->size_m);
+      throw InputError(were == are
+                           ? fmt::format("{}: was made for another surface of \"{}\", of the same size and number of triangles; use "
+                                         "a bank of the same mesh",
+                                         file.string(), ours[i].name)
+                           : fmt::format("{}: was made for a body \"{}\" of {}, and the scene's bank measures {}; use a bank of the "
+                                         "same mesh and size, or record the contacts anew",
+                                         file.string(), ours[i].name, were, are));
+    }
+  }
+  const auto is_unmarked = [](const stream::RecordedBody& body) { return !body.surface; };
+  if (std::any_of(theirs.begin(), theirs.end(), is_unmarked)) {
+    course.warnings.push_back(
+        fmt::format("{}: does not say how large its bodies are (\"size_m\", \"order_m\"); that they have as many triangles as the scene's is all "
+                    "that was compared",
+                    file.string()));
   }
   return course;
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "runtime/host/scene.hpp"
@@ -16,6 +17,7 @@ struct Course {
   stream::Recording recording;
   std::int64_t steps = 0;  // of the physics
   contact::EnergyAudit energy{};
+  std::vector<std::string> warnings;
 };
 
 /// Whether any body can move: without one there is no physics.
@@ -30,7 +32,8 @@ contact::WorldSpec make_world(const Scene& scene);
 Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress);
 
 /// The events of a contacts file. Throws InputError when it is none, or was made for other bodies than the scene's: as many, of the same
-/// names, with as many triangles in their banks, in the same order.
+/// names, with the same surface in their banks, in the same order. A file that does not say which surfaces it was made for is compared by
+/// their numbers of triangles, with a warning.
 Course read_course(const std::filesystem::path& file, const Scene& scene);
 
 }  // namespace carillon::host

@@ -7,13 +7,14 @@
 #include <new>
 
 #include "runtime/config/error.hpp"
+#include "runtime/config/printable.hpp"
 #include "runtime/host/program.hpp"
 #include "runtime/host/scene.hpp"
 
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-render: {}\n", message);
+  fmt::print(stderr, "carillon-render: {}\n", carillon::config::printable(message));
   return code;
 }
 
@@ -22,6 +23,9 @@ int fail(int code, const char* message) {
 int main(int argc, char** argv) {
   carillon::host::ProgramOptions options;
   CLI::App app("Simulates a scene of falling bodies and renders what two ears or microphones hear.", "carillon-render");
+  app.failure_message([](const CLI::App* asked, const CLI::Error& error) {
+    return carillon::config::printable_lines(CLI::FailureMessage::simple(asked, error));
+  });
   app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
   auto* output =
       app.add_option("-o,--output", options.wav, "WAV file to write: stereo, or a channel for each microphone; required without --plan")

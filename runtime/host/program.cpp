@@ -10,6 +10,7 @@
 #include <ctime>
 
 #include "runtime/config/file.hpp"
+#include "runtime/config/printable.hpp"
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
@@ -82,7 +83,7 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
 void print_summary(const Scene& scene, const Sound& sound, const Figures& figures) {
   fmt::print("bodies             {}\n", figures.bodies);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    fmt::print("  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", scene.bodies[i].name, sound.body_modes[i],
+    fmt::print("  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", config::printable(scene.bodies[i].name), sound.body_modes[i],
                scene.bodies[i].spec.fixed ? "fixed, " : "", sound.body_peak_pa[i]);
   }
   fmt::print("modes sounding     {}\n", figures.modes);
@@ -118,7 +119,7 @@ void print_warnings(const Scene& scene, const Sound& sound, const Figures& figur
 
 void write_output(const fs::path& file, const std::string& bytes, const char* what) {
   config::write_file(file, bytes);
-  fmt::print("{:<18} {}\n", what, file.string());
+  fmt::print("{:<18} {}\n", what, config::printable(file.string()));
 }
 
 }  // namespace
@@ -157,11 +158,13 @@ void run(const ProgramOptions& options) {
   const Course course = options.contacts ? read_course(*options.contacts, scene)
                                          : simulate(scene, has_contacts, options.audit, Progress("physics", options.quiet));
   figures.physics_s = get_seconds_since(started);
+  scene.warnings.insert(scene.warnings.end(), course.warnings.begin(), course.warnings.end());
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", config::printable(warning));
   figures.physics_cpu_s = static_cast<double>(std::clock() - ticks) / CLOCKS_PER_SEC;
   const bool measures = options.plan || options.report.has_value();
   const Plan plan = make_plan(std::move(facts), course.recording.events, measures ? plan::measure_costs() : plan::Costs{});
   if (options.plan) {
-    fmt::print("{}", plan::format_plan(plan.planner, plan.facts));
+    fmt::print("{}", config::printable_lines(plan::format_plan(plan.planner, plan.facts)));
     return;
   }
   contact::Simulation simulation = contact::collect(course.recording.events, centres_m);

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "runtime/config/document.hpp"
+#include "runtime/config/printable.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/plan/table.hpp"
 #include "runtime/synth/kernels.hpp"
@@ -120,7 +121,9 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
                    "\"modes_rise\": {:.6g}}},\n",
                    bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j, bodies.weight_n, f.audit->modes_rise);
   }
-  json += " \"per_body\": [";
+  json += " \"warnings\": [";
+  for (std::size_t i = 0; i < scene.warnings.size(); ++i) json += (i == 0 ? "" : ", ") + config::quote(config::printable(scene.warnings[i]));
+  json += "],\n \"per_body\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const auto played = std::count_if(simulation.impulses.begin(), simulation.impulses.end(),
                                       [i](const contact::Impulse& impulse) { return impulse.body == static_cast<std::int32_t>(i); });

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
-#include <set>
 #include <span>
+
+#include "runtime/config/solids.hpp"
 
 namespace carillon::host {
 namespace {
@@ -26,6 +28,8 @@ constexpr std::size_t kMostMicrophones = 16;
 constexpr std::size_t kMostStrikes = 100000;
 constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
+constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body lasts as long as a person's step on less
+constexpr double kStiffestGroundPa = 1e13;  // ten times a diamond
 constexpr double kRoughestM = 1e-3;  // what is higher is no roughness but a shape
 
 using Quaternion = std::array<double, 4>;
@@ -161,12 +165,18 @@ SceneBody parse_body(config::Object& object, const plan::Wish& wish) {
   return body;
 }
 
-contact::GroundSpec parse_ground(config::Object& object) {
+contact::GroundSpec parse_ground(config::Object& object, std::vector<std::string>& warnings) {
   contact::GroundSpec ground;
   ground.height_m = read_within(object, "height_m", ground.height_m, -kFarthestM, kFarthestM);
   ground.young_modulus_pa = object.number_or("young_modulus_pa", ground.young_modulus_pa, config::kPositive);
+  ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1.0, 3e4);
+  const auto question = config::ask_about_solid(ground.young_modulus_pa, ground.density_kg_m3);
+  if (!(ground.young_modulus_pa >= kSoftestGroundPa && ground.young_modulus_pa <= kStiffestGroundPa)) {
+    object.fail("young_modulus_pa", fmt::format("{:g} Pa is the stiffness of no ground; give {:g} to {:g}{}", ground.young_modulus_pa,
+                                                kSoftestGroundPa, kStiffestGroundPa, question ? ": " + *question : ""));
+  }
+  if (question) warnings.push_back(fmt::format("{}: \"ground\": {}", object.find_place("young_modulus_pa"), *question));
   ground.poisson_ratio = object.number_or("poisson_ratio", ground.poisson_ratio, {-1.0, 0.5});
-  ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1e-3, 1e6);
   ground.restitution = read_within(object, "restitution", ground.restitution, 0.0, 1.0);
   ground.friction = read_within(object, "friction", ground.friction, 0.0, 10.0);
   ground.roughness_m = read_within(object, "roughness_m", ground.roughness_m, 0.0, kRoughestM);
@@ -174,22 +184,23 @@ contact::GroundSpec parse_ground(config::Object& object) {
   return ground;
 }
 
+using Names = std::map<std::string, std::size_t>;  // of bodies, and their places in the list
+
 /// The body that "body" names.
-std::size_t find_body(config::Object& object, const std::vector<SceneBody>& bodies) {
+std::size_t find_body(config::Object& object, const Names& bodies) {
   const std::string name = object.string("body");
+  if (const auto found = bodies.find(name); found != bodies.end()) return found->second;
   std::vector<std::string> names;
-  for (const SceneBody& body : bodies) names.push_back(body.name);
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  for (const auto& [known, index] : bodies) names.push_back(known);
   const std::string nearest = config::find_nearest(name, names);
   object.fail("body", fmt::format("no body is called \"{}\"; {}", name,
                                   nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
 }
 
-SceneStrike parse_strike(config::Object& object, const Scene& scene) {
+SceneStrike parse_strike(config::Object& object, const Scene& scene, const Names& names) {
   SceneStrike strike;
   strike.place = object.find_place("");
-  strike.body = find_body(object, scene.bodies);
+  strike.body = find_body(object, names);
   strike.time_s = object.number("time_s");
   strike.duration_s = read_within(object, "duration_s", strike.duration_s, 0.0, kLongestPulseS);
   if (!(strike.time_s - 0.5 * strike.duration_s >= 0.0 && strike.time_s <= scene.duration_s)) {
@@ -323,7 +334,7 @@ Scene parse_scene(const config::Document& document) {
   }
   scene.sample_rate_hz = static_cast<int>(root.integer_if("sample_rate_hz", 8000, 192000).value_or(scene.sample_rate_hz));
   scene.gravity_m_s2 = read_vector(root, "gravity_m_s2", scene.gravity_m_s2, 1e4);
-  if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground);
+  if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground, scene.warnings);
 
   std::vector<config::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
@@ -336,18 +347,18 @@ Scene parse_scene(const config::Document& document) {
                                     kMostBodies));
   if (root.has("effects")) scene.wish = read_effects(root);
   scene.effects = find_usual(scene.wish);
-  std::set<std::string> names;
+  Names names;
   for (config::Object& object : bodies) {
     scene.bodies.push_back(parse_body(object, scene.wish));
     const std::string& name = scene.bodies.back().name;
-    if (!names.insert(name).second)
+    if (!names.emplace(name, names.size()).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
   }
   std::vector<config::Object> strikes = root.objects("strikes");
   if (strikes.size() > kMostStrikes) {
     root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMostStrikes));
   }
-  for (config::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene));
+  for (config::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene, names));
   if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");

@@ -93,6 +93,7 @@ struct Scene {
   synth::EffectSet effects = kDefaultEffects;  // of all bodies where nobody plans
   Output output;
   Quality quality;
+  std::vector<std::string> warnings;  // of numbers that may be meant, a line each
 };
 
 /// Reads a scene file. Throws as parse_scene does, and for a file that cannot be read.

@@ -6,13 +6,14 @@
 #include <exception>
 
 #include "runtime/config/error.hpp"
+#include "runtime/config/printable.hpp"
 #include "runtime/live/device.hpp"
 #include "runtime/live/player.hpp"
 
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-live: {}\n", message);
+  fmt::print(stderr, "carillon-live: {}\n", carillon::config::printable(message));
   return code;
 }
 
@@ -22,6 +23,9 @@ int main(int argc, char** argv) {
   carillon::live::PlayerOptions options;
   bool lists = false;
   CLI::App app("Plays a scene of falling bodies while it happens.", "carillon-live");
+  app.failure_message([](const CLI::App* asked, const CLI::Error& error) {
+    return carillon::config::printable_lines(CLI::FailureMessage::simple(asked, error));
+  });
   auto* scene = app.add_option("scene", options.scene, "Scene file (JSON)")->option_text("SCENE.json");
   app.add_flag("--list", lists, "List the sound cards' outputs, the default one first")->excludes(scene);
   app.add_option("--device", options.device, "Output to play on, by its name")->option_text("NAME");
@@ -45,7 +49,7 @@ int main(int argc, char** argv) {
   }
   try {
     if (lists) {
-      for (const std::string& name : carillon::live::list_devices()) fmt::print("{}\n", name);
+      for (const std::string& name : carillon::live::list_devices()) fmt::print("{}\n", carillon::config::printable(name));
       return 0;
     }
     carillon::live::play(options);

@@ -3,9 +3,17 @@
 // Deviations: none.
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "runtime/plan/planner.hpp"
 
 namespace carillon::plan {
+namespace {
+
+/// "34.2 dB(A)"; what makes no sound has no level.
+std::string format_level(double level_db) { return std::isfinite(level_db) ? fmt::format("{:.1f} dB(A)", level_db) : "no sound"; }
+
+}  // namespace
 
 std::string describe(const Reason& r) {
   using Rule = Reason::Rule;
@@ -21,15 +29,18 @@ std::string describe(const Reason& r) {
     case Rule::kNoModes:
       return "no mode between 20 Hz and half the sample rate";
     case Rule::kTooQuiet:
-      return fmt::format("{:.1f} dB(A), below {:.1f} dB(A) nobody hears it", r.value, r.limit);
+      if (!std::isfinite(r.value) || !std::isfinite(r.limit)) return "makes no sound";
+      return fmt::format("{}, below {} nobody hears it", format_level(r.value), format_level(r.limit));
     case Rule::kHeard:
-      return fmt::format("heard with {:.1f} dB(A) at {:.2f} m", r.value, r.distance_m);
+      return fmt::format("heard with {} at {:.2f} m", format_level(r.value), r.distance_m);
     case Rule::kSilent:
       return fmt::format("nothing has called for it for {:g} s", kHoldS);
     case Rule::kChange:
+      if (!std::isfinite(r.value)) return "without it the sound would not differ";
       return fmt::format("without it the sound would differ by {:.1f} dB, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
                          r.limit);
     case Rule::kThump:
+      if (!std::isfinite(r.value)) return "makes no thump in the sound of so large a body";
       return fmt::format("a thump of {:.1f} dB in the sound of so large a body, told from it above {:.1f} dB", r.value, r.limit);
     case Rule::kFixed:
       return "a body that cannot move has none";

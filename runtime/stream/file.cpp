@@ -212,7 +212,10 @@ std::optional<long long> parse_header(config::Object line, std::vector<RecordedB
   line.integer("carillon_contacts", 1, 1);
   const std::optional<long long> count = line.integer_if("events", 0, kInt64);
   for (config::Object& body : line.objects("bodies")) {
-    bodies.push_back({body.string("name"), body.integer("triangles", 1, kInt32)});
+    RecordedBody& recorded = bodies.emplace_back();
+    recorded.name = body.string("name");
+    recorded.triangles = body.integer("triangles", 1, kInt32);
+    if (body.has("size_m") || body.has("order_m")) recorded.surface = {body.numbers<3>("size_m"), body.numbers<3>("order_m")};
     body.finish();
   }
   if (bodies.empty()) line.fail("bodies", "there are no bodies; give each a name and the number of triangles of its bank");
@@ -223,11 +226,26 @@ std::optional<long long> parse_header(config::Object line, std::vector<RecordedB
 
 }  // namespace
 
+bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b) {
+  constexpr double kSlack = 1e-6;  // of the size: the same surface with other rounding
+  const double size = std::hypot(std::hypot(a.size_m[0], a.size_m[1], a.size_m[2]), std::hypot(b.size_m[0], b.size_m[1], b.size_m[2]));
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!(std::abs(a.size_m[k] - b.size_m[k]) <= kSlack * size) || !(std::abs(a.order_m[k] - b.order_m[k]) <= kSlack * size)) return false;
+  }
+  return true;
+}
+
 std::string format_recording(const Recording& recording) {
   std::string text = fmt::format(R"({{"carillon_contacts": 1, "events": {}, "bodies": [)", recording.events.size());
   for (std::size_t i = 0; i < recording.bodies.size(); ++i) {
-    fmt::format_to(std::back_inserter(text), R"({}{{"name": {}, "triangles": {}}})", i == 0 ? "" : ", ",
-                   config::quote(recording.bodies[i].name), recording.bodies[i].triangles);
+    const RecordedBody& body = recording.bodies[i];
+    fmt::format_to(std::back_inserter(text), R"({}{{"name": {}, "triangles": {})", i == 0 ? "" : ", ", config::quote(body.name),
+                   body.triangles);
+    if (body.surface) {
+      fmt::format_to(std::back_inserter(text), R"(, "size_m": {}, "order_m": {})", format_numbers(body.surface->size_m),
+                     format_numbers(body.surface->order_m));
+    }
+    text += '}';
   }
   text += "]}\n";
   for (const Event& event : recording.events) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,9 +12,20 @@
 
 namespace carillon::stream {
 
+/// What tells one surface from another, in metres of the mesh: its extent along each axis, and the mean of its triangles' middles, triangle
+/// i weighed by i + 1, so that another numbering gives another place.
+struct SurfaceMark {
+  Vec3 size_m{};
+  Vec3 order_m{};
+};
+
+/// Whether two marks are of one surface, to 1e-6 of its size.
+bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b);
+
 struct RecordedBody {
   std::string name;
-  std::int64_t triangles = 0;  // of its bank
+  std::int64_t triangles = 0;               // of its bank
+  std::optional<SurfaceMark> surface = {};  // of its bank; files of others, and older ones, do not say
 };
 
 struct Recording {

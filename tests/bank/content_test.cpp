@@ -126,6 +126,13 @@ TEST_P(BankFaults, AreToldInWords) {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
+void scale_lengths(Bank& bank, double scale) {
+  for (Vec3& vertex : bank.vertices_m) {
+    for (double& x : vertex) x *= scale;
+  }
+  for (double& x : bank.rigid.centre_m) x *= scale;
+}
+
 const Spoiled kSpoiled[] = {
     {"short_decay", [](Bank& b) { b.decay_per_s.pop_back(); }, "decay holds 5 values and 6 are wanted"},
     {"short_residual", [](Bank& b) { b.residual.clear(); }, "residual holds 0 values"},
@@ -290,6 +297,34 @@ const Spoiled kSpoiled[] = {
        b.proof->cluster_count = {2};
      },
      "spreads over"},
+    {"giant_shape", [](Bank& b) { b.shape_scale[3] = 1e300; }, "shape_scale[3] is 1e+300, with which the mode moves by"},
+    {"shape_of_a_lighter_body", [](Bank& b) { b.shape_scale[3] = 1e3; }, "shape_scale[3] is 1e+03"},
+    {"giant_gain", [](Bank& b) { b.radiation_gain[3] = 1e300; }, "radiation_gain[3] is 1e+300, and a surface of this size and motion has"},
+    {"gain_of_a_still_mode", [](Bank& b) { b.shape_scale[3] = 0.0; },
+     "radiation_gain[3] is 3.5, and a surface of this size and motion has 0"},
+    {"giant_stiffness", [](Bank& b) { b.material.young_modulus_pa = 1e300; }, "young_modulus_pa is 1e+300, outside"},
+    {"no_stiffness_to_speak_of", [](Bank& b) { b.material.young_modulus_pa = 1e-300; }, "young_modulus_pa is 1e-300, outside"},
+    {"neutron_star",
+     [](Bank& b) {
+       for (double* x : {&b.material.density_kg_m3, &b.rigid.mass_kg}) *x *= 1e12;
+       for (double& x : b.rigid.inertia_kg_m2) x *= 1e12;
+     },
+     "density_kg_m3 is 7.8e+15, outside"},
+    {"giant_alpha", [](Bank& b) { b.material.alpha1_s = 1e7; }, "alpha1_s is 1e+07, outside"},
+    {"light_frequency",
+     [](Bank& b) {
+       b.eigenvalue_rad2_s2.back() = 1e40;
+       b.band_hz[1] = 1e30;
+     },
+     "beyond the 1e+12 Hz"},
+    {"giant_decay",
+     [](Bank& b) {
+       b.damping.law = "mixed";
+       b.decay_per_s[3] = 1e200;
+     },
+     "decay[3] is 1e+200 1/s, more than any damping makes"},
+    {"atom", [](Bank& b) { scale_lengths(b, 1e-10); }, "bodies have 1e-09 to 1e+07 m"},
+    {"galaxy", [](Bank& b) { scale_lengths(b, 1e21); }, "bodies have 1e-09 to 1e+07 m"},
     {"no_stiffness", [](Bank& b) { b.material.young_modulus_pa = 0; }, "young_modulus_pa is 0"},
     {"incompressible", [](Bank& b) { b.material.poisson_ratio = 0.5; }, "poisson_ratio is 0.5"},
     {"negative_alpha", [](Bank& b) { b.material.alpha2_per_s = -5; }, "alpha2_per_s is -5"},

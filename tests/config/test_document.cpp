@@ -102,6 +102,52 @@ INSTANTIATE_TEST_SUITE_P(Table, BadDocument,
                                          BadText{"nan", "{\"a\": NaN}", "not JSON"}, BadText{"list", "{\"a\": [1]}", "a list of 1"}),
                          [](const auto& info) { return info.param.name; });
 
+TEST(Document, numbers_are_those_of_json_and_nothing_else) {
+  for (const char* good : {"0", "-0", "12", "-12.5", "0.5", "1e3", "1E+3", "2.5e-07", "100", "10.01", "1e007"}) {
+    EXPECT_NO_THROW(parse(std::string("{\"a\": ") + good + "}").number("a")) << good;
+    EXPECT_NO_THROW(parse(std::string("{\"a\":[") + good + "," + good + "]}").numbers<2>("a")) << good;
+  }
+  for (const char* bad :
+       {"012", "00",   "-01", "01.5", "+1",    "+0.5",  "1.",    "-1.",   "1.e3", ".5",        "-.5",  "1e",  "1e+", "-",  "+",
+        "--1", "0x10", "0b1", "0o7",  "1_000", "1.2.3", "1e5.5", "12abc", "3m",   "-Infinity", "-NaN", "1e-", "0e",  "- 1"}) {
+    for (const std::string form : {"{\n\n\"a\": X}", "{\n\n\"b\": [1, X]}", "{\n\n\"a\":X}"}) {
+      std::string text = form;
+      text.replace(text.find('X'), 1, bad);
+      const auto message = message_of([&] { parse(text).number("a"); });
+      EXPECT_NE(message.find("file.json:3: "), std::string::npos) << bad << ": " << message;
+    }
+  }
+  for (const char* bad : {"NaN", "Infinity", "inf", "nan", "True", "None"})
+    EXPECT_NE(message_of([&] { parse(std::string("{\n\"a\": ") + bad + "}").number("a"); }).find("file.json:2"), std::string::npos) << bad;
+  EXPECT_NE(message_of([] { parse("{\"a\": 0915}"); }).find("does not begin with a zero"), std::string::npos);
+}
+
+TEST(Document, what_looks_like_a_number_in_texts_keys_and_comments_is_left_alone) {
+  auto object = parse("{ // 012 and +1\n \"01\": \"007\", /* .5 \" 1. */ \"a\": \"\\\"012\", \"b\": true, \"c\": 1 /*012*/, \"d\": [1,2]}");
+  EXPECT_EQ(object.string("01"), "007");
+  EXPECT_EQ(object.string("a"), "\"012");
+  EXPECT_EQ(object.number("c"), 1.0);
+  EXPECT_EQ(object.numbers<2>("d")[1], 2.0);
+}
+
+TEST(Document, finding_the_lines_of_all_values_reads_the_text_once) {
+  std::string text = "{\"list\": [\n";
+  constexpr int kEntries = 5000;
+  for (int i = 0; i < kEntries; ++i) text += "{\"x\": 1}" + std::string(i + 1 < kEntries ? "," : "") + "\n";
+  text += "]}";
+  const auto document = config::parse_document(text, "some/dir/file.json");
+  EXPECT_EQ(document.count_scanned_bytes(), 0u) << "no line was asked for yet";
+  auto root = document.root();
+  const auto list = root.objects("list");
+  for (int i = 0; i < kEntries; ++i) {
+    const std::string place = list[static_cast<std::size_t>(i)].find_place("x");
+    ASSERT_TRUE(place.ends_with("file.json:" + std::to_string(i + 2))) << place;
+  }
+  EXPECT_LE(document.count_scanned_bytes(), text.size());
+  EXPECT_EQ(root.entries("list", kEntries)[4321].place.substr(root.entries("list", kEntries)[4321].place.rfind(':')), ":4323");
+  EXPECT_LE(document.count_scanned_bytes(), text.size());
+}
+
 TEST(Document, deep_nesting_is_refused_before_it_can_exhaust_the_stack) {
   const auto message = message_of([] { parse("{\"a\": " + std::string(1000000, '[')); });
   EXPECT_NE(message.find("brackets"), std::string::npos);

@@ -3,12 +3,14 @@
 import json
 import os
 import pathlib
+import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 import zlib
 
+import h5py
 import numpy
 
 import make_bank
@@ -76,6 +78,14 @@ def count_like(image, colour, reach=0.06):
     return int(((cosine > 1 - reach) & (strength > 40)).sum())
 
 
+def spoil(source, target, change):
+    """A copy of a bank with `change` made to its HDF5 part, sealed again."""
+    shutil.copy(folder / source, folder / target)
+    with h5py.File(folder / target, "r+") as bank:
+        change(bank)
+    make_bank.seal(folder / target)
+
+
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     make_bank.write_ball_bank(folder / "ball.hdf")
@@ -120,7 +130,31 @@ with tempfile.TemporaryDirectory() as name:
         run("scene", "fall.json", "-o", "silent.png", folder=folder)
         expect(count_like(read_png(folder / "silent.png")[: height - 150], (204, 26, 41), 0.02) < 20, "scene: a contact without an impulse")
 
+    # A mode that does not move the surface is drawn at rest.
+    spoil("ball.hdf", "still.hdf", lambda bank: bank["modes/shape"].__setitem__(slice(None), 0))
+    done = run("modes", "still.hdf", "-o", "still.png", "--modes", "1", folder=folder)
+    expect(done.returncode == 0, f"modes at rest: exit code {done.returncode}: {done.stderr}")
+    if done.returncode == 0:
+        part = read_png(folder / "still.png")[:-200]
+        expect(part.std() > 15, "modes at rest: the picture is blank")
+        expect(count_like(part, (253, 231, 37)) < 100, "modes at rest: something moves")
+
     # What cannot be drawn.
+    spoil("ball.hdf", "nan.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), numpy.nan))
+    spoil("ball.hdf", "far.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), 1e300))
+    spoil("ball.hdf", "wild.hdf", lambda bank: bank["mesh/triangles"].__setitem__((0, 0), 10**6))
+    spoil("ball.hdf", "point.hdf", lambda bank: bank["mesh/vertices"].__setitem__(slice(None), 0.0))
+    spoil("ball.hdf", "endless.hdf", lambda bank: bank["modes/shape_scale"].__setitem__(0, numpy.inf))
+    def replace(bank, key, value):
+        del bank[key]
+        bank[key] = value
+    spoil("ball.hdf", "few.hdf", lambda bank: replace(bank, "modes/shape", numpy.zeros((3, 4, 3), "<i2")))
+    spoil("ball.hdf", "words.hdf", lambda bank: replace(bank, "modes/frequency_hz", numpy.array([b"a"] * 4)))
+    spoil("ball.hdf", "flat.hdf", lambda bank: replace(bank, "mesh/triangles", numpy.zeros(9, "<i4")))
+    (folder / "infinite.json").write_text(json.dumps(scene | {"ground": {"height_m": 1e999}}))
+    (folder / "remote.json").write_text(json.dumps(scene | {"bodies": [{"name": "a", "bank": "ball.hdf", "fixed": True, "poses": [[0, 1e300, 0, 0, 1, 0, 0, 0]]}]}))
+    (folder / "deep.json").write_text("[" * 100000)
+    (folder / "escape.json").write_text('{"bodies": [{"name": "\\u001b]0;x\\u0007\\u009b\\u202e", "bank": "ball.hdf", "fixed": true, "poses": []}]}')
     (folder / "text.hdf").write_text("hello")
     data = (folder / "ball.hdf").read_bytes()
     (folder / "short.hdf").write_bytes(data[:-100])
@@ -149,10 +183,24 @@ with tempfile.TemporaryDirectory() as name:
         (["scene", "poor.json", "-o", "x.png"], ["poor.json", "body 'a'", "poses"]),
         (["scene", "list.json", "-o", "x.png"], ["list.json", "no trajectory"]),
         (["scene", "far.json", "-o", "x.png"], ["absent.hdf", "No such file"]),
+        (["modes", "nan.hdf", "-o", "x.png"], ["nan.hdf", "finite"]),
+        (["modes", "far.hdf", "-o", "x.png"], ["far.hdf", "finite"]),
+        (["modes", "wild.hdf", "-o", "x.png"], ["wild.hdf", "vertex"]),
+        (["modes", "point.hdf", "-o", "x.png"], ["point.hdf", "no extent"]),
+        (["modes", "endless.hdf", "-o", "x.png"], ["endless.hdf", "mode 1"]),
+        (["modes", "few.hdf", "-o", "x.png"], ["few.hdf", "fit"]),
+        (["modes", "words.hdf", "-o", "x.png"], ["words.hdf", "numbers"]),
+        (["modes", "flat.hdf", "-o", "x.png"], ["flat.hdf", "triangles"]),
+        (["scene", "infinite.json", "-o", "x.png"], ["infinite.json", "finite"]),
+        (["scene", "remote.json", "-o", "x.png"], ["remote.json", "farther"]),
+        (["scene", "deep.json", "-o", "x.png"], ["deep.json"]),
+        (["scene", "escape.json", "-o", "x.png"], ["escape.json", "\\u001b]0;x"]),
         (["scenes", "far.json", "-o", "x.png"], ["scenes", "--help"]),
     ]:
         done = run(*arguments, folder=folder)
         expect(done.returncode == 2, f"{arguments}: exit code {done.returncode}, not 2: {done.stderr}")
+        expect(done.stderr.count("\n") == 1 and not any(ord(letter) in [*range(10), *range(11, 32), *range(127, 160), 0x202E] for letter in done.stderr),
+               f"{arguments}: not one printable line: {done.stderr!r}")
         for word in words:
             expect(word in done.stderr, f"{arguments}: '{word}' is not in: {done.stderr}")
     expect(sorted(folder.iterdir()) == before, "a command that failed left a file behind")

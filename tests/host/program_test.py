@@ -333,6 +333,51 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertEqual((self.root / "hand.wav").read_bytes(), (self.root / "struck.wav").read_bytes())
 
+    def test_contacts_of_another_surface_are_refused(self):
+        scene = self.scene("sized.json")
+        file = self.root / "sized.jsonl"
+        run = render(scene, "-o", self.root / "sized.wav", "--record", file)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertNotIn("warning", run.stderr)
+        bank = BIN / "carillon-bank"
+        subprocess.run([bank, "edit", self.root / "cube.h5", self.root / "twice.h5", "--size", "2"], check=True, capture_output=True, timeout=60)
+        subprocess.run([bank, "edit", self.root / "cube.h5", self.root / "stiff.h5", "--stiffness", "2"], check=True, capture_output=True, timeout=60)
+        body = json.loads(scene.read_text())["bodies"][0]
+        wav = self.root / "sized_again.wav"
+        twice = self.scene("twice.json", bodies=[{**body, "bank": "twice.h5", "position_m": [0, 0, 1]}])
+        self.assert_refused(render(twice, "--contacts", file, "-o", wav), 2, "sized.jsonl", '"cube"', "0.1 x 0.1 x 0.1 m", "0.2 x 0.2 x 0.2 m")
+        self.assertFalse(wav.exists())
+        stiff = self.scene("stiff.json", bodies=[{**body, "bank": "stiff.h5"}])
+        run = render(stiff, "--contacts", file, "-o", wav)  # another material, the same surface
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertNotIn("warning", run.stderr)
+        # The same size, but the triangles have other numbers.
+        lines = file.read_text().splitlines(keepends=True)
+        header = json.loads(lines[0])
+        header["bodies"][0]["order_m"][1] += 0.001
+        file.write_text(json.dumps(header) + "\n" + "".join(lines[1:]))
+        self.assert_refused(render(scene, "--contacts", file, "-o", wav), 2, "sized.jsonl", "another surface")
+        # A file that does not say plays, with a word about it.
+        for key in ("size_m", "order_m"):
+            del header["bodies"][0][key]
+        file.write_text(json.dumps(header) + "\n" + "".join(lines[1:]))
+        run = render(twice, "--contacts", file, "-o", wav, "--report", self.root / "sized_report.json")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn("warning: " + str(file), run.stderr)
+        self.assertIn("size_m", json.loads((self.root / "sized_report.json").read_text())["warnings"][0])
+
+    def test_a_ground_of_another_unit_is_asked_about(self):
+        wav = self.root / "ground.wav"
+        run = render(self.scene("soil.json", ground={"height_m": 0, "young_modulus_pa": 5e7, "density_kg_m3": 1800}, duration_s=0.05), "-o", wav)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertNotIn("warning", run.stderr)
+        run = render(self.scene("newtons.json", ground={"height_m": 0, "young_modulus_pa": 30000}, duration_s=0.05), "-o", wav)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn("newtons.json:", run.stderr)
+        self.assertIn("MPa", run.stderr)
+        for value in (30, 1e-300, 1e300, 1e14):
+            self.assert_refused(render(self.scene("no_ground.json", ground={"height_m": 0, "young_modulus_pa": value}), "-o", wav), 2, "no_ground.json:", "young_modulus_pa")
+
     def test_bad_contacts_files_are_refused_and_named(self):
         scene = self.scene("bad_contacts.json")
         file = self.root / "bad.jsonl"

@@ -54,6 +54,21 @@ TEST(Scene, StrikesAreRead) {
   EXPECT_TRUE(parse("{\"duration_s\": 2, " + kBody + "}").strikes.empty());
 }
 
+TEST(Scene, ManyStrikesAreReadInOnePassOfTheText) {
+  std::string text = "{\"duration_s\": 100,\n" + kBody + ", \"strikes\": [\n";
+  constexpr int kStrikes = 20000;
+  for (int i = 0; i < kStrikes; ++i) {
+    text += "{\"time_s\": 1, \"body\": \"a\", \"triangle\": 7, \"impulse_n_s\": [0, 0, 1]}";
+    text += i + 1 < kStrikes ? ",\n" : "\n";
+  }
+  text += "]}";
+  const config::Document document = config::parse_document(text, "/somewhere/scene.json");
+  const Scene scene = parse_scene(document);
+  ASSERT_EQ(scene.strikes.size(), static_cast<std::size_t>(kStrikes));
+  EXPECT_EQ(scene.strikes.back().place, "/somewhere/scene.json:" + std::to_string(kStrikes + 2));
+  EXPECT_LE(document.count_scanned_bytes(), text.size()) << "the lines of strikes are found by one pass, not by one for each strike";
+}
+
 TEST(Scene, WhatIsLeftOutHasItsDefault) {
   const Scene scene = parse("{\"duration_s\": 2, " + kBody + "}");
   EXPECT_EQ(scene.sample_rate_hz, 48000);

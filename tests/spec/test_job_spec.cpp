@@ -92,6 +92,59 @@ TEST(JobSpec, a_resolved_job_moves_with_its_folder) {
   EXPECT_EQ(moved.mesh, "/elsewhere/m.msh");
 }
 
+TEST(JobSpec, the_scale_of_a_mesh_is_part_of_the_resolved_job) {
+  const JobSpec plain = parse_job(job_with(""), "/jobs/job.json"),
+                scaled = parse_job(job_with(", \"mesh_scale\": 0.001"), "/jobs/job.json");
+  EXPECT_EQ(plain.mesh_scale, 1.0);
+  EXPECT_EQ(scaled.mesh_scale, 0.001);
+  const std::string text = resolved_json(scaled, "/jobs", "");
+  EXPECT_NE(text, resolved_json(plain, "/jobs", ""));
+  EXPECT_EQ(parse_job(text, "/jobs/b.bank.resolved.json").mesh_scale, 0.001);
+  EXPECT_EQ(resolved_json(parse_job(text, "/jobs/b.bank.resolved.json"), "/jobs", ""), text);
+  EXPECT_EQ(resolved_json(parse_job(job_with(", \"mesh_scale\": 1"), "/jobs/job.json"), "/jobs", ""), resolved_json(plain, "/jobs", ""));
+}
+
+std::vector<std::string> warnings_of(const std::string& material) {
+  return parse_job("{\"mesh\": \"m\", \"bank\": \"b\",\n\n\"material\": {" + material + "}}", "/jobs/job.json").warnings;
+}
+
+TEST(JobSpec, units_of_another_system_are_asked_about_at_their_line) {
+  const std::string damping = R"(, "damping": {"internal_friction": {"tan_phi": 1e-3}})";
+  EXPECT_TRUE(warnings_of(R"("young_modulus_pa": 72e9, "poisson_ratio": 0.22, "density_kg_m3": 2500)" + damping).empty());
+  EXPECT_TRUE(warnings_of(R"("lame_lambda_pa": 3.99e9, "lame_mu_pa": 2.05e9, "density_kg_m3": 2700)" + damping).empty());
+  for (
+      const auto& [material, words] :
+      {std::pair(R"("young_modulus_pa": 72, "poisson_ratio": 0.22, "density_kg_m3": 2.5)", "young_modulus_pa is 72: was it given in GPa?"),
+       {R"("young_modulus_pa": 200, "poisson_ratio": 0.3, "density_kg_m3": 7850)", "young_modulus_pa is 200: was it given in GPa?"},
+       {R"("young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7.85)", "density_kg_m3 is 7.85: was it given in g/cm^3?"},
+       {R"("lame_lambda_pa": 3.99, "lame_mu_pa": 2.05, "density_kg_m3": 2700)", "lame_mu_pa is 2.05: was it given in GPa?"},
+       {R"("orthotropic": {"young_modulus_pa": [11, 0.9, 0.5], "shear_modulus_pa": [0.7, 0.04, 0.6], "poisson_ratio": [0.37, 0.43, 0.47]}, "density_kg_m3": 400)",
+        "orthotropic.young_modulus_pa is 11: was it given in GPa?"}}) {
+    const auto warnings = warnings_of(material + damping);
+    ASSERT_EQ(warnings.size(), 1U) << material;
+    EXPECT_TRUE(warnings[0].starts_with("/jobs/job.json:3: ")) << warnings[0];
+    EXPECT_NE(warnings[0].find(words), std::string::npos) << warnings[0];
+  }
+}
+
+TEST(JobSpec, damping_that_is_none_or_leaves_nothing_to_swing_is_asked_about) {
+  const std::string steel = R"("young_modulus_pa": 2e11, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": )";
+  for (const char* good : {R"({"rayleigh": {"alpha1_s": 1e-7}})", R"({"rayleigh": {"alpha2_per_s": 5}})",
+                           R"({"internal_friction": {"tan_phi": 0.5}})", R"({"loss_table": [[100, 0], [1000, 0.1]]})"})
+    EXPECT_TRUE(warnings_of(steel + good).empty()) << good;
+  for (const char* none :
+       {R"({"rayleigh": {}})", R"({"rayleigh": {"alpha1_s": 0, "alpha2_per_s": 0}})", R"({"internal_friction": {"tan_phi": 0}})",
+        R"({"loss_table": [[100, 0]]})", R"({"caughey": {"coefficients": [0]}})"}) {
+    const auto warnings = warnings_of(steel + none);
+    ASSERT_EQ(warnings.size(), 1U) << none;
+    EXPECT_NE(warnings[0].find("rings for ever"), std::string::npos) << warnings[0];
+  }
+  const auto strong = warnings_of(steel + R"({"rayleigh": {"alpha1_s": 1000}})");
+  ASSERT_EQ(strong.size(), 1U);
+  EXPECT_NE(strong[0].find("nothing of the band"), std::string::npos) << strong[0];
+  EXPECT_NE(strong[0].find("alpha1_s is 1000 s"), std::string::npos) << strong[0];
+}
+
 class BadJobs : public testing::TestWithParam<BadJob> {};
 TEST_P(BadJobs, is_refused_with_the_line_and_the_mend) { carillon::tests::expect_refused(GetParam()); }
 
@@ -150,6 +203,18 @@ INSTANTIATE_TEST_SUITE_P(
             "job.json:4:", "check the unit"},
         BadJob{"band_without_end", job_with(",\n\"band_hz\": [20, 1e300]"), "job.json:3:", "must end at"},
         BadJob{"part_of_a_key", job_with(",\n\"fixed\": {\"box\": 1}"), "job.json:3:", "did you mean \"box_m\"?"},
+        BadJob{"scale_of_nothing", job_with(",\n\"mesh_scale\": 0"), "job.json:3:", "greater than 0"},
+        BadJob{"scale_of_the_sky", job_with(",\n\"mesh_scale\": 1e300"), "job.json:3:", "metres per unit of the mesh file"},
+        BadJob{"scale_of_a_shape", "{\"body\": {\"shape\": \"bar\"}, \"bank\": \"b\",\n\"mesh_scale\": 0.001, " + kMaterial + "}",
+               "job.json:2:", "inside \"body\""},
+        BadJob{"more_nodes_than_the_mesher_makes",
+               "{\"bank\": \"b\",\n\"body\": {\"shape\": \"bar\", \"nodes\": 20000001}, " + kMaterial + "}",
+               "job.json:2:", "at most 20000000 nodes"},
+        BadJob{"leading_zero", job_with(",\n\"max_modes\": 010"), "job.json:3:", "does not begin with a zero"},
+        BadJob{"density_in_tons_per_cubic_millimetre",
+               material_with(
+                   "\"young_modulus_pa\": 210000, \"poisson_ratio\": 0.3,\n\"density_kg_m3\": 7.85e-9, \"damping\": {\"rayleigh\": {}}"),
+               "job.json:4:", "t/mm^3"},
         BadJob{"tolerance", job_with(",\n\"solver\": {\"tolerance\": 1}"), "job.json:3:", "between"},
         BadJob{"path_is_number", "{\"mesh\": 5, \"bank\": \"b\"," + kMaterial + "}", "job.json:1:", "text in quotes"}),
     [](const auto& info) { return info.param.name; });

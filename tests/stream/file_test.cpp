@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 
@@ -180,6 +181,33 @@ TEST(Recording, ComesBackBitForBit) {
     std::visit([&](const auto& e) { expect_same(e, std::get<std::decay_t<decltype(e)>>(back.events[i])); }, recording.events[i]);
   }
   EXPECT_EQ(format_recording(back), format_recording(recording));
+}
+
+TEST(Recording, KeepsTheMarksOfItsSurfaces) {
+  const SurfaceMark mark{{0.1, 0.2, 0.3}, {0.01, -0.02, 1.0 / 3.0}};
+  const Recording back = parse_recording(format_recording({{{"ball", 20, mark}, {"shelf", 12, {}}}, {}}), "run.jsonl");
+  ASSERT_TRUE(back.bodies[0].surface.has_value());
+  EXPECT_EQ(back.bodies[0].surface->size_m, mark.size_m);
+  EXPECT_EQ(back.bodies[0].surface->order_m, mark.order_m);
+  EXPECT_FALSE(back.bodies[1].surface.has_value());
+}
+
+TEST(SurfaceMarks, AreOfOneSurfaceUpToRounding) {
+  const SurfaceMark mark{{0.1, 0.2, 0.3}, {0.01, -0.02, 0.05}};
+  const auto change = [&](double scale, double shift) {
+    SurfaceMark other = mark;
+    for (double& x : other.size_m) x *= scale;
+    for (double& x : other.order_m) x = x * scale + shift;
+    return other;
+  };
+  EXPECT_TRUE(is_same_surface(mark, mark));
+  EXPECT_TRUE(is_same_surface(mark, change(1.0 + 1e-9, 1e-10)));
+  EXPECT_FALSE(is_same_surface(mark, change(2.0, 0.0)));
+  EXPECT_FALSE(is_same_surface(mark, change(1.001, 0.0)));
+  EXPECT_FALSE(is_same_surface(mark, change(1.0, 1e-4)));
+  SurfaceMark none = mark;
+  none.order_m[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(is_same_surface(mark, none));
 }
 
 TEST(Recording, CanBeWrittenByHand) {
