@@ -46,11 +46,12 @@ class GmshReader {
   void read_format();
   void read_names();
   void read_entities(bool partitioned);
-  void read_nodes_2();
+  void read_nodes_2(bool parametric);
   void read_nodes_4();
   void read_elements_2();
   void read_elements_4();
   void skip_section(std::string_view name, std::size_t place);
+  void skip_numbers(std::string_view name);
   const GmshType& find_type(int type, std::size_t place) const;
   void add_element(std::int64_t tag, int number, const GmshType& type, const std::vector<std::int32_t>& physicals, std::size_t place);
   void name_groups();
@@ -63,6 +64,7 @@ class GmshReader {
 
   Cursor cursor_;
   std::size_t group_budget_;
+  std::size_t start_ = 0;  // of the section that is skipped
   bool binary_ = false;
   bool swap_ = false;
   int version_ = 0;  // 2 or 4; 0 before $MeshFormat
@@ -151,7 +153,7 @@ void GmshReader::read_entities(bool partitioned) {
   }
 }
 
-void GmshReader::read_nodes_2() {
+void GmshReader::read_nodes_2(bool parametric) {
   const std::size_t at = cursor_.place();
   const auto count = cursor_.checked_count(cursor_.text_int("the number of nodes", INT64_MIN, INT64_MAX), binary_ ? 28 : 8, "nodes", at);
   cursor_.line();
@@ -161,6 +163,10 @@ void GmshReader::read_nodes_2() {
     const std::size_t place = cursor_.place();
     const auto tag = cursor_.int32("the number of a node");
     raw_.add_node(cursor_, tag, read_point(), place);
+    if (!parametric) continue;
+    const auto dimension = cursor_.int32("the dimension of the entity of a node");
+    cursor_.int32("the entity of a node");
+    for (int k = 0; k < dimension && dimension < 3; ++k) cursor_.real("a parametric coordinate");
   }
 }
 
@@ -309,12 +315,104 @@ void GmshReader::read_elements_4() {
     cursor_.fail(at, "$Elements announces {} elements, but its blocks hold {}; the file was damaged: write the mesh again", count, total);
 }
 
+/// Behind the numbers of a binary section that is known; the cursor stands where its $End should.
+void GmshReader::skip_numbers(std::string_view name) {
+  const auto step = [&](std::size_t bytes) {
+    if (bytes > cursor_.remaining()) cursor_.fail(cursor_.place(), "${} is longer than the file", name);
+    cursor_.seek(cursor_.place() + bytes);
+  };
+  const auto step_many = [&](std::int64_t count, std::size_t bytes) {
+    step(cursor_.checked_count(count, bytes, "entries", cursor_.place()) * bytes);
+  };
+  // A text number that ends its line: the binary data begin behind that.
+  const auto read_line_int = [&](const char* what) {
+    const auto value = cursor_.text_int(what, INT64_MIN, INT64_MAX);
+    cursor_.line();
+    return value;
+  };
+  if (name == "Periodic") {
+    const auto links = cursor_.checked_count(cursor_.int64("the number of links"), 28, "links", cursor_.place());
+    for (std::size_t n = 0; n < links; ++n) {
+      for (int k = 0; k < 3; ++k) cursor_.int32("an entity");
+      step_many(cursor_.int64("the number of affine values"), 8);
+      step_many(cursor_.int64("the number of node pairs"), 16);
+    }
+  } else if (name == "GhostElements") {
+    const auto ghosts = cursor_.checked_count(cursor_.int64("the number of ghost elements"), 20, "ghost elements", cursor_.place());
+    for (std::size_t n = 0; n < ghosts; ++n) {
+      step(8 + 4);
+      step_many(cursor_.int64("the number of ghost partitions"), 4);
+    }
+  } else if (name == "Parametrizations") {
+    const auto curves = cursor_.checked_count(cursor_.int64("the number of curves"), 12, "curves", cursor_.place());
+    const auto faces = cursor_.checked_count(cursor_.int64("the number of surfaces"), 20, "surfaces", cursor_.place());
+    for (std::size_t n = 0; n < curves; ++n) {
+      step(4);
+      step_many(cursor_.int64("the number of points"), 4 * 8);
+    }
+    for (std::size_t n = 0; n < faces; ++n) {
+      step(4);
+      const auto points = cursor_.int64("the number of points");
+      const auto triangles = cursor_.int64("the number of triangles");
+      step_many(points, 11 * 8);
+      step_many(triangles, 3 * 4);
+    }
+  } else {  // NodeData, ElementData, ElementNodeData: three lists in text, then the values
+    const auto strings = cursor_.checked_count(read_line_int("the number of string tags"), 1, "string tags", cursor_.place());
+    for (std::size_t n = 0; n < strings; ++n) cursor_.line();
+    const auto reals = cursor_.checked_count(read_line_int("the number of real tags"), 2, "real tags", cursor_.place());
+    for (std::size_t n = 0; n < reals; ++n) cursor_.text_real("a real tag");
+    const auto integers = cursor_.checked_count(cursor_.text_int("the number of integer tags", INT64_MIN, INT64_MAX), 2, "integer tags",
+                                                cursor_.place());
+    std::array<std::int64_t, 3> tags{0, 0, 0};  // time step, components, entries
+    for (std::size_t n = 0; n < integers; ++n) {
+      const auto tag = cursor_.text_int("an integer tag", INT32_MIN, INT32_MAX);
+      if (n < 3) tags[n] = tag;
+    }
+    cursor_.line();
+    const std::size_t components = cursor_.checked_count(tags[1], 1, "components", cursor_.place());
+    if (name == "ElementNodeData") {
+      const auto elements = cursor_.checked_count(tags[2], 8, "elements", cursor_.place());
+      for (std::size_t n = 0; n < elements; ++n) {
+        step(4);
+        step_many(cursor_.int32("the number of nodes"), 8 * components + (components == 0));
+      }
+    } else {
+      step_many(tags[2], 4 + 8 * components);
+    }
+  }
+}
+
 void GmshReader::skip_section(std::string_view name, std::size_t place) {
-  const std::string end = fmt::format("\n$End{}", name);
-  const auto found = cursor_.bytes().find(end, cursor_.place() == 0 ? 0 : cursor_.place() - 1);
-  if (found == std::string_view::npos)
-    cursor_.fail(place, "section ${} has no $End{}; the file was cut short: write or copy it again", name, name);
-  cursor_.seek(found + 1);
+  const std::string end = fmt::format("$End{}", name);
+  const std::string_view bytes = cursor_.bytes();
+  start_ = cursor_.place();
+  // Whether the end of the section is here: its tag, a line of its own but for what comes before, and then another section or nothing.
+  const auto is_end = [&](std::size_t at) {
+    if (bytes.substr(at, end.size()) != end) return false;
+    const auto line = std::min(bytes.find('\n', at), bytes.size());
+    if (bytes.substr(at + end.size(), line - at - end.size()).find_first_not_of(" \t\r") != std::string_view::npos) return false;
+    const auto next = bytes.find_first_not_of(" \t\r\n", line);
+    return next == std::string_view::npos || bytes[next] == '$';
+  };
+  static const std::set<std::string_view> kLists{"NodeData", "ElementData", "ElementNodeData"};
+  static const std::set<std::string_view> kBinary{"Periodic", "GhostElements", "Parametrizations"};
+  // Binary values may hold anything, the tag itself too, so a section that is known is walked through. Version 2 has the others in text.
+  if (binary_ && (kLists.contains(name) || (version_ == 4 && kBinary.contains(name)))) {
+    try {
+      skip_numbers(name);
+      cursor_.skip_space();
+      if (is_end(cursor_.place())) return;
+    } catch (const InputError&) {  // not as the manual has it: its end is sought
+    }
+  }
+  // In text the tag begins a line; behind binary values there is no line end before it.
+  for (std::size_t at = start_ == 0 ? 0 : start_ - 1; (at = bytes.find(end, at)) != std::string_view::npos; ++at) {
+    if (!is_end(at) || (!binary_ && at > 0 && bytes[at - 1] != '\n' && bytes[at - 1] != '\r')) continue;
+    cursor_.seek(at);
+    return;
+  }
+  cursor_.fail(place, "section ${} has no ${}; the file was cut short: write or copy it again", name, end.substr(1));
 }
 
 void GmshReader::name_groups() {
@@ -353,8 +451,9 @@ TetMesh GmshReader::read() {
     const std::string name(head.substr(1));
     if (name == "NOD" || name == "ELM")
       cursor_.fail(place, "Gmsh format 1 is not read, only 2.2 and 4.1; convert it: gmsh FILE -save -format msh41 -o NEW.msh");
-    const bool ours = name == "Nodes" || name == "Elements" || name == "Entities" || name == "MeshFormat" || name == "PartitionedEntities";
-    if (ours && !seen.insert(name).second) cursor_.fail(place, "a second section ${}; keep one mesh in a file", name);
+    const bool parametric = name == "ParametricNodes";  // of version 2, in place of $Nodes
+    const bool ours = name == "Nodes" || parametric || name == "Elements" || name == "Entities" || name == "MeshFormat" || name == "PartitionedEntities";
+    if (ours && !seen.insert(parametric ? "Nodes" : name).second) cursor_.fail(place, "a second section ${}; keep one mesh in a file", name);
     if (ours && name != "MeshFormat" && version_ == 0) cursor_.fail(place, "${} comes before $MeshFormat; write the mesh again", name);
     if (name == "MeshFormat") {
       read_format();
@@ -362,8 +461,8 @@ TetMesh GmshReader::read() {
       read_names();
     } else if ((name == "Entities" || name == "PartitionedEntities") && version_ == 4) {
       read_entities(name != "Entities");
-    } else if (name == "Nodes") {
-      version_ == 2 ? read_nodes_2() : read_nodes_4();
+    } else if (name == "Nodes" || (parametric && version_ == 2)) {
+      version_ == 2 ? read_nodes_2(parametric) : read_nodes_4();
     } else if (name == "Elements") {
       version_ == 2 ? read_elements_2() : read_elements_4();
     } else {

@@ -80,6 +80,62 @@ def write_gmsh(order):
     gmsh.option.setNumber("Mesh.Binary", 0)
 
 
+def write_views(order):
+    """Post-processing data of every kind behind the mesh, by Gmsh itself: in binary files no line end comes before some of their end tags."""
+    tags, xyz, _ = gmsh.model.mesh.getNodes()
+    kinds, elements, nodes = gmsh.model.mesh.getElements(3)
+    elements, corners = elements[0], len(nodes[0]) // len(elements[0])
+    data = {"NodeData": (tags, [[x] for x in xyz.reshape(-1, 3)[:, 0]]), "ElementData": (elements, [[0.5 * n, 2.0, 3.0] for n in range(len(elements))]),
+            "ElementNodeData": (elements, [[0.1 * k for k in range(corners)] for _ in elements])}
+    gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
+    for version, name in ((2.2, "22"), (4.1, "41")):
+        for binary in (0, 1):
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            path = f"{DATA}/gmsh{name}_views_{'binary' if binary else 'text'}_{order}.msh"
+            gmsh.write(path)
+            for kind, (where, values) in data.items():
+                view = gmsh.view.add(kind)
+                gmsh.view.addModelData(view, 0, gmsh.model.getCurrent(), kind, where, values)
+                gmsh.view.write(view, path, append=True)
+                gmsh.view.remove(view)
+    gmsh.option.setNumber("Mesh.Binary", 0)
+
+
+def write_parametric_and_parted(order):
+    """The same mesh with parametric coordinates; then in two parts, with ghost elements. The last that is done to the model."""
+    for parted in (False, True):
+        gmsh.option.setNumber("Mesh.SaveParametric", 0 if parted else 1)
+        if parted:
+            gmsh.option.setNumber("Mesh.PartitionCreateGhostCells", 1)
+            gmsh.option.setNumber("Mesh.PartitionCreateTopology", 1)
+            gmsh.model.mesh.partition(2)
+        for version, name in ((2.2, "22"), (4.1, "41")):
+            for binary in (0, 1):
+                gmsh.option.setNumber("Mesh.MshFileVersion", version)
+                gmsh.option.setNumber("Mesh.Binary", binary)
+                kind = "parted" if parted else "parametric"
+                gmsh.write(f"{DATA}/gmsh{name}_{kind}_{'binary' if binary else 'text'}_{order}.msh")
+    gmsh.option.setNumber("Mesh.Binary", 0)
+    gmsh.option.setNumber("Mesh.SaveParametric", 0)
+
+
+def write_periodic():
+    """The box with one end as a copy of the other: a mesh of its own, so it is held against its other encodings."""
+    gmsh.clear()
+    gmsh.model.occ.addBox(0, 0, 0, 0.3, 0.2, 0.1)
+    gmsh.model.occ.synchronize()
+    ends = [[tag for _, tag in gmsh.model.getEntitiesInBoundingBox(x - 1e-6, -1e-6, -1e-6, x + 1e-6, 0.21, 0.11, 2)] for x in (0.3, 0.0)]
+    gmsh.model.mesh.setPeriodic(2, *ends, [1, 0, 0, 0.3, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
+    gmsh.model.mesh.generate(3)
+    for version, name in ((2.2, "22"), (4.1, "41")):
+        for binary in (0, 1):
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.write(f"{DATA}/gmsh{name}_periodic_{'binary' if binary else 'text'}_1.msh")
+    gmsh.option.setNumber("Mesh.Binary", 0)
+
+
 def write_vtk(points, cells, clamp, order):
     grid = vtkUnstructuredGrid()
     pts = vtkPoints()
@@ -179,5 +235,8 @@ for order in (1, 2):
         gmsh.option.setNumber("Mesh.SaveAll", 1)
         gmsh.write(f"{DATA}/gmsh_1.mesh")
         gmsh.option.setNumber("Mesh.SaveAll", 0)
+        write_views(order)
+write_parametric_and_parted(2)
+write_periodic()
 gmsh.finalize()
 write_tetgen()

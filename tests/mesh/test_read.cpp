@@ -48,6 +48,10 @@ TEST_P(EveryFile, holds_the_mesh_that_gmsh_says) {
 INSTANTIATE_TEST_SUITE_P(fixtures, EveryFile,
                          testing::Values("gmsh22_text_1.msh", "gmsh22_text_2.msh", "gmsh22_binary_1.msh", "gmsh22_binary_2.msh",
                                          "gmsh41_text_1.msh", "gmsh41_text_2.msh", "gmsh41_binary_1.msh", "gmsh41_binary_2.msh",
+                                         "gmsh22_views_text_1.msh", "gmsh22_views_binary_1.msh", "gmsh41_views_text_1.msh",
+                                         "gmsh41_views_binary_1.msh", "gmsh22_parametric_text_2.msh", "gmsh22_parametric_binary_2.msh",
+                                         "gmsh41_parametric_text_2.msh", "gmsh41_parametric_binary_2.msh", "gmsh22_parted_text_2.msh",
+                                         "gmsh22_parted_binary_2.msh", "gmsh41_parted_text_2.msh", "gmsh41_parted_binary_2.msh",
                                          "meshio41_1.msh", "meshio41_2.msh", "medit_1.mesh", "medit_2.mesh", "gmsh_1.mesh",
                                          "medit_gmsh_order_2.mesh", "medit_ordering_2.mesh", "meshio_1.node", "meshio_1.ele",
                                          "meshio_ascii_1.vtu", "meshio_ascii_2.vtu", "meshio_plain_1.vtu", "meshio_plain_2.vtu",
@@ -78,7 +82,11 @@ TEST_P(GmshFile, gives_its_physical_groups_as_node_sets_and_its_volume_tag_as_re
 
 INSTANTIATE_TEST_SUITE_P(fixtures, GmshFile,
                          testing::Values("gmsh22_text_1.msh", "gmsh22_text_2.msh", "gmsh22_binary_1.msh", "gmsh22_binary_2.msh",
-                                         "gmsh41_text_1.msh", "gmsh41_text_2.msh", "gmsh41_binary_1.msh", "gmsh41_binary_2.msh"),
+                                         "gmsh41_text_1.msh", "gmsh41_text_2.msh", "gmsh41_binary_1.msh", "gmsh41_binary_2.msh",
+                                         "gmsh22_views_text_1.msh", "gmsh22_views_binary_1.msh", "gmsh41_views_text_1.msh",
+                                         "gmsh41_views_binary_1.msh", "gmsh22_parametric_text_2.msh", "gmsh22_parametric_binary_2.msh",
+                                         "gmsh41_parametric_text_2.msh", "gmsh41_parametric_binary_2.msh", "gmsh22_parted_text_2.msh",
+                                         "gmsh22_parted_binary_2.msh", "gmsh41_parted_text_2.msh", "gmsh41_parted_binary_2.msh"),
                          [](const auto& info) { return info.param.substr(0, info.param.size() - 4); });
 
 TEST(read, node_sets_and_regions_come_out_of_the_other_formats_too) {
@@ -208,6 +216,45 @@ TEST(read, a_gmsh_file_of_the_other_byte_order_gives_the_same_mesh) {
   const TetMesh mesh = parse_mesh(std::as_bytes(std::span(text)), "big.msh", MeshFormat::kGmsh);
   EXPECT_DOUBLE_EQ(calc_volume(mesh), 4.0);
   EXPECT_EQ(mesh.regions.at(0), 5);
+}
+
+TEST(read, a_periodic_mesh_of_gmsh_is_the_same_in_every_encoding) {
+  const TetMesh first = read_mesh(fixture("gmsh41_periodic_text_1.msh"));
+  EXPECT_NEAR(calc_volume(first), 0.3 * 0.2 * 0.1, 1e-12);
+  for (const char* name : {"gmsh41_periodic_binary_1.msh", "gmsh22_periodic_text_1.msh", "gmsh22_periodic_binary_1.msh"}) {
+    SCOPED_TRACE(name);
+    const TetMesh mesh = read_mesh(fixture(name));
+    EXPECT_EQ(mesh.nodes.size(), first.nodes.size());
+    EXPECT_EQ(mesh.tet_count(), first.tet_count());
+    EXPECT_NEAR(calc_volume(mesh), 0.3 * 0.2 * 0.1, 1e-12);
+  }
+}
+
+/// A binary section of values whose bytes are `bytes`, padded to entries of one value each.
+std::string make_data(const std::string& name, std::string bytes, bool tag_on_a_line) {
+  while (bytes.size() % 12 != 0) bytes += ' ';
+  return "$" + name + "\n1\n\"a view\"\n1\n0\n3\n0\n1\n" + std::to_string(bytes.size() / 12) + "\n" + bytes + (tag_on_a_line ? "\n" : "") +
+         "$End" + name + "\n";
+}
+
+TEST(read, values_of_binary_sections_may_hold_anything) {
+  const TetMesh plain = read_mesh(fixture("gmsh41_binary_1.msh"));
+  const std::string hostile[] = {"\n$EndElementData\n$Nodes\n", "$EndElementData", "\n$EndNodeData\n", std::string(24, '\0'), ""};
+  for (const char* version : {"gmsh41_binary_1.msh", "gmsh22_binary_1.msh"})
+    for (const std::string& bytes : hostile)
+      for (const char* name : {"ElementData", "NodeData"})
+        for (const bool tag_on_a_line : {false, true}) {
+          const std::string text =
+              read_text(fixture(version)) + make_data(name, bytes, tag_on_a_line) + "$Comments\nno line end before the tag$EndComments\n";
+          const TetMesh mesh = parse_mesh(std::as_bytes(std::span(text)), "views.msh", MeshFormat::kGmsh);
+          EXPECT_EQ(mesh.tet_count(), plain.tet_count());
+        }
+  // A section that is not known, and one that is not as the manual has it, end at the tag that another section or nothing follows.
+  const std::string text =
+      read_text(fixture("gmsh41_binary_1.msh")) + "$Foreign\n\x01\x02$EndForeign\x03\x04$EndForeign\n$Periodic\nodd$EndPeriodic";
+  EXPECT_EQ(parse_mesh(std::as_bytes(std::span(text)), "views.msh", MeshFormat::kGmsh).tet_count(), plain.tet_count());
+  const std::string cut = read_text(fixture("gmsh41_binary_1.msh")) + make_data("ElementData", std::string(48, 'x'), false).substr(0, 70);
+  EXPECT_THROW(parse_mesh(std::as_bytes(std::span(cut)), "views.msh", MeshFormat::kGmsh), InputError);
 }
 
 TEST(read, every_truncation_of_every_format_is_an_error_or_the_whole_mesh_and_never_a_crash) {
