@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -47,32 +48,62 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes, std::string_view mend) {
+namespace {
+
+/// A regular file to read. `length` gets its bytes.
+int open_regular(const fs::path& file, std::string_view what, std::uint64_t& length) {
   // O_NONBLOCK: opening a pipe without a writer must not wait.
-  const Descriptor fd(::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
-  if (fd.get() < 0) {
+  const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (fd < 0) {
     throw InputError(fmt::format("{}: cannot open this {}: {}; check the path", file.string(), what, std::strerror(errno)));
   }
   struct stat info {};
-  if (::fstat(fd.get(), &info) != 0 || !S_ISREG(info.st_mode)) {
+  if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
+    ::close(fd);
     throw InputError(fmt::format("{}: a {} must be a regular file, and this is {}; name the file itself", file.string(), what,
                                  S_ISDIR(info.st_mode) ? "a folder" : "a pipe or a device"));
   }
-  if (static_cast<std::uint64_t>(info.st_size) > max_bytes) {
-    throw InputError(
-        fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", file.string(), info.st_size, what, max_bytes, mend));
-  }
-  std::string bytes(static_cast<std::size_t>(info.st_size), '\0');
+  length = static_cast<std::uint64_t>(info.st_size);
+  return fd;
+}
+
+/// As many of the bytes as the file has left.
+std::size_t read_some(int fd, char* bytes, std::size_t count, const fs::path& file, std::string_view what) {
   std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t got = ::read(fd.get(), bytes.data() + done, bytes.size() - done);
+  while (done < count) {
+    const ssize_t got = ::read(fd, bytes + done, count - done);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) throw InputError(fmt::format("{}: cannot read this {}: {}; check the disk", file.string(), what, std::strerror(errno)));
-    if (got == 0) break;  // the file shrank while we read it
+    if (got == 0) break;
     done += static_cast<std::size_t>(got);
   }
-  bytes.resize(done);
+  return done;
+}
+
+}  // namespace
+
+std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes, std::string_view mend) {
+  std::uint64_t length = 0;
+  const Descriptor fd(open_regular(file, what, length));
+  if (length > max_bytes) {
+    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", file.string(), length, what, max_bytes, mend));
+  }
+  std::string bytes(static_cast<std::size_t>(length), '\0');
+  bytes.resize(read_some(fd.get(), bytes.data(), bytes.size(), file, what));  // shorter when the file shrank meanwhile
   return bytes;
+}
+
+void read_pieces(const fs::path& file, std::string_view what, std::size_t piece_bytes, const std::function<void(std::string_view)>& take) {
+  std::uint64_t length = 0;
+  const Descriptor fd(open_regular(file, what, length));
+  std::string piece(piece_bytes, '\0');
+  for (std::uint64_t done = 0; done < length;) {  // what is appended meanwhile is not read
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(piece_bytes, length - done));
+    const std::size_t got = read_some(fd.get(), piece.data(), wanted, file, what);
+    if (got == 0) return;
+    take(std::string_view(piece).substr(0, got));
+    done += got;
+  }
 }
 
 namespace {

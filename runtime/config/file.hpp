@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -14,6 +15,10 @@ namespace carillon::config {
 /// cannot be read, or when it holds more than `max_bytes`. `what` says in messages what was expected ("job file").
 std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes,
                       std::string_view mend = "check that this is the right file");
+
+/// The bytes of a regular file of any length, in pieces of at most `piece_bytes`, in order. Throws as read_file does.
+void read_pieces(const std::filesystem::path& file, std::string_view what, std::size_t piece_bytes,
+                 const std::function<void(std::string_view)>& take);
 
 /// Writes the bytes to a temporary file beside `file`, fsyncs, renames it to `file` and fsyncs the folder: readers see the old content
 /// or the new. The temporary file has no name until it is whole, where the file system can do that (not on NFS): a process that is ended in

@@ -108,19 +108,6 @@ WorldModel make_model(const WorldSpec& spec) {
   return world;
 }
 
-/// Position of the mesh frame from that of the centre of mass: x - R(q) c.
-Pose make_pose(const stream::Motion& motion, const Vec3& c) {
-  const auto& q = motion.rotation;
-  const Vec3 u{q[1], q[2], q[3]};
-  const auto cross = [](const Vec3& a, const Vec3& b) {
-    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  };
-  const Vec3 t = cross(u, c), s = cross(u, t);
-  Pose pose{motion.time_s, motion.position_m, q};
-  for (std::size_t k = 0; k < 3; ++k) pose.position_m[k] -= c[k] + 2.0 * (q[0] * t[k] + s[k]);
-  return pose;
-}
-
 }  // namespace
 
 World::World(const WorldSpec& spec, const WorldOptions& options) {
@@ -140,6 +127,18 @@ double World::advance(double until_s, double cpu_s, const std::function<void(con
 
 Statistics World::get_statistics() const { return runner_->get_statistics(); }
 
+Pose calc_pose(const stream::Motion& motion, const Vec3& c) {
+  const auto& q = motion.rotation;
+  const Vec3 u{q[1], q[2], q[3]};
+  const auto cross = [](const Vec3& a, const Vec3& b) {
+    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  };
+  const Vec3 t = cross(u, c), s = cross(u, t);
+  Pose pose{motion.time_s, motion.position_m, q};
+  for (std::size_t k = 0; k < 3; ++k) pose.position_m[k] -= c[k] + 2.0 * (q[0] * t[k] + s[k]);
+  return pose;
+}
+
 Simulation collect(const std::vector<stream::Event>& events, const std::vector<Vec3>& centres_m) {
   Simulation all;
   all.poses.resize(centres_m.size());
@@ -151,7 +150,7 @@ Simulation collect(const std::vector<stream::Event>& events, const std::vector<V
       const auto body = static_cast<std::size_t>(motion->body);
       auto& path = all.poses[body];
       if (!path.empty() && path.back().time_s >= motion->time_s) continue;  // after an impact it is where it was before
-      path.push_back(make_pose(*motion, centres_m[body]));
+      path.push_back(calc_pose(*motion, centres_m[body]));
     }
   }
   const auto earlier = [](const Impulse& x, const Impulse& y) { return x.time_s < y.time_s; };

@@ -70,6 +70,9 @@ class World {
   std::unique_ptr<Runner> runner_;
 };
 
+/// The pose of the mesh frame of a body whose centre of mass lies at `centre_m` in it: x - R(q) c.
+Pose calc_pose(const stream::Motion& motion, const Vec3& centre_m);
+
 /// Puts the stream of a world together again. `centres_m[i]`: centre of mass of body i in the frame of its mesh; as many as there are
 /// bodies. Events of other bodies are left out.
 Simulation collect(const std::vector<stream::Event>& events, const std::vector<Vec3>& centres_m);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <queue>
 
 #include "runtime/contact/world.hpp"
 #include "runtime/host/pose.hpp"
@@ -61,65 +62,64 @@ std::vector<stream::Event> make_still(const Scene& scene) {
   return events;
 }
 
-Course run_physics(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress) {
+/// Puts what a world says in order of time, and strikes between it: of what happens at one time, first what the world says, as it came.
+class InOrder {
+ public:
+  InOrder(std::vector<contact::Impulse> strikes, Events& out) : strikes_(std::move(strikes)), out_(&out) {
+    std::stable_sort(strikes_.begin(), strikes_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+  }
+
+  void take(const stream::Event& event) {
+    waiting_.push({stream::get_time_s(event), order_++, event});
+    if (const auto* mark = std::get_if<stream::Mark>(&event)) release(mark->time_s);
+  }
+  void finish() {
+    release(std::numeric_limits<double>::infinity());
+    for (; next_ < strikes_.size(); ++next_) out_->append(strikes_[next_]);
+  }
+
+ private:
+  struct Waiting {
+    double time_s = 0.0;
+    std::int64_t order = 0;
+    stream::Event event;
+    bool operator>(const Waiting& other) const { return time_s != other.time_s ? time_s > other.time_s : order > other.order; }
+  };
+
+  /// Nothing before that time will come.
+  void release(double until_s) {
+    for (; !waiting_.empty() && waiting_.top().time_s < until_s; waiting_.pop()) {
+      for (; next_ < strikes_.size() && strikes_[next_].time_s < waiting_.top().time_s; ++next_) out_->append(strikes_[next_]);
+      out_->append(waiting_.top().event);
+    }
+  }
+
+  std::vector<contact::Impulse> strikes_;
+  Events* out_;
+  std::size_t next_ = 0;
+  std::int64_t order_ = 0;
+  std::priority_queue<Waiting, std::vector<Waiting>, std::greater<>> waiting_;
+};
+
+void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, InOrder& events,
+                 Course& course) {
   contact::World world(make_world(scene), {.contact_step_s = scene.quality.contact_step_s,
                                            .end_s = scene.duration_s,
                                            .lasting_contacts = has_contacts,
                                            .audits_energy = audits});
-  Course course;
   constexpr int kParts = 100;
   for (int part = 1; part <= kParts; ++part) {
     world.advance(scene.duration_s * part / kParts, std::numeric_limits<double>::infinity(),
-                  [&](const stream::Event& event) { course.recording.events.push_back(event); });
+                  [&](const stream::Event& event) { events.take(event); });
     if (progress) progress(static_cast<double>(part) / kParts);
   }
   course.steps = world.get_statistics().steps;
   course.energy = world.get_statistics().energy;
-  return course;
 }
 
-}  // namespace
-
-bool has_physics(const Scene& scene) {
-  return std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const SceneBody& body) { return !body.spec.fixed; });
-}
-
-contact::WorldSpec make_world(const Scene& scene) {
-  contact::WorldSpec spec;
-  for (const SceneBody& body : scene.bodies) spec.bodies.push_back(body.spec);
-  spec.ground = scene.ground;
-  spec.gravity_m_s2 = scene.gravity_m_s2;
-  return spec;
-}
-
-Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress) {
-  Course course;
-  std::vector<const bank::Bank*> banks;
-  for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
-  const std::vector<contact::Impulse> strikes = make_impulses(scene, banks);  // refused before the physics, if at all
-  if (!has_physics(scene)) {
-    course.recording.events = make_still(scene);
-  } else {
-    try {
-      course = run_physics(scene, has_contacts, audits, progress);
-    } catch (const InputError& error) {
-      throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
-    } catch (const SolveError& error) {
-      throw SolveError(fmt::format("{}: {}", scene.file.string(), error.what()));
-    }
-  }
-  std::vector<stream::Event>& events = course.recording.events;
-  events.insert(events.end(), strikes.begin(), strikes.end());
-  std::stable_sort(events.begin(), events.end(),
-                   [](const stream::Event& a, const stream::Event& b) { return stream::get_time_s(a) < stream::get_time_s(b); });
-  course.recording.bodies = list_bodies(scene);
-  return course;
-}
-
-Course read_course(const std::filesystem::path& file, const Scene& scene) {
-  Course course;
-  course.recording = stream::read_recording(file);
-  const std::vector<stream::RecordedBody>&theirs = course.recording.bodies, ours = list_bodies(scene);
+/// Throws InputError unless the file's bodies are the scene's.
+void check_bodies(const std::filesystem::path& file, const std::vector<stream::RecordedBody>& theirs,
+                  const std::vector<stream::RecordedBody>& ours, std::vector<std::string>& warnings) {
   if (theirs.size() != ours.size()) {
     throw InputError(fmt::format("{}: is of {} bodies, and the scene has {}; play it with the scene that it was made for", file.string(),
                                  theirs.size(), ours.size()));
@@ -147,11 +147,83 @@ Course read_course(const std::filesystem::path& file, const Scene& scene) {
   }
   const auto is_unmarked = [](const stream::RecordedBody& body) { return !body.surface; };
   if (std::any_of(theirs.begin(), theirs.end(), is_unmarked)) {
-    course.warnings.push_back(
+    warnings.push_back(
         fmt::format("{}: does not say how large its bodies are (\"size_m\", \"order_m\"); that they have as many triangles as the scene's is all "
                     "that was compared",
                     file.string()));
   }
+}
+
+}  // namespace
+
+Events make_events(const std::vector<stream::Event>& events) {
+  Events records;
+  records.append(std::span(events));
+  return records;
+}
+
+void write_recording(const Course& course, const std::function<void(std::string_view)>& sink) {
+  constexpr std::size_t kPiece = 1 << 16;
+  std::string text = stream::format_header(course.bodies, course.events.size());
+  course.events.for_each([&](const stream::Event& event) {
+    stream::append_line(text, event);
+    if (text.size() < kPiece) return;
+    sink(text);
+    text.clear();
+  });
+  sink(text);
+}
+
+Tally count_impulses(const Events& events, std::size_t bodies) {
+  Tally tally;
+  tally.body_impulses.assign(bodies, 0);
+  events.for_each([&](const stream::Event& event) {
+    const auto* impulse = std::get_if<stream::Impulse>(&event);
+    if (impulse == nullptr || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= bodies) return;
+    ++tally.impulses;
+    ++tally.body_impulses[static_cast<std::size_t>(impulse->body)];
+    if (impulse->other < 0 || impulse->body < impulse->other) ++tally.contacts;
+  });
+  return tally;
+}
+
+bool has_physics(const Scene& scene) {
+  return std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const SceneBody& body) { return !body.spec.fixed; });
+}
+
+contact::WorldSpec make_world(const Scene& scene) {
+  contact::WorldSpec spec;
+  for (const SceneBody& body : scene.bodies) spec.bodies.push_back(body.spec);
+  spec.ground = scene.ground;
+  spec.gravity_m_s2 = scene.gravity_m_s2;
+  return spec;
+}
+
+Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, config::Spool spool) {
+  Course course{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
+  std::vector<const bank::Bank*> banks;
+  for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
+  InOrder events(make_impulses(scene, banks), course.events);  // strikes are refused before the physics, if at all
+  if (!has_physics(scene)) {
+    for (const stream::Event& event : make_still(scene)) events.take(event);
+  } else {
+    try {
+      run_physics(scene, has_contacts, audits, progress, events, course);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
+    } catch (const SolveError& error) {
+      throw SolveError(fmt::format("{}: {}", scene.file.string(), error.what()));
+    }
+  }
+  events.finish();
+  return course;
+}
+
+Course read_course(const std::filesystem::path& file, const Scene& scene, config::Spool spool) {
+  Course course{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
+  (void)stream::read_recording(
+      file, [&](const stream::Event& event) { course.events.append(event); },
+      [&](const std::vector<stream::RecordedBody>& theirs) { check_bodies(file, theirs, course.bodies, course.warnings); });
   return course;
 }
 

@@ -5,20 +5,41 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "runtime/config/spool.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/stream/file.hpp"
 
 namespace carillon::host {
 
-/// Everything that happens in a scene, in order of time. The bodies are those of the scene, in its order.
+/// What happens, in order of time, however much it is.
+using Events = config::Records<stream::Event>;
+
+/// A list as events, for scenes that are made by hand.
+Events make_events(const std::vector<stream::Event>& events);
+
+/// Everything that happens in a scene. The bodies are those of the scene, in its order. Events of a contacts file stay in the order of the
+/// file.
 struct Course {
-  stream::Recording recording;
+  std::vector<stream::RecordedBody> bodies;
+  Events events;
   std::int64_t steps = 0;  // of the physics
   contact::EnergyAudit energy{};
   std::vector<std::string> warnings;
 };
+
+/// The course as the text of a contacts file, in pieces, in order.
+void write_recording(const Course& course, const std::function<void(std::string_view)>& sink);
+
+/// How many impulses bodies get.
+struct Tally {
+  std::vector<std::int64_t> body_impulses;  // per body
+  std::int64_t impulses = 0;
+  std::int64_t contacts = 0;  // one between two bodies counts once
+};
+Tally count_impulses(const Events& events, std::size_t bodies);
 
 /// Whether any body can move: without one there is no physics.
 bool has_physics(const Scene& scene);
@@ -27,13 +48,14 @@ bool has_physics(const Scene& scene);
 contact::WorldSpec make_world(const Scene& scene);
 
 /// Runs the physics, if any body can move, and adds the strikes. Every body's spec has its bank. `has_contacts`: with records of contacts
-/// that last; `audits`: with the books of energy. `progress` (may be empty) is called with the finished fraction. Throws InputError and
-/// SolveError, which name the scene.
-Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress);
+/// that last; `audits`: with the books of energy. `progress` (may be empty) is called with the finished fraction. `spool` takes the events.
+/// Throws InputError and SolveError, which name the scene.
+Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress,
+                config::Spool spool = config::Spool());
 
 /// The events of a contacts file. Throws InputError when it is none, or was made for other bodies than the scene's: as many, of the same
 /// names, with the same surface in their banks, in the same order. A file that does not say which surfaces it was made for is compared by
 /// their numbers of triangles, with a warning.
-Course read_course(const std::filesystem::path& file, const Scene& scene);
+Course read_course(const std::filesystem::path& file, const Scene& scene, config::Spool spool = config::Spool());
 
 }  // namespace carillon::host

@@ -2,9 +2,14 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <memory>
+#include <queue>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "runtime/host/events.hpp"
 #include "runtime/stream/events.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
@@ -19,11 +24,16 @@ struct FedBody {
 
 class Feed {
  public:
-  /// `events` and `walk` must outlive the feed; body i of them is bodies[i], events of others are left out. `walk` is the listener's.
-  Feed(std::span<const stream::Event> events, std::vector<FedBody> bodies, std::span<const stream::Listener> walk);
+  /// `events` and `walk` must outlive the feed; body i of them is bodies[i], events of others are left out. No event may be earlier than
+  /// one before it by more than a second. `walk` is the listener's.
+  Feed(const Events& events, std::vector<FedBody> bodies, std::span<const stream::Listener> walk);
 
-  /// Waypoints that are to be remembered of a body (-1: of the listener), when sound travels for at most `longest_s`.
-  int count_waypoints(int body, double longest_s) const;
+  Feed(const Feed&) = delete;
+  Feed& operator=(const Feed&) = delete;
+
+  /// Waypoints that are to be remembered of each body, and behind them of the listener, when its sound travels for at most longest_s[body];
+  /// the listener's place of `longest_s` may be left out. Goes through all events.
+  std::vector<int> count_waypoints(std::span<const double> longest_s) const;
 
   /// Hands on what must be known before the samples until `until_s` are made. The synthesiser must be between two calls of process();
   /// what does not fit into its ring at once goes in parts. [main-thread], and the audio thread's place.
@@ -31,21 +41,39 @@ class Feed {
 
  private:
   struct Item {
-    double due_s = 0.0;     // it must be known before anything at this time is made
-    std::size_t event = 0;  // of events_, then of walk_
-    bool is_still = false;  // the same without its velocity
+    double due_s = 0.0;       // it must be known before anything at this time is made
+    std::uint64_t event = 0;  // of events_, then of walk_
+    bool is_still = false;    // the same without its velocity, and before it
+    bool operator>(const Item& other) const {
+      if (due_s != other.due_s) return due_s > other.due_s;
+      return event != other.event ? event > other.event : is_still < other.is_still;
+    }
   };
-  stream::Event make_event(const Item& item) const;
+  struct Held {
+    Item item;
+    stream::Event event;
+    bool operator>(const Held& other) const { return item > other.item; }
+  };
+  /// When events are due, which follows from those before them.
+  class Times;
 
-  std::span<const stream::Event> events_;
+  const FedBody* find(std::int32_t body) const;
+  stream::Event make_event(const Item& item, stream::Event event) const;
+  void read_until(double until_s);
+
+  const Events* events_;
   std::span<const stream::Listener> walk_;
   std::vector<FedBody> bodies_;
-  std::vector<Item> items_;                   // in order of due_s
-  std::vector<std::vector<double>> times_s_;  // of the motions of each body, then of the listener
-  double margin_s_ = 0.0;                     // by which ways are known longer ahead than they need to be
+  double margin_s_ = 0.0;  // by which ways are known longer ahead than they need to be
   bool has_contacts_ = false;
-  double end_s_ = -1e300;  // when the last thing happens
-  std::size_t next_ = 0;
+  double end_s_ = -1e300;    // when the last thing happens
+  std::vector<Item> early_;  // in order, what is due long before it happens; the walk
+  std::size_t next_early_ = 0;
+  // Of what is due shortly before it happens as much as may be due now.
+  std::shared_ptr<Times> times_;
+  Events::Reader reader_;
+  double read_s_ = -1e300;  // latest event that was read
+  std::priority_queue<Held, std::vector<Held>, std::greater<>> held_;
 };
 
 }  // namespace carillon::host

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "runtime/host/pose.hpp"
+#include "runtime/synth/pulse.hpp"
 
 namespace carillon::host {
 
@@ -32,11 +34,45 @@ plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, 
   return facts;
 }
 
-Plan make_plan(plan::SceneFacts facts, std::span<const stream::Event> events, const plan::Costs& costs) {
-  plan::Planner planner(facts, costs);
-  for (const stream::Event& event : events) planner.watch(event);
-  std::vector<plan::Change> changes = planner.advance(std::numeric_limits<double>::infinity());
-  return {std::move(facts), std::move(planner), std::move(changes)};
+Plan make_plan(plan::SceneFacts facts, const Events& events, const plan::Costs& costs) {
+  // The planner may decide about what no event can change any more: a strike calls for effects half its pulse before it, and so much
+  // earlier as its click takes to cross the body.
+  constexpr double kDisorderS = 1.0;  // Feed
+  constexpr double kLargestCrossingS = 1.0;
+  constexpr double kEveryS = 0.1;
+  double longest_s = 0.0;
+  std::optional<stream::Event> first_listener;
+  events.for_each([&](const stream::Event& event) {
+    if (!first_listener && std::holds_alternative<stream::Listener>(event)) first_listener = event;
+    const auto* impulse = std::get_if<stream::Impulse>(&event);
+    if (impulse == nullptr || stream::find_fault(event) != nullptr) return;
+    longest_s = std::max(longest_s, 0.5 * synth::calc_pulse_length(impulse->shape, impulse->duration_s));
+  });
+  const double behind_s = longest_s + kDisorderS + kLargestCrossingS;
+  Plan plan{.facts = facts, .planner = plan::Planner(std::move(facts), costs)};
+  std::size_t switches = 0;
+  const auto decide = [&](double known_s) {
+    for (plan::Change& change : plan.planner.advance(known_s)) {
+      plan.steps.append({change.time_s, change.body, change.effects});
+      if (switches >= kMostReported) continue;
+      switches += change.switches.size();
+      plan.changes.push_back(std::move(change));
+    }
+  };
+  if (first_listener) plan.planner.watch(*first_listener);  // that the listener walks holds from the beginning
+  double decided_s = 0.0;
+  events.for_each([&](const stream::Event& event) {
+    if (first_listener && std::holds_alternative<stream::Listener>(event))
+      first_listener.reset();  // seen
+    else
+      plan.planner.watch(event);
+    const double known_s = stream::get_time_s(event) - behind_s;
+    if (!(known_s > decided_s + kEveryS)) return;
+    decide(known_s);
+    decided_s = known_s;
+  });
+  decide(std::numeric_limits<double>::infinity());
+  return plan;
 }
 
 }  // namespace carillon::host

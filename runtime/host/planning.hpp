@@ -1,9 +1,11 @@
 // The plan of a scene: which effects its bodies call for, from the scene and from what happens in it.
 #pragma once
 
-#include <span>
+#include <cstdint>
 #include <vector>
 
+#include "runtime/config/spool.hpp"
+#include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/plan/planner.hpp"
@@ -15,14 +17,23 @@ namespace carillon::host {
 /// fixed may move.
 plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves);
 
+/// From that time on a body has these effects.
+struct PlanStep {
+  double time_s = 0.0;
+  std::int32_t body = 0;
+  synth::EffectSet effects;
+};
+
 /// A planner that has seen all of a scene, and what it decided.
 struct Plan {
   plan::SceneFacts facts;
   plan::Planner planner;
-  std::vector<plan::Change> changes;  // in order of time; the first of every body at 0
+  config::Records<PlanStep> steps{};    // in order of time; the first of every body at 0
+  std::vector<plan::Change> changes{};  // the same with reasons, as many as a report lists
 };
+inline constexpr std::size_t kMostReported = 10000;  // switches of effects
 
-/// `events` in order of time.
-Plan make_plan(plan::SceneFacts facts, std::span<const stream::Event> events, const plan::Costs& costs);
+/// `events` as Feed takes them.
+Plan make_plan(plan::SceneFacts facts, const Events& events, const plan::Costs& costs);
 
 }  // namespace carillon::host

@@ -4,10 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <ctime>
+#include <memory>
 
 #include "runtime/config/file.hpp"
 #include "runtime/config/printable.hpp"
@@ -52,6 +56,63 @@ class Progress {
   int next_ = 0;
 };
 
+bool is_standard_output(const fs::path& wav) { return wav == "-"; }
+
+/// Where what the sound is made of waits until it is written.
+fs::path find_spool_folder(const fs::path& wav) {
+  if (wav.empty() || is_standard_output(wav)) return {};
+  return wav.has_parent_path() ? wav.parent_path() : fs::path(".");
+}
+
+/// Throws SystemError when the sound cannot fit on the disk: better now than after hours.
+void check_room(const Scene& scene, const fs::path& wav) {
+  const std::uint64_t frames = count_frames(scene.duration_s, scene.sample_rate_hz);
+  const std::size_t channels = count_channels(scene);
+  const auto kept = static_cast<double>(frames * channels * sizeof(float));
+  const double whole = is_standard_output(wav) ? 0.0 : static_cast<double>(calc_wav_bytes(channels, scene.output.format, frames));
+  std::error_code error;
+  const fs::path folder = is_standard_output(wav) ? fs::temp_directory_path(error) : find_spool_folder(wav);
+  const fs::space_info space = fs::space(folder, error);
+  if (error || kept <= static_cast<double>(config::Spool::kMemory) || static_cast<double>(space.available) >= kept + whole) return;
+  throw SystemError(
+      fmt::format("{}: {:.3g} GB are free, and the sound needs {:.3g} GB: {:.3g} GB for the WAV file and {:.3g} GB while it is "
+                  "made; make room or choose another place",
+                  folder.string(), 1e-9 * static_cast<double>(space.available), 1e-9 * (kept + whole), 1e-9 * whole, 1e-9 * kept));
+}
+
+/// Throws SystemError when whoever reads standard output is gone.
+void write_standard_output(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t put = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
+    if (put < 0 && errno == EINTR) continue;
+    if (put <= 0) throw SystemError(fmt::format("standard output: cannot write the sound: {}", std::strerror(put < 0 ? errno : ENOSPC)));
+    bytes.remove_prefix(static_cast<std::size_t>(put));
+  }
+}
+
+/// Files that appear together, when all of them are whole.
+class Outputs {
+ public:
+  config::WholeFile& add(const fs::path& file, const char* what) {
+    files_.push_back({std::make_unique<config::WholeFile>(file), what, file});
+    return *files_.back().file;
+  }
+  void commit(std::FILE* notes) {
+    for (const Output& output : files_) {
+      output.file->commit();
+      fmt::print(notes, "{:<18} {}\n", output.what, config::printable(output.path.string()));
+    }
+  }
+
+ private:
+  struct Output {
+    std::unique_ptr<config::WholeFile> file;
+    const char* what;
+    fs::path path;
+  };
+  std::vector<Output> files_;
+};
+
 bool is_same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::equivalent(a, b, error)) return true;
@@ -61,7 +122,7 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 /// Every output: can be written, is none of the inputs, and is not named twice.
 void check_outputs(const ProgramOptions& options, const Scene& scene) {
   std::vector<std::pair<fs::path, std::string>> outputs;
-  if (!options.plan) outputs.emplace_back(options.wav, "WAV file");
+  if (!options.plan && !is_standard_output(options.wav)) outputs.emplace_back(options.wav, "WAV file");
   if (options.spectrogram) outputs.emplace_back(*options.spectrogram, "spectrogram");
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
   if (options.report) outputs.emplace_back(*options.report, "report");
@@ -80,59 +141,52 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
   }
 }
 
-void print_summary(const Scene& scene, const Sound& sound, const Figures& figures) {
-  fmt::print("bodies             {}\n", figures.bodies);
+void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, const Figures& figures) {
+  fmt::print(notes, "bodies             {}\n", figures.bodies);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    fmt::print("  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", config::printable(scene.bodies[i].name), sound.body_modes[i],
+    fmt::print(notes, "  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", config::printable(scene.bodies[i].name), sound.body_modes[i],
                scene.bodies[i].spec.fixed ? "fixed, " : "", sound.body_peak_pa[i]);
   }
-  fmt::print("modes sounding     {}\n", figures.modes);
-  fmt::print("contacts           {}\n", figures.contacts);
-  fmt::print("physics            {:.2f} s\n", figures.physics_s);
-  fmt::print("sound              {:.2f} s for {:g} s at {} Hz\n", figures.sound_s, scene.duration_s, sound.rate_hz);
-  fmt::print("real-time factor   {:.3f} (below 1 is faster than real time)\n", figures.real_time_factor);
+  fmt::print(notes, "modes sounding     {}\n", figures.modes);
+  fmt::print(notes, "contacts           {}\n", figures.tally.contacts);
+  fmt::print(notes, "physics            {:.2f} s\n", figures.physics_s);
+  fmt::print(notes, "sound              {:.2f} s for {:g} s at {} Hz\n", figures.sound_s, scene.duration_s, sound.rate_hz);
+  fmt::print(notes, "real-time factor   {:.3f} (below 1 is faster than real time)\n", figures.real_time_factor);
   if (figures.audit) {
     const contact::EnergyAudit& bodies = figures.audit->bodies;
-    fmt::print("energy of bodies   rises by {:.2g} J at most, and by {:.2g} J at a hit; the largest of motion is {:.3g} J\n", bodies.rise_j,
-               bodies.hit_rise_j, bodies.kinetic_j);
-    fmt::print("energy of modes    rises by a share of {:.2g} at most while nothing acts\n", figures.audit->modes_rise);
+    fmt::print(notes, "energy of bodies   rises by {:.2g} J at most, and by {:.2g} J at a hit; the largest of motion is {:.3g} J\n",
+               bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j);
+    fmt::print(notes, "energy of modes    rises by a share of {:.2g} at most while nothing acts\n", figures.audit->modes_rise);
   }
-  if (figures.peak_pa > 0.0) {
-    fmt::print("peak               {:.4g} Pa at the {}\n", figures.peak_pa, scene.microphones_m.empty() ? "ears" : "microphones");
-    fmt::print("level              {:.1f} dB re 20 uPa, loudest 125 ms {:.1f} dB\n", figures.levels.mean_db, figures.levels.loudest_db);
-    fmt::print("gain               {:.4g} full scale per Pa, peak at {:.1f} dBFS\n", figures.gain.per_pa,
-               20.0 * std::log10(figures.gain.per_pa * figures.peak_pa));
+  if (sound.peak_pa > 0.0) {
+    fmt::print(notes, "peak               {:.4g} Pa at the {}\n", sound.peak_pa, scene.microphones_m.empty() ? "ears" : "microphones");
+    fmt::print(notes, "level              {:.1f} dB re 20 uPa, loudest 125 ms {:.1f} dB\n", sound.levels.mean_db, sound.levels.loudest_db);
+    fmt::print(notes, "gain               {:.4g} full scale per Pa, peak at {:.1f} dBFS\n", figures.gain.per_pa,
+               20.0 * std::log10(figures.gain.per_pa * sound.peak_pa));
+    if (sound.faded_s > 0.0) {
+      fmt::print(notes,
+                 "end                still sounds: faded within the last {:g} ms (\"output\": {{\"fade_end\": false}} cuts it off)\n",
+                 1e3 * sound.faded_s);
+    }
   } else {
-    fmt::print("peak               0 Pa: nothing sounds in this scene, the file is silent\n");
+    fmt::print(notes, "peak               0 Pa: nothing sounds in this scene, the file is silent\n");
   }
 }
 
 void print_warnings(const Scene& scene, const Sound& sound, const Figures& figures) {
   if (figures.gain.reduced) {
     fmt::print(stderr, "warning: the gain {:g} would clip ({:.1f} dB over full scale at a peak of {:.4g} Pa); {:.4g} is used instead\n",
-               *scene.output.gain_per_pa, 20.0 * std::log10(*scene.output.gain_per_pa * figures.peak_pa), figures.peak_pa,
-               figures.gain.per_pa);
+               *scene.output.gain_per_pa, 20.0 * std::log10(*scene.output.gain_per_pa * sound.peak_pa), sound.peak_pa, figures.gain.per_pa);
   }
   if (sound.refused > 0) fmt::print(stderr, "warning: {} contact pulses could not be played (too many at once)\n", sound.refused);
   if (sound.resets > 0) fmt::print(stderr, "warning: {} times a body's state was no number and was cleared\n", sound.resets);
-}
-
-void write_output(const fs::path& file, const std::string& bytes, const char* what) {
-  config::write_file(file, bytes);
-  fmt::print("{:<18} {}\n", what, config::printable(file.string()));
 }
 
 }  // namespace
 
 void run(const ProgramOptions& options) {
   Scene scene = read_scene(options.scene);
-  if (options.rate_hz) {
-    scene.sample_rate_hz = *options.rate_hz;
-    if (!fits_in_memory(scene)) {
-      throw InputError(
-          fmt::format("--rate {}: {:g} s at this rate need too much memory; give a lower rate", *options.rate_hz, scene.duration_s));
-    }
-  }
+  if (options.rate_hz) scene.sample_rate_hz = *options.rate_hz;
   if (options.format) {
     const auto name = std::find(kSampleFormatNames.begin(), kSampleFormatNames.end(), *options.format);
     scene.output.format = static_cast<SampleFormat>(name - kSampleFormatNames.begin());
@@ -140,67 +194,77 @@ void run(const ProgramOptions& options) {
   if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
     throw InputError("--plan makes no sound and writes no files; leave the options that name files away");
   }
+  const bool to_standard_output = is_standard_output(options.wav);
+  if (to_standard_output && isatty(STDOUT_FILENO) != 0) {
+    throw InputError(
+        "-o -: standard output is a terminal; lead the sound into a program or a file, as in  carillon-render SCENE -o - | aplay");
+  }
+  std::FILE* notes = to_standard_output ? stderr : stdout;
   check_outputs(options, scene);
+  if (!options.plan) check_room(scene, options.wav);
+  const auto make_spool = [&](const char* what) { return config::Spool(find_spool_folder(options.wav), what); };
   const Banks banks = read_banks(scene);
   plan::SceneFacts facts = make_facts(scene, make_microphones(scene), options.contacts.has_value() || has_physics(scene));
   std::vector<const bank::Bank*> body_banks;
-  std::vector<contact::Vec3> centres_m;
-  for (const SceneBody& body : scene.bodies) {
-    body_banks.push_back(body.spec.bank);
-    centres_m.push_back(body.spec.bank->rigid.centre_m);
-  }
+  for (const SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
 
   Figures figures;
   figures.bodies = scene.bodies.size();
   auto started = Clock::now();
   const std::clock_t ticks = std::clock();
   const bool has_contacts = options.record.has_value() || plan::Planner(facts).needs_contacts();
-  const Course course = options.contacts ? read_course(*options.contacts, scene)
-                                         : simulate(scene, has_contacts, options.audit, Progress("physics", options.quiet));
+  const Course course = options.contacts
+                            ? read_course(*options.contacts, scene, make_spool("contacts"))
+                            : simulate(scene, has_contacts, options.audit, Progress("physics", options.quiet), make_spool("contacts"));
   figures.physics_s = get_seconds_since(started);
   scene.warnings.insert(scene.warnings.end(), course.warnings.begin(), course.warnings.end());
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", config::printable(warning));
   figures.physics_cpu_s = static_cast<double>(std::clock() - ticks) / CLOCKS_PER_SEC;
   const bool measures = options.plan || options.report.has_value();
-  const Plan plan = make_plan(std::move(facts), course.recording.events, measures ? plan::measure_costs() : plan::Costs{});
+  const Plan plan = make_plan(std::move(facts), course.events, measures ? plan::measure_costs() : plan::Costs{});
   if (options.plan) {
     fmt::print("{}", config::printable_lines(plan::format_plan(plan.planner, plan.facts)));
     return;
   }
-  contact::Simulation simulation = contact::collect(course.recording.events, centres_m);
-  simulation.steps = course.steps;
+  figures.tally = count_impulses(course.events, scene.bodies.size());
+  figures.physics_steps = course.steps;
   started = Clock::now();
-  const Sound sound = calc_sound(scene, body_banks, course.recording.events,
+  SoundStore store(scene.sample_rate_hz, count_channels(scene), make_spool("sound"));
+  const Sound sound = calc_sound(scene, body_banks, course.events,
                                  {.rate_hz = scene.sample_rate_hz,
                                   .plan = &plan,
                                   .measures = measures,
                                   .audits = options.audit,
-                                  .progress = Progress("sound", options.quiet)});
+                                  .fades_end = scene.output.fade_end,
+                                  .progress = Progress("sound", options.quiet)},
+                                 store);
   figures.sound_s = get_seconds_since(started);
   if (options.audit) figures.audit = EnergyBooks{course.energy, sound.energy_rise};
   figures.real_time_factor = (figures.physics_s + figures.sound_s) / scene.duration_s;
   figures.modes = sound.modes;
-  figures.contacts = count_contacts(simulation);
-  figures.peak_pa = calc_peak_pa(sound);
-  figures.levels = calc_levels(sound);
-  figures.gain = calc_gain(scene.output, figures.peak_pa);
+  figures.gain = calc_gain(scene.output, sound.peak_pa);
 
-  // Everything is made before anything is written.
-  const std::string wav = make_wav(sound, figures.gain.per_pa, scene.output.format);
-  const std::string png = options.spectrogram
-                              ? make_spectrogram_png(sound, fmt::format("{}: {} contacts, {} modes", scene.file.stem().string(),
-                                                                        figures.contacts, figures.modes))
-                              : "";
-  const std::string trajectory = options.trajectory ? make_trajectory_json(scene, body_banks, simulation) : "";
-  const std::string recording = options.record ? stream::format_recording(course.recording) : "";
-  const std::string report = options.report ? make_report_json(scene, simulation, sound, plan, figures) : "";
-  print_summary(scene, sound, figures);
+  // Everything is made before anything is seen.
+  Outputs outputs;
+  const auto append_to = [](config::WholeFile& file) { return [&file](std::string_view bytes) { file.append(bytes); }; };
+  if (options.spectrogram) {
+    outputs.add(*options.spectrogram, "spectrogram")
+        .append(make_spectrogram_png(
+            store, fmt::format("{}: {} contacts, {} modes", scene.file.stem().string(), figures.tally.contacts, figures.modes)));
+  }
+  if (options.trajectory) {
+    write_trajectory(scene, body_banks, course.events, make_spool("paths"), append_to(outputs.add(*options.trajectory, "trajectory")));
+  }
+  if (options.report) outputs.add(*options.report, "report").append(make_report_json(scene, sound, plan, figures));
+  if (options.record) write_recording(course, append_to(outputs.add(*options.record, "contacts file")));
+  if (!to_standard_output) write_wav(store, figures.gain.per_pa, scene.output.format, append_to(outputs.add(options.wav, "sound")));
+  print_summary(notes, scene, sound, figures);
   print_warnings(scene, sound, figures);
-  if (options.spectrogram) write_output(*options.spectrogram, png, "spectrogram");
-  if (options.trajectory) write_output(*options.trajectory, trajectory, "trajectory");
-  if (options.report) write_output(*options.report, report, "report");
-  if (options.record) write_output(*options.record, recording, "contacts file");
-  write_output(options.wav, wav, "sound");
+  if (to_standard_output) {
+    std::signal(SIGPIPE, SIG_IGN);  // a reader that goes is an error with a name
+    write_wav(store, figures.gain.per_pa, scene.output.format, write_standard_output);
+  }
+  outputs.commit(notes);
 }
 
 }  // namespace carillon::host

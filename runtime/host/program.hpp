@@ -9,7 +9,7 @@ namespace carillon::host {
 
 struct ProgramOptions {
   std::filesystem::path scene;
-  std::filesystem::path wav;
+  std::filesystem::path wav;  // "-" is standard output
   std::optional<std::filesystem::path> spectrogram, trajectory, report;
   std::optional<std::filesystem::path> contacts;  // played instead of the scene's physics and strikes
   std::optional<std::filesystem::path> record;
@@ -20,7 +20,8 @@ struct ProgramOptions {
   bool quiet = false;                 // no progress
 };
 
-/// Reads everything, simulates, renders, writes everything; prints what it does on stdout, progress and warnings on stderr.
+/// Reads everything, simulates, renders, writes everything; prints what it does on stdout (on stderr where the sound goes to stdout),
+/// progress and warnings on stderr. Files appear whole or not at all, and all together. Memory does not grow with the length of the scene.
 /// Throws InputError before any work when an input is bad or an output cannot be written.
 void run(const ProgramOptions& options);
 

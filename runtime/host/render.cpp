@@ -5,17 +5,20 @@
 #include "runtime/host/render.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <ctime>
 #include <limits>
 #include <map>
 #include <memory>
+#include <numbers>
+#include <numeric>
+#include <optional>
 
 #include "runtime/host/feed.hpp"
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/radiation/gains.hpp"
+#include "runtime/synth/cpu_ticks.hpp"
 #include "runtime/synth/texture.hpp"
 
 namespace carillon::host {
@@ -31,14 +34,6 @@ constexpr int kMostStrikes = 256;         // of a body, waiting or acting at onc
 
 double get_cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-std::uint64_t get_ticks() noexcept {
-#if defined(__x86_64__)
-  return __builtin_ia32_rdtsc();
-#else
-  return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
-#endif
-}
-
 double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
 /// What the events say about one body.
@@ -49,12 +44,11 @@ struct BodyCourse {
   double reach_m = 0.0;     // how far from the first microphone's place it ever gets
 };
 
-std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
-                               const Vec3& base) {
+std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const Vec3& base) {
   std::vector<BodyCourse> courses(scene.bodies.size());
   std::vector<bool> is_placed(scene.bodies.size());
   const auto find = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < courses.size(); };
-  for (const stream::Event& event : events) {
+  events.for_each([&](const stream::Event& event) {
     if (const auto* motion = std::get_if<stream::Motion>(&event); motion != nullptr && find(motion->body)) {
       const auto i = static_cast<std::size_t>(motion->body);
       if (!is_placed[i]) courses[i].first = *motion;
@@ -66,7 +60,7 @@ std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank:
       courses[static_cast<std::size_t>(impulse->body)].is_played = true;
     if (const auto* contact = std::get_if<stream::Contact>(&event); contact != nullptr && find(contact->body))
       courses[static_cast<std::size_t>(contact->body)].is_played = courses[static_cast<std::size_t>(contact->body)].is_touched = true;
-  }
+  });
   for (std::size_t i = 0; i < courses.size(); ++i) {
     if (is_placed[i]) continue;
     const contact::Pose& initial = scene.bodies[i].spec.initial;
@@ -81,32 +75,32 @@ std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank:
 /// long none of those of contacts.
 class Changes {
  public:
-  Changes(const Scene& scene, const std::vector<BodyCourse>& courses, const Plan* plan) : scene_(&scene), courses_(&courses) {
-    if (plan != nullptr) changes_ = plan->changes;
+  Changes(const Scene& scene, const std::vector<BodyCourse>& courses, const Plan* plan)
+      : scene_(&scene), courses_(&courses), first_(courses.size(), scene.effects), all_(first_) {
+    if (plan == nullptr) return;
+    steps_.emplace(plan->steps);
+    std::vector<bool> is_known(courses.size());
+    plan->steps.for_each([&](const PlanStep& step) {
+      const auto body = static_cast<std::size_t>(step.body);
+      all_[body] = is_known[body] ? all_[body].with(step.effects) : step.effects;
+      if (!is_known[body]) first_[body] = step.effects;
+      is_known[body] = true;
+    });
   }
   /// What a body begins with, and what it has at any time.
-  synth::EffectSet find_first(std::size_t body) const {
-    const auto first = std::find_if(changes_.begin(), changes_.end(), [&](const auto& change) { return is_of(change, body); });
-    return find(body, first == changes_.end() ? scene_->effects : first->effects);
-  }
-  synth::EffectSet find_all(std::size_t body) const {
-    synth::EffectSet all = find_first(body);
-    for (const plan::Change& change : changes_)
-      if (is_of(change, body)) all = all.with(find(body, change.effects));
-    return all;
-  }
+  synth::EffectSet find_first(std::size_t body) const { return find(body, first_[body]); }
+  synth::EffectSet find_all(std::size_t body) const { return find(body, all_[body]); }
   void apply(double until_s, synth::Synthesiser& synthesiser) {
-    if (changes_.empty()) return;
+    if (!steps_) return;
     synthesiser.collect();
-    for (; next_ < changes_.size() && changes_[next_].time_s < until_s; ++next_) {
-      const int body = changes_[next_].body;
-      const synth::EffectSet effects = find(static_cast<std::size_t>(body), changes_[next_].effects);
-      if (effects != synthesiser.get_effects(body)) synthesiser.set_effects(body, effects);
+    for (const PlanStep* step = steps_->peek(); step != nullptr && step->time_s < until_s; step = steps_->peek()) {
+      const synth::EffectSet effects = find(static_cast<std::size_t>(step->body), step->effects);
+      if (effects != synthesiser.get_effects(step->body)) synthesiser.set_effects(step->body, effects);
+      steps_->next();
     }
   }
 
  private:
-  static bool is_of(const plan::Change& change, std::size_t body) { return static_cast<std::size_t>(change.body) == body; }
   synth::EffectSet find(std::size_t body, synth::EffectSet effects) const {
     const BodyCourse& course = (*courses_)[body];
     if (!course.is_played) return {};
@@ -116,8 +110,58 @@ class Changes {
 
   const Scene* scene_;
   const std::vector<BodyCourse>* courses_;
-  std::span<const plan::Change> changes_;
-  std::size_t next_ = 0;
+  std::vector<synth::EffectSet> first_, all_;  // per body
+  std::optional<config::Records<PlanStep>::Reader> steps_;
+};
+
+/// What comes out of the synthesiser on its way into the store: measured, and with its end held back until it is known whether it has to
+/// fade.
+class Outlet {
+ public:
+  Outlet(SoundStore& store, std::uint64_t frames, bool fades)
+      : store_(&store),
+        meter_(store.get_rate_hz(), store.get_channels()),
+        tail_begin_(fades ? frames - std::min<std::uint64_t>(frames, static_cast<std::uint64_t>(std::llround(kFadeS * store.get_rate_hz())))
+                          : frames) {}
+
+  /// The next frames, by channels.
+  void add(const std::vector<const float*>& channels, std::size_t count) {
+    frames_.clear();
+    for (std::size_t n = 0; n < count; ++n)
+      for (const float* channel : channels) frames_.push_back(channel[n]);
+    const auto before = static_cast<std::size_t>(std::min<std::uint64_t>(count, tail_begin_ - std::min(tail_begin_, taken_)));
+    const std::span<const float> all(frames_);
+    store(all.first(before * channels.size()));
+    const std::span<const float> rest = all.subspan(before * channels.size());
+    tail_.insert(tail_.end(), rest.begin(), rest.end());
+    taken_ += count;
+  }
+  void finish(Sound& sound) {
+    const auto peak = std::accumulate(tail_.begin(), tail_.end(), 0.0F, [](float most, float p) { return std::max(most, std::abs(p)); });
+    const std::size_t channels = store_->get_channels(), count = tail_.size() / channels;
+    if (peak > 0.0F && peak >= kFadeShare * std::max(meter_.get_peak_pa(), static_cast<double>(peak))) {
+      for (std::size_t i = 0; i < tail_.size(); ++i) {
+        const double c = std::cos(0.5 * std::numbers::pi * static_cast<double>(i / channels + 1) / static_cast<double>(count));
+        tail_[i] = i / channels + 1 == count ? 0.0F : static_cast<float>(tail_[i] * c * c);
+      }
+      sound.faded_s = static_cast<double>(count) / store_->get_rate_hz();
+    }
+    store(tail_);
+    sound.peak_pa = meter_.get_peak_pa();
+    sound.levels = meter_.calc_levels();
+    sound.frames = store_->get_frames();
+  }
+
+ private:
+  void store(std::span<const float> frames) {
+    meter_.add(frames);
+    store_->append(frames);
+  }
+
+  SoundStore* store_;
+  Meter meter_;
+  std::uint64_t tail_begin_ = 0, taken_ = 0;
+  std::vector<float> frames_, tail_;
 };
 
 /// Below which pressure at 1 m a body sleeps: where the planner is free to say so, what nobody hears.
@@ -137,8 +181,8 @@ double calc_reach_m(const Scene& scene, const Microphones& microphones, const Ve
 
 }  // namespace
 
-Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
-                 const RenderOptions& options) {
+Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
+                 SoundStore& store) {
   const double started = get_cpu_seconds();
   const Microphones microphones = make_microphones(scene);
   const std::vector<stream::Listener> walk = list_walk(microphones);
@@ -171,55 +215,58 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     fed[i] = {.number = static_cast<int>(i), .moves = !effects.is_empty() && !scene.bodies[i].spec.fixed, .lead_s = lead_s};
   }
   Feed feed(events, fed, walk);
+  std::vector<double> longest_m, longest_s;
+  for (const BodyCourse& course : courses) {
+    longest_m.push_back(std::min(course.reach_m + ears_reach_m, kFarthestHeardM));
+    longest_s.push_back(longest_m.back() / synth::kSoundSpeedMs);
+  }
+  const std::vector<int> waypoints = feed.count_waypoints(longest_s);
   synth::Synthesiser synthesiser({.rate_hz = rate_hz,
                                   .microphones_m = microphones.offset_m,
                                   .listener_m = base,
                                   .max_bodies = std::max(1, static_cast<int>(fed.size())),
                                   .max_strikes = kMostStrikes,
-                                  .max_waypoints = feed.count_waypoints(-1, 0.0),
+                                  .max_waypoints = waypoints.back(),
                                   .budget = calc_budget(scene.quality, rate_hz),
                                   .ground = make_ground(scene),
-                                  .ticks = options.measures ? &get_ticks : nullptr});
+                                  .ticks = options.measures ? &synth::get_cpu_ticks : nullptr});
   for (std::size_t i = 0; i < fed.size(); ++i) {
-    const double longest_m = std::min(courses[i].reach_m + ears_reach_m, kFarthestHeardM);
     synthesiser.add_body(body_models[i],
                          {.position_m = courses[i].first.position_m,
                           .rotation = courses[i].first.rotation,
                           .effects = changes.find_first(i),
                           .silence_pa = find_silence_pa(scene, i, options.plan),
                           .surface = {.roughness_m = scene.bodies[i].spec.roughness_m, .friction = scene.bodies[i].spec.friction},
-                          .longest_m = longest_m,
-                          .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs),
+                          .longest_m = longest_m[i],
+                          .max_waypoints = waypoints[i],
                           .isa = scene.quality.instructions,
                           .audits_energy = options.audits});
   }
 
   constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
-  const std::size_t samples = static_cast<std::size_t>(std::llround(scene.duration_s * rate_hz)) + kLatency;
-  const std::size_t channels = microphones.offset_m.size();
-  sound.pressure_pa.assign(channels, std::vector<double>(samples - kLatency));
+  const std::size_t samples = count_frames(scene.duration_s, options.rate_hz) + kLatency;
+  const std::size_t channels = sound.channels = microphones.offset_m.size();
+  Outlet outlet(store, samples - kLatency, options.fades_end);
+  std::vector<const float*> heard(channels);
   std::vector<std::array<float, kBlock>> blocks(channels);
   std::vector<float*> out;
   for (auto& block : blocks) out.push_back(block.data());
   const double began = get_cpu_seconds();
-  const auto first_tick = get_ticks();
-  const auto first_time = std::chrono::steady_clock::now();
+  const std::uint64_t asked_ns = synth::get_cpu_ticks_cost_ns();
   for (std::size_t start = 0; start < samples; start += kBlock) {
     const std::size_t count = std::min(kBlock, samples - start);
     changes.apply(static_cast<double>(start + kBlock) / rate_hz, synthesiser);
     feed.hand_on(static_cast<double>(start + kBlock) / rate_hz, synthesiser);
     synthesiser.process(out.data(), static_cast<int>(channels), static_cast<int>(count));
-    for (std::size_t c = 0; c < channels; ++c) {
-      for (std::size_t n = start < kLatency ? kLatency - start : 0; n < count; ++n)
-        sound.pressure_pa[c][start + n - kLatency] = static_cast<double>(blocks[c][n]);
-    }
+    const std::size_t skipped = std::min(count, start < kLatency ? kLatency - start : 0);
+    for (std::size_t c = 0; c < channels; ++c) heard[c] = blocks[c].data() + skipped;
+    outlet.add(heard, count - skipped);
     if (options.progress) options.progress(static_cast<double>(start + count) / static_cast<double>(samples));
   }
-  sound.seconds_playing_cpu = get_cpu_seconds() - began;
-  if (options.measures) {
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - first_time;
-    sound.seconds_per_tick = seconds.count() / std::max(1.0, static_cast<double>(get_ticks() - first_tick));
-  }
+  outlet.finish(sound);
+  sound.seconds_playing_cpu =
+      std::max(0.0, get_cpu_seconds() - began - 1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - asked_ns));
+  if (options.measures) sound.seconds_per_tick = 1e-9;
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   sound.strikes = counters.strikes;
   sound.refused = counters.refused + counters.faults + counters.overflows;
@@ -232,6 +279,8 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   sound.seconds_cpu = get_cpu_seconds() - started;
   return sound;
 }
+
+std::uint64_t count_frames(double duration_s, int rate_hz) { return static_cast<std::uint64_t>(std::llround(duration_s * rate_hz)); }
 
 double calc_budget(const Quality& quality, double rate_hz) {
   return quality.modes ? static_cast<double>(*quality.modes) * rate_hz : std::numeric_limits<double>::infinity();
@@ -253,29 +302,27 @@ synth::Surface make_ground(const Scene& scene) {
   return surface;
 }
 
-double calc_peak_pa(const Sound& sound) {
-  double peak = 0.0;
-  for (const auto& ear : sound.pressure_pa) {
-    for (const double p : ear) peak = std::max(peak, std::abs(p));
+Meter::Meter(int rate_hz, std::size_t channels) : channels_(channels), window_(static_cast<std::size_t>(std::max(1.0, kFastS * rate_hz))) {}
+
+void Meter::add(std::span<const float> frames) {
+  for (std::size_t i = 0; i < frames.size(); i += channels_) {
+    for (const float sample : frames.subspan(i, channels_)) {
+      const auto p = static_cast<double>(sample);
+      sum_ += p * p / static_cast<double>(channels_);
+      peak_pa_ = std::max(peak_pa_, std::abs(p));
+    }
+    if (++frames_ % window_ != 0) continue;
+    total_ += sum_;
+    loudest_ = std::max(loudest_, sum_);
+    sum_ = 0.0;
   }
-  return peak;
 }
 
-Levels calc_levels(const Sound& sound) {
-  const auto window = static_cast<std::size_t>(std::max(1.0, kFastS * sound.rate_hz));
-  const std::size_t samples = sound.pressure_pa[0].size();
-  double total = 0.0, loudest = 0.0;
-  for (std::size_t start = 0; start < samples; start += window) {
-    double sum = 0.0;
-    for (std::size_t n = start; n < std::min(samples, start + window); ++n) {
-      for (const auto& channel : sound.pressure_pa) sum += channel[n] * channel[n] / static_cast<double>(sound.pressure_pa.size());
-    }
-    total += sum;
-    loudest = std::max(loudest, sum);
-  }
+Levels Meter::calc_levels() const {
   const auto to_db = [](double mean_square) { return 10.0 * std::log10(mean_square / (kReferencePa * kReferencePa)); };
-  return {.mean_db = to_db(samples > 0 ? total / static_cast<double>(samples) : 0.0),
-          .loudest_db = to_db(loudest / static_cast<double>(std::min(window, std::max<std::size_t>(samples, 1))))};
+  const double total = total_ + sum_, loudest = std::max(loudest_, sum_);
+  return {.mean_db = to_db(frames_ > 0 ? total / static_cast<double>(frames_) : 0.0),
+          .loudest_db = to_db(loudest / static_cast<double>(std::min<std::uint64_t>(window_, std::max<std::uint64_t>(frames_, 1))))};
 }
 
 Gain calc_gain(const Output& output, double peak_pa) {

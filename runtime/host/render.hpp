@@ -7,19 +7,46 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/host/events.hpp"
 #include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
+#include "runtime/host/sound_store.hpp"
 #include "runtime/stream/events.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
 namespace carillon::host {
 
+/// Levels re 20 uPa, unweighted, the mean square of all channels: of the whole, and of the loudest 125 ms. Minus infinity for silence.
+struct Levels {
+  double mean_db = 0.0;
+  double loudest_db = 0.0;
+};
+
+/// Peak and levels of a sound that goes by.
+class Meter {
+ public:
+  Meter(int rate_hz, std::size_t channels);
+  /// Whole frames, channels interleaved [Pa].
+  void add(std::span<const float> frames);
+  /// Largest absolute pressure of all channels [Pa].
+  double get_peak_pa() const { return peak_pa_; }
+  Levels calc_levels() const;
+
+ private:
+  std::size_t channels_ = 0, window_ = 0;  // frames
+  std::uint64_t frames_ = 0;
+  double sum_ = 0.0, total_ = 0.0, loudest_ = 0.0, peak_pa_ = 0.0;  // sum_: of the window so far
+};
+
 /// What is heard, and how much work it was.
 struct Sound {
   int rate_hz = 0;
-  // Per channel (left and right ear, or microphones), all of the same length.
-  std::vector<std::vector<double>> pressure_pa = std::vector<std::vector<double>>(2);
+  std::size_t channels = 0;  // left and right ear, or microphones
+  std::uint64_t frames = 0;
+  double peak_pa = 0.0;
+  Levels levels;
+  double faded_s = 0.0;                                // of its end; 0: it is silent there, or the scene wants it as it is
   int modes = 0;                                       // of all bodies, below Nyquist
   std::vector<int> body_modes;                         // per body
   std::vector<double> body_peak_pa;                    // per body, at 1 m
@@ -39,13 +66,22 @@ struct RenderOptions {
   const Plan* plan = nullptr;              // whose changes the bodies follow; without, all bodies have the scene's effects
   bool measures = false;                   // what each effect of each body costs
   bool audits = false;                     // the energy of the modes
+  bool fades_end = false;                  // what still sounds at the end goes to zero within kFadeS
   std::function<void(double)> progress{};  // may be empty; called with the finished fraction
 };
 
-/// Renders round(duration * rate) samples. banks[i] belongs to scene.bodies[i]; body i of the events, which are in order of time, is the
-/// same. A body to which nothing happens gets no effects.
-Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, std::span<const stream::Event> events,
-                 const RenderOptions& options);
+/// The sound that is cut off fades within this time at its end, unless it has become this much softer than its peak: half a step of 16
+/// bits, -96 dB.
+inline constexpr double kFadeS = 0.01;
+inline constexpr double kFadeShare = 1.0 / 65536.0;
+
+/// Renders round(duration * rate) frames into `store`, which has the scene's channels and the rate. banks[i] belongs to scene.bodies[i];
+/// body i of the events (as Feed takes them) is the same. A body to which nothing happens gets no effects.
+Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
+                 SoundStore& store);
+
+/// Of a sound of that length.
+std::uint64_t count_frames(double duration_s, int rate_hz);
 
 /// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put.
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects);
@@ -55,16 +91,6 @@ double calc_budget(const Quality& quality, double rate_hz);
 
 /// The ground as those feel it who slide on it.
 synth::Surface make_ground(const Scene& scene);
-
-/// Largest absolute pressure of all channels [Pa].
-double calc_peak_pa(const Sound& sound);
-
-/// Levels re 20 uPa, unweighted, the mean square of all channels: of the whole, and of the loudest 125 ms. Minus infinity for silence.
-struct Levels {
-  double mean_db = 0.0;
-  double loudest_db = 0.0;
-};
-Levels calc_levels(const Sound& sound);
 
 /// The gain [full scale per Pa] that goes into the file. A given gain that would clip is reduced to the one of "auto".
 struct Gain {

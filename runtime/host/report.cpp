@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "runtime/config/document.hpp"
 #include "runtime/config/printable.hpp"
@@ -16,23 +17,77 @@ namespace carillon::host {
 namespace {
 
 constexpr double kPosesPerS = 200.0;
-constexpr std::size_t kMostChanges = 10000;
+constexpr std::size_t kPiece = 1 << 16;  // bytes that are handed on at once
 
 /// JSON has no infinity: silence has the level null.
 std::string make_level(double db) { return std::isfinite(db) ? fmt::format("{:.2f}", db) : "null"; }
 
-/// Every pose that lies at least 1 / 200 s after the one kept before it, and the last.
-std::vector<contact::Pose> find_kept_poses(const std::vector<contact::Pose>& poses) {
-  std::vector<contact::Pose> kept;
-  for (const contact::Pose& pose : poses) {
-    if (kept.empty() || pose.time_s - kept.back().time_s >= 1.0 / kPosesPerS - 1e-12) kept.push_back(pose);
-  }
-  if (!poses.empty() && kept.back().time_s < poses.back().time_s) {
-    if (kept.size() > 1) kept.pop_back();
-    kept.push_back(poses.back());
-  }
-  return kept;
+using Paths = config::RecordLists<contact::Pose>;
+
+/// Where each body has been. After an impact it is where it was before.
+Paths collect_paths(const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool) {
+  Paths paths(banks.size(), std::move(spool));
+  std::vector<std::optional<double>> last_s(banks.size());
+  events.for_each([&](const stream::Event& event) {
+    const auto* motion = std::get_if<stream::Motion>(&event);
+    if (motion == nullptr || motion->body < 0 || static_cast<std::size_t>(motion->body) >= banks.size()) return;
+    const auto body = static_cast<std::size_t>(motion->body);
+    if (last_s[body] && *last_s[body] >= motion->time_s) return;
+    last_s[body] = motion->time_s;
+    paths.append(body, contact::calc_pose(*motion, banks[body]->rigid.centre_m));
+  });
+  return paths;
 }
+
+/// Every pose that lies at least 1 / 200 s after the one kept before it, and the last, which takes the place of the one before.
+template <class Work>
+void for_kept_poses(const Paths& paths, std::size_t body, Work&& work) {
+  Paths::Reader reader(paths, body);
+  std::optional<contact::Pose> waiting, last;  // kept, yet the last may replace it; read
+  std::size_t kept = 0;
+  double kept_s = 0.0;
+  for (const contact::Pose* pose = reader.peek(); pose != nullptr; pose = reader.peek()) {
+    last = *pose;
+    reader.next();
+    if (kept > 0 && !(last->time_s - kept_s >= 1.0 / kPosesPerS - 1e-12)) continue;
+    if (waiting) work(*waiting);
+    waiting = last;
+    kept_s = last->time_s;
+    ++kept;
+  }
+  if (!last) return;
+  const bool is_kept = !(kept_s < last->time_s);
+  if (waiting && (is_kept || kept == 1)) work(*waiting);
+  if (!is_kept) work(*last);
+}
+
+/// Follows a path as time goes on.
+class PathCursor {
+ public:
+  PathCursor(const Paths& paths, std::size_t body) : reader_(paths, body) {
+    const contact::Pose* first = reader_.peek();
+    if (first == nullptr) return;
+    around_ = {*first};
+    reader_.next();
+  }
+  bool is_empty() const { return around_.empty(); }
+  /// As find_pose of the whole path, for times that hardly go back.
+  contact::Pose find(double time_s) {
+    while (around_.back().time_s <= time_s) {
+      const contact::Pose* next = reader_.peek();
+      if (next == nullptr) break;
+      if (around_.size() == 2 * kKept) around_.erase(around_.begin(), around_.begin() + kKept);
+      around_.push_back(*next);
+      reader_.next();
+    }
+    return find_pose(around_, time_s);
+  }
+
+ private:
+  static constexpr std::size_t kKept = 512;  // poses before the time asked for last; a second of physics
+  Paths::Reader reader_;
+  std::vector<contact::Pose> around_;
+};
 
 contact::Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse& impulse) {
   contact::Vec3 point{};
@@ -57,63 +112,74 @@ plan::MoreJson list_measured(const Sound& sound, std::size_t body, double durati
 
 }  // namespace
 
-std::string make_trajectory_json(const Scene& scene, const std::vector<const bank::Bank*>& banks, const contact::Simulation& simulation) {
+void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool,
+                      const std::function<void(std::string_view)>& sink) {
+  const Paths paths = collect_paths(banks, events, std::move(spool));
   std::string json = "{\n \"bodies\": [";
   auto out = std::back_inserter(json);
+  const auto hand_on = [&](std::size_t least) {
+    if (json.size() < least) return;
+    sink(json);
+    json.clear();
+  };
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const SceneBody& body = scene.bodies[i];
     fmt::format_to(out, "{}\n  {{\"name\": {}, \"bank\": {}, \"fixed\": {},\n   \"poses\": [", i == 0 ? "" : ",", config::quote(body.name),
                    config::quote(body.bank.string()), body.spec.fixed);
-    const std::vector<contact::Pose> poses =
-        i < simulation.poses.size() ? find_kept_poses(simulation.poses[i]) : std::vector<contact::Pose>{};
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      const contact::Pose& p = poses[k];
-      fmt::format_to(out, "{}\n    [{:.6f}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", k == 0 ? "" : ",", p.time_s,
+    bool first = true;
+    for_kept_poses(paths, i, [&](const contact::Pose& p) {
+      fmt::format_to(out, "{}\n    [{:.6f}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", first ? "" : ",", p.time_s,
                      p.position_m[0], p.position_m[1], p.position_m[2], p.rotation[0], p.rotation[1], p.rotation[2], p.rotation[3]);
-    }
+      first = false;
+      hand_on(kPiece);
+    });
     json += "\n   ]}";
   }
   fmt::format_to(out, "\n ],\n \"ground\": {{\"height_m\": {}}},\n \"up\": \"z\",\n \"impulses\": [",
                  scene.ground ? fmt::format("{:.9g}", scene.ground->height_m) : "null");
+  std::vector<PathCursor> cursors;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) cursors.emplace_back(paths, i);
   bool first = true;
-  for (const contact::Impulse& impulse : simulation.impulses) {
-    if (impulse.body < 0 || static_cast<std::size_t>(impulse.body) >= scene.bodies.size()) continue;
-    const auto i = static_cast<std::size_t>(impulse.body);
-    const contact::Pose pose = simulation.poses[i].empty() ? scene.bodies[i].spec.initial : find_pose(simulation.poses[i], impulse.time_s);
-    const contact::Vec3 x = calc_world_point(pose, find_contact_point(*banks[i], impulse));
-    const double size = std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]);
+  events.for_each([&](const stream::Event& event) {
+    const auto* impulse = std::get_if<stream::Impulse>(&event);
+    if (impulse == nullptr || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= scene.bodies.size()) return;
+    const auto i = static_cast<std::size_t>(impulse->body);
+    const contact::Pose pose = cursors[i].is_empty() ? scene.bodies[i].spec.initial : cursors[i].find(impulse->time_s);
+    const contact::Vec3 x = calc_world_point(pose, find_contact_point(*banks[i], *impulse));
+    const double size = std::hypot(impulse->impulse_n_s[0], impulse->impulse_n_s[1], impulse->impulse_n_s[2]);
     fmt::format_to(out,
                    "{}\n  {{\"time_s\": {:.9f}, \"body\": {}, \"other\": {}, \"world_m\": [{:.6g}, {:.6g}, {:.6g}], \"impulse_n_s\": "
                    "{:.6g}, \"duration_s\": {:.6g}}}",
-                   first ? "" : ",", impulse.time_s, impulse.body, impulse.other, x[0], x[1], x[2], size, impulse.duration_s);
+                   first ? "" : ",", impulse->time_s, impulse->body, impulse->other, x[0], x[1], x[2], size, impulse->duration_s);
     first = false;
-  }
+    hand_on(kPiece);
+  });
   json += "\n ]\n}\n";
-  return json;
+  hand_on(0);
 }
 
-std::string make_report_json(const Scene& scene, const contact::Simulation& simulation, const Sound& sound, const Plan& plan,
-                             const Figures& f) {
+std::string make_report_json(const Scene& scene, const Sound& sound, const Plan& plan, const Figures& f) {
   std::string json = "{\n";
   auto out = std::back_inserter(json);
   fmt::format_to(out, " \"scene\": {},\n \"duration_s\": {},\n \"sample_rate_hz\": {},\n \"samples\": {},\n \"channels\": {},\n",
-                 config::quote(scene.file.string()), scene.duration_s, sound.rate_hz, sound.pressure_pa[0].size(),
-                 sound.pressure_pa.size());
+                 config::quote(scene.file.string()), scene.duration_s, sound.rate_hz, sound.frames, sound.channels);
   fmt::format_to(
       out,
       " \"instructions\": \"{}\",\n \"bodies\": {},\n \"modes\": {},\n \"contacts\": {},\n \"impulses\": {},\n \"impulses_played\": {},\n "
       "\"impulses_refused\": {},\n \"resets\": {},\n",
-      synth::get_name(synth::get_kernels(scene.quality.instructions).isa), f.bodies, f.modes, f.contacts, simulation.impulses.size(),
+      synth::get_name(synth::get_kernels(scene.quality.instructions).isa), f.bodies, f.modes, f.tally.contacts, f.tally.impulses,
       sound.strikes, sound.refused, sound.resets);
   fmt::format_to(out,
                  " \"physics_steps\": {},\n \"physics_s\": {:.4f},\n \"physics_cpu_s\": {:.5f},\n \"sound_s\": {:.4f},\n \"sound_cpu_s\": "
                  "{:.5f},\n \"playing_cpu_s\": {:.6f},\n "
                  "\"real_time_factor\": {:.4f},\n",
-                 simulation.steps, f.physics_s, f.physics_cpu_s, f.sound_s, sound.seconds_cpu, sound.seconds_playing_cpu,
+                 f.physics_steps, f.physics_s, f.physics_cpu_s, f.sound_s, sound.seconds_cpu, sound.seconds_playing_cpu,
                  f.real_time_factor);
   fmt::format_to(
-      out, " \"peak_pa\": {:.6g},\n \"mean_db_spl\": {},\n \"loudest_db_spl\": {},\n \"gain_per_pa\": {:.6g},\n \"gain_reduced\": {},\n",
-      f.peak_pa, make_level(f.levels.mean_db), make_level(f.levels.loudest_db), f.gain.per_pa, f.gain.reduced);
+      out,
+      " \"peak_pa\": {:.6g},\n \"mean_db_spl\": {},\n \"loudest_db_spl\": {},\n \"gain_per_pa\": {:.6g},\n \"gain_reduced\": {},\n"
+      " \"faded_end_s\": {:.6g},\n",
+      sound.peak_pa, make_level(sound.levels.mean_db), make_level(sound.levels.loudest_db), f.gain.per_pa, f.gain.reduced, sound.faded_s);
   if (f.audit) {
     const contact::EnergyAudit& bodies = f.audit->bodies;
     fmt::format_to(out,
@@ -125,19 +191,13 @@ std::string make_report_json(const Scene& scene, const contact::Simulation& simu
   for (std::size_t i = 0; i < scene.warnings.size(); ++i) json += (i == 0 ? "" : ", ") + config::quote(config::printable(scene.warnings[i]));
   json += "],\n \"per_body\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    const auto played = std::count_if(simulation.impulses.begin(), simulation.impulses.end(),
-                                      [i](const contact::Impulse& impulse) { return impulse.body == static_cast<std::int32_t>(i); });
+    const std::int64_t played = i < f.tally.body_impulses.size() ? f.tally.body_impulses[i] : 0;
     fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   \"effects\": {}}}",
                    i == 0 ? "" : ",", config::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i],
                    plan::make_plan_json(plan.planner, plan.facts, static_cast<int>(i), list_measured(sound, i, scene.duration_s)));
   }
-  fmt::format_to(out, "\n ],\n \"changes\": {}\n}}\n", plan::make_changes_json(plan.changes, plan.facts, kMostChanges));
+  fmt::format_to(out, "\n ],\n \"changes\": {}\n}}\n", plan::make_changes_json(plan.changes, plan.facts, kMostReported));
   return json;
-}
-
-std::int64_t count_contacts(const contact::Simulation& simulation) {
-  return std::count_if(simulation.impulses.begin(), simulation.impulses.end(),
-                       [](const contact::Impulse& impulse) { return impulse.other < 0 || impulse.body < impulse.other; });
 }
 
 }  // namespace carillon::host

@@ -1,16 +1,21 @@
 // What a rendering says about itself, as JSON: the paths of the bodies for pictures, and the figures of the run.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "runtime/host/events.hpp"
 #include "runtime/host/render.hpp"
 
 namespace carillon::host {
 
-/// Paths (at most 200 poses a second), ground and impulses. Layout: docs/howto/scene-files.md.
-std::string make_trajectory_json(const Scene& scene, const std::vector<const bank::Bank*>& banks, const contact::Simulation& simulation);
+/// Paths (at most 200 poses a second), ground and impulses, in pieces, in order. Layout: docs/howto/scene-files.md. `spool` takes the
+/// paths meanwhile.
+void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool,
+                      const std::function<void(std::string_view)>& sink);
 
 /// Where energy came from nowhere, if anywhere.
 struct EnergyBooks {
@@ -22,20 +27,15 @@ struct EnergyBooks {
 struct Figures {
   std::size_t bodies = 0;
   int modes = 0;
-  std::int64_t contacts = 0;  // a contact between two bodies counts once
-  double physics_s = 0.0;     // wall clock
+  Tally tally;
+  std::int64_t physics_steps = 0;
+  double physics_s = 0.0;  // wall clock
   double physics_cpu_s = 0.0;
   double sound_s = 0.0;
-  double peak_pa = 0.0;
-  Levels levels;
   Gain gain;
   std::optional<EnergyBooks> audit;
   double real_time_factor = 0.0;  // (physics_s + sound_s) / duration: below 1 is faster than real time
 };
-std::string make_report_json(const Scene& scene, const contact::Simulation& simulation, const Sound& sound, const Plan& plan,
-                             const Figures& figures);
-
-/// Number of contacts among the impulses.
-std::int64_t count_contacts(const contact::Simulation& simulation);
+std::string make_report_json(const Scene& scene, const Sound& sound, const Plan& plan, const Figures& figures);
 
 }  // namespace carillon::host

@@ -300,6 +300,7 @@ Output parse_output(config::Object& object) {
   }
   output.peak_dbfs = read_within(object, "peak_dbfs", output.peak_dbfs, -120.0, 0.0);
   output.format = static_cast<SampleFormat>(read_name(object, "format", kSampleFormatNames, "pcm24"));
+  output.fade_end = object.boolean_or("fade_end", output.fade_end);
   object.finish();
   return output;
 }
@@ -366,10 +367,6 @@ Scene parse_scene(const config::Document& document) {
       scene.microphones_m.push_back(read_place(root, "microphones", row));
     }
   }
-  if (!fits_in_memory(scene)) {
-    root.fail("duration_s", fmt::format("{} s at {} Hz and {} channels need too much memory; give fewer or a lower \"sample_rate_hz\"",
-                                        scene.duration_s, scene.sample_rate_hz, count_channels(scene)));
-  }
   scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", kGainKindNames, "sphere"));
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
   if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality);
@@ -378,11 +375,6 @@ Scene parse_scene(const config::Document& document) {
 }
 
 std::size_t count_channels(const Scene& scene) { return scene.microphones_m.empty() ? 2 : scene.microphones_m.size(); }
-
-bool fits_in_memory(const Scene& scene) {
-  const double pairs = std::max(1.0, 0.5 * static_cast<double>(count_channels(scene)));
-  return scene.duration_s * scene.sample_rate_hz * pairs <= kMostSamples;
-}
 
 std::array<Vec3, 2> calc_ears(const Listener& listener) {
   // Left is up x facing. Who looks straight up or down keeps the left ear towards -x.

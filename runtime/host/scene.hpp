@@ -21,8 +21,6 @@ namespace carillon::host {
 
 using Vec3 = std::array<double, 3>;
 
-inline constexpr double kMostSamples = 2e8;  // duration times rate times pairs of channels; about 3 GB of intermediate results
-
 enum class SampleFormat { kPcm16, kPcm24, kPcm32, kFloat };
 /// The names of --format and output.format, in the order of SampleFormat.
 inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm32", "float"};
@@ -63,6 +61,7 @@ struct Output {
   std::optional<double> gain_per_pa;  // full scale per pascal; nothing is "auto": the peak comes to peak_dbfs
   double peak_dbfs = -1.0;
   SampleFormat format = SampleFormat::kPcm24;
+  bool fade_end = true;  // what still sounds at the end fades within its last 10 ms
 };
 
 /// The names of quality.instructions, in the order of synth::Isa.
@@ -104,9 +103,6 @@ Scene parse_scene(const config::Document& document);
 
 /// Channels of the sound: microphones, or two ears.
 std::size_t count_channels(const Scene& scene);
-
-/// False when duration, rate and channels ask for more memory than kMostSamples stands for.
-bool fits_in_memory(const Scene& scene);
 
 /// The places of the left and the right ear at the beginning: the line between them is level when the listener does not look straight up or
 /// down.

@@ -1,14 +1,23 @@
 // WAV files.
 #pragma once
 
+#include <functional>
 #include <string>
+#include <string_view>
 
-#include "runtime/host/render.hpp"
+#include "runtime/host/scene.hpp"
+#include "runtime/host/sound_store.hpp"
 
 namespace carillon::host {
 
-/// The bytes of a WAV file, a channel for each of the sound: pressure times `gain_per_pa`, full scale 1. Throws SystemError when libsndfile
-/// refuses.
-std::string make_wav(const Sound& sound, double gain_per_pa, SampleFormat format);
+/// Bytes of the file for so many frames. Above 4 GiB it is an RF64 (EBU Tech 3306), which is what a WAV file is called that long.
+std::uint64_t calc_wav_bytes(std::size_t channels, SampleFormat format, std::uint64_t frames);
+
+/// All that stands before the samples. Lengths are in it, so that the file can be written from front to back.
+std::string make_wav_header(int rate_hz, std::size_t channels, SampleFormat format, std::uint64_t frames);
+
+/// A WAV file in pieces, in order: a channel for each of the sound, pressure times `gain_per_pa`, full scale 1. Throws SystemError when
+/// libsndfile refuses, and what `sink` throws.
+void write_wav(const SoundStore& sound, double gain_per_pa, SampleFormat format, const std::function<void(std::string_view)>& sink);
 
 }  // namespace carillon::host

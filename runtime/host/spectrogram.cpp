@@ -1,4 +1,4 @@
-// Method:     Hann-windowed Fourier transforms, mean square of both ears, scaled so that a steady tone shows its level; colour by level.
+// Method:     Hann-windowed Fourier transforms, mean square of all channels, scaled so that a steady tone shows its level; colour by level.
 // Source:     Harris 1978 (windows); the colour map is "magma" of matplotlib (van der Walt & Smith 2015, CC0), perceptually uniform, by
 // nine of its points. Deviations: none.
 #include "runtime/host/spectrogram.hpp"
@@ -164,30 +164,50 @@ void draw_color_bar(cairo_t* cr, const SpectrogramLayout& at, double top_db) {
   draw_upright_text(cr, x + width + 80, at.top + at.plot_height / 2, "Level (dB re 20 µPa)");
 }
 
-/// Pressure over time: the span from the lowest to the highest sample of every column, both ears together.
-void draw_pressure(cairo_t* cr, const SpectrogramLayout& at, const Sound& sound, double peak_pa) {
+/// Pressure over time, all channels together: the span from the lowest to the highest sample of every column.
+struct Spans {
+  explicit Spans(std::size_t columns) : low(columns, 0.0), high(columns, 0.0) {}
+  std::vector<double> low, high;
+  double peak_pa = 0.0;
+};
+
+Spans find_spans(const SoundStore& sound, std::size_t columns) {
+  Spans spans(columns);
+  const std::uint64_t samples = sound.get_frames();
+  const std::size_t channels = sound.get_channels();
+  const auto find_first = [&](std::size_t x) { return samples * x / columns; };
+  std::size_t begin = 0;  // the first column that may still get samples
+  sound.for_each_piece([&](std::uint64_t first, std::span<const float> frames) {
+    const std::uint64_t end = first + frames.size() / channels;
+    while (begin < columns && std::max(find_first(begin) + 1, find_first(begin + 1)) <= first) ++begin;
+    for (std::size_t x = begin; x < columns && find_first(x) < end; ++x) {
+      const std::uint64_t from = std::max(find_first(x), first), until = std::min(end, std::max(find_first(x) + 1, find_first(x + 1)));
+      for (std::size_t i = static_cast<std::size_t>(from - first) * channels; from < until && i < (until - first) * channels; ++i) {
+        const auto p = static_cast<double>(frames[i]);
+        spans.low[x] = std::min(spans.low[x], p);
+        spans.high[x] = std::max(spans.high[x], p);
+      }
+    }
+  });
+  for (std::size_t x = 0; x < columns; ++x) spans.peak_pa = std::max({spans.peak_pa, spans.high[x], -spans.low[x]});
+  return spans;
+}
+
+void draw_pressure(cairo_t* cr, const SpectrogramLayout& at, const Spans& spans) {
   const double top = 60, height = at.top - top - 16, middle = top + height / 2;
-  const std::size_t samples = sound.pressure_pa[0].size();
-  const double scale = peak_pa > 0.0 ? (height / 2 - 3) / peak_pa : 0.0;
+  const double scale = spans.peak_pa > 0.0 ? (height / 2 - 3) / spans.peak_pa : 0.0;
   cairo_set_line_width(cr, 1.0);
   cairo_set_source_rgb(cr, 0.32, 0.07, 0.48);
   for (int x = 0; x < at.plot_width; ++x) {
-    const std::size_t first = samples * static_cast<std::size_t>(x) / static_cast<std::size_t>(at.plot_width);
-    const std::size_t last = std::max(first + 1, samples * (static_cast<std::size_t>(x) + 1) / static_cast<std::size_t>(at.plot_width));
-    double low = 0.0, high = 0.0;
-    for (const auto& ear : sound.pressure_pa) {
-      for (std::size_t n = first; n < std::min(last, samples); ++n) {
-        low = std::min(low, ear[n]);
-        high = std::max(high, ear[n]);
-      }
-    }
-    draw_line(cr, at.left + x + 0.5, middle - high * scale - 0.5, at.left + x + 0.5, middle - low * scale + 0.5);
+    const auto column = static_cast<std::size_t>(x);
+    draw_line(cr, at.left + x + 0.5, middle - spans.high[column] * scale - 0.5, at.left + x + 0.5,
+              middle - spans.low[column] * scale + 0.5);
   }
   cairo_set_source_rgb(cr, 0.15, 0.15, 0.15);
   draw_frame(cr, at.left, top, at.plot_width, height);
   cairo_set_font_size(cr, 15);
-  const Label peak = make_pressure_label(peak_pa);
-  if (peak_pa > 0.0) {
+  const Label peak = make_pressure_label(spans.peak_pa);
+  if (spans.peak_pa > 0.0) {
     draw_text(cr, at.left - 8, top + 14, peak.text, Anchor::kRight);
     draw_text(cr, at.left - 8, top + height, "−" + peak.text, Anchor::kRight);
   }
@@ -201,15 +221,17 @@ cairo_status_t append_bytes(void* closure, const unsigned char* data, unsigned i
 
 }  // namespace
 
-ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frames) {
-  const std::size_t samples = sound.pressure_pa[0].size();
+ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t frames) {
+  const auto samples = static_cast<std::int64_t>(sound.get_frames());
+  const std::size_t channels = sound.get_channels();
+  const int rate_hz = sound.get_rate_hz();
   ShortTimeSpectrum spectrum;
   // About 23 Hz to a bin: the modes of a bowl stand apart and impacts stay sharp.
   spectrum.window = 256;
-  while (spectrum.window < 16384 && spectrum.window * 23.5 < sound.rate_hz) spectrum.window *= 2;
+  while (spectrum.window < 16384 && spectrum.window * 23.5 < rate_hz) spectrum.window *= 2;
   const int window = spectrum.window;
-  spectrum.bin_hz = static_cast<double>(sound.rate_hz) / window;
-  spectrum.duration_s = static_cast<double>(std::max<std::size_t>(samples, 1)) / sound.rate_hz;
+  spectrum.bin_hz = static_cast<double>(rate_hz) / window;
+  spectrum.duration_s = static_cast<double>(std::max<std::int64_t>(samples, 1)) / rate_hz;
   spectrum.frames = frames;
   spectrum.bins = static_cast<std::size_t>(window) / 2 + 1;
   spectrum.level_db.assign(frames * spectrum.bins, kFloorDb);
@@ -221,6 +243,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frame
   const int parts = std::max(1, static_cast<int>(std::ceil(hop / (0.5 * window))));
   Eigen::FFT<double> fft;
   std::vector<double> piece(static_cast<std::size_t>(window));
+  std::vector<float> heard;  // of one window, all channels
   std::vector<std::complex<double>> transform;
   std::vector<double> power(spectrum.bins);
   for (std::size_t frame = 0; frame < frames; ++frame) {
@@ -228,18 +251,19 @@ ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frame
     for (int part = 0; part < parts; ++part) {
       const double centre = (static_cast<double>(frame) + (part + 0.5) / parts) * hop;
       const auto first = static_cast<std::int64_t>(std::floor(centre)) - window / 2;
-      for (const auto& ear : sound.pressure_pa) {
-        for (int i = 0; i < window; ++i) {
-          const std::int64_t n = first + i;
-          piece[i] = n >= 0 && n < static_cast<std::int64_t>(samples) ? hann[i] * ear[static_cast<std::size_t>(n)] : 0.0;
-        }
+      const std::int64_t from = std::clamp<std::int64_t>(first, 0, samples), until = std::clamp<std::int64_t>(first + window, 0, samples);
+      heard.assign(static_cast<std::size_t>(window) * channels, 0.0F);
+      sound.read(static_cast<std::uint64_t>(from), std::span(heard).subspan(static_cast<std::size_t>(from - first) * channels,
+                                                                            static_cast<std::size_t>(until - from) * channels));
+      for (std::size_t c = 0; c < channels; ++c) {
+        for (std::size_t i = 0; i < hann.size(); ++i) piece[i] = hann[i] * static_cast<double>(heard[i * channels + c]);
         fft.fwd(transform, piece);
         for (std::size_t bin = 0; bin < spectrum.bins; ++bin) power[bin] += std::norm(transform[bin]);
       }
     }
     for (std::size_t bin = 0; bin < spectrum.bins; ++bin) {
       // A tone of amplitude A has |X| = A total / 2 and the mean square A^2 / 2.
-      const double mean_square = 2.0 * power[bin] / (total * total) / (2.0 * parts);
+      const double mean_square = 2.0 * power[bin] / (total * total) / (static_cast<double>(channels) * parts);
       const double level = 10.0 * std::log10(mean_square / (kReferencePa * kReferencePa));
       spectrum.level_db[frame * spectrum.bins + bin] = std::max(level, kFloorDb);
     }
@@ -247,7 +271,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frame
   return spectrum;
 }
 
-std::string make_spectrogram_png(const Sound& sound, const std::string& title) {
+std::string make_spectrogram_png(const SoundStore& sound, const std::string& title) {
   const SpectrogramLayout at;
   const ShortTimeSpectrum spectrum = calc_short_time_spectrum(sound, static_cast<std::size_t>(at.plot_width));
   const double loudest = *std::max_element(spectrum.level_db.begin(), spectrum.level_db.end());
@@ -261,9 +285,9 @@ std::string make_spectrogram_png(const Sound& sound, const std::string& title) {
   cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
   cairo_set_line_width(cr, 1.0);
   draw_spectrum(cr, at, spectrum, top_db);
-  draw_axes(cr, at, spectrum.duration_s, 0.5 * sound.rate_hz);
+  draw_axes(cr, at, spectrum.duration_s, 0.5 * sound.get_rate_hz());
   draw_color_bar(cr, at, top_db);
-  draw_pressure(cr, at, sound, calc_peak_pa(sound));
+  draw_pressure(cr, at, find_spans(sound, static_cast<std::size_t>(at.plot_width)));
   cairo_set_font_size(cr, 21);
   draw_text(cr, at.left, 40, title, Anchor::kLeft);
   cairo_surface_flush(image.get());

@@ -5,11 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "runtime/host/render.hpp"
+#include "runtime/host/sound_store.hpp"
 
 namespace carillon::host {
 
-/// Short-time spectrum. level_db is (frames, bins) row-major: the level re 20 uPa of a steady tone in that bin, mean square of both ears.
+/// Short-time spectrum. level_db is (frames, bins) row-major: the level re 20 uPa of a steady tone in that bin, mean square of all
+/// channels.
 struct ShortTimeSpectrum {
   int window = 0;       // samples of a Hann window
   double bin_hz = 0.0;  // width of a bin
@@ -20,8 +21,9 @@ struct ShortTimeSpectrum {
 };
 inline constexpr double kFloorDb = -120.0;  // what silence counts as
 
-/// `frames` spectra spread evenly over the sound; where they lie further apart than half a window, the ones between are averaged in.
-ShortTimeSpectrum calc_short_time_spectrum(const Sound& sound, std::size_t frames);
+/// `frames` spectra spread evenly over the sound, of which a window at a time is read; where they lie further apart than half a window, the
+/// ones between are averaged in.
+ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t frames);
 
 /// Where the picture of the spectrum lies in the image, in pixels; frequency runs logarithmically, as it is heard, from lowest_hz at the
 /// bottom to the Nyquist frequency at the top.
@@ -33,6 +35,6 @@ struct SpectrogramLayout {
 
 /// Draws the spectrogram with its axes (s, Hz), a colour bar (dB re 20 uPa) and the pressure over time above it; returns the bytes of a PNG
 /// file. Throws SystemError when there is no memory for it.
-std::string make_spectrogram_png(const Sound& sound, const std::string& title);
+std::string make_spectrogram_png(const SoundStore& sound, const std::string& title);
 
 }  // namespace carillon::host

@@ -2,7 +2,8 @@
 //             volume. U_lm = (1 / a^2) sum over triangles of (phi . n) A Y_lm, phi the mean of its corners; a sphere that moves with
 //             U_lm Y_lm sends the far pressure rho0 c0 U_lm Y_lm / (k |h_l'(ka)| r), and different (l, m) are orthogonal over directions,
 //             so that g^2 = (rho0 c0)^2 / 4 pi  sum_l U_l^2 / (k |h_l'(ka)|)^2 with U_l^2 = sum_m U_lm^2. What Parseval's sum leaves of
-//             (phi . n)^2 goes to the next order. All weights of a vertex are added up before the modes are looked at.
+//             (phi . n)^2 goes to the next order. All modes are summed at once, a block of
+//             triangles as a product of matrices.
 // Source:     Morse & Ingard, Theoretical Acoustics (1968), 7.2; Pierce, Acoustics (1981), 4.1-4.2.
 // Deviations: exact for spheres; any other body radiates as if its surface lay on one. The monopole is the true flow of volume, for every
 //             body, and so is the level of what it sends at wavelengths long against it.
@@ -16,6 +17,7 @@
 #include <numbers>
 
 #include "runtime/bank/surface.hpp"
+#include "runtime/radiation/flow.hpp"
 
 namespace carillon::radiation {
 namespace {
@@ -106,62 +108,69 @@ Skin make_skin(const bank::Bank& bank) {
   return skin;
 }
 
-/// Weight of the motion of each vertex in every U_lm: (V) arrays of (3, kHarmonics), zero for vertices inside the skin.
-using Weights = std::array<std::array<double, kHarmonics>, 3>;
-
-std::vector<Weights> calc_weights(const bank::Bank& bank, const Skin& skin) {
-  std::vector<Weights> weights(bank.vertex_count());
-  for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
-    Vec3 direction{};
-    for (int k = 0; k < 3; ++k) {
-      for (const std::int32_t v : skin.triangles[t]) direction[k] += bank.vertices_m[v][k] / 3.0;
-      direction[k] -= skin.centre_m[k];
-    }
-    const double length = std::sqrt(calc_dot(direction, direction));
-    for (double& x : direction) x = length > 0.0 ? x / length : 0.0;
-    const std::array<double, kHarmonics> harmonics = calc_harmonics(direction);
-    for (const std::int32_t v : skin.triangles[t]) {
-      for (int k = 0; k < 3; ++k) {
-        const double share = skin.normals_m2[t][k] / (3.0 * skin.radius_m * skin.radius_m);
-        for (std::size_t i = 0; i < kHarmonics; ++i) weights[v][k][i] += share * harmonics[i];
-      }
-    }
-  }
-  return weights;
+AddFlow find_add_flow() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) return add_flow_avx512;
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return add_flow_avx2;
+#endif
+  return add_flow_plain;
 }
 
 /// What one mode sends out in each order: U_l^2 summed over m, and the rest.
 using Power = std::array<double, kOrders + 1>;
 
 std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
-  const auto weights = calc_weights(bank, skin);
-  const std::size_t modes = bank.mode_count();
-  std::vector<std::array<double, kHarmonics>> flow(modes);
-  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
-    const auto& [x, y, z] = weights[v];
-    for (std::size_t m = 0; m < modes; ++m) {
-      const Vec3 phi = bank.shape_at(v, m);
-      for (std::size_t i = 0; i < kHarmonics; ++i) flow[m][i] += phi[0] * x[i] + phi[1] * y[i] + phi[2] * z[i];
+  static_assert(kHarmonics <= kFlowColumns);
+  const AddFlow add_flow = find_add_flow();
+  const std::size_t modes = bank.mode_count(), rows = (modes + kFlowRows - 1) / kFlowRows * kFlowRows;
+  const double per_area = 1.0 / (skin.radius_m * skin.radius_m);
+  std::vector<double> flow(rows * kFlowColumns), squares(modes);  // in integer steps of the shapes
+  std::vector<float> through(kFlowBlock * rows), harmonic(kFlowBlock * kFlowColumns), block_squares(modes);
+  std::vector<std::int32_t> motion(3 * modes);  // of the three corners together
+  for (std::size_t first = 0; first < skin.triangles.size(); first += kFlowBlock) {
+    std::fill(through.begin(), through.end(), 0.0F);
+    std::fill(harmonic.begin(), harmonic.end(), 0.0F);
+    std::fill(block_squares.begin(), block_squares.end(), 0.0F);
+    for (std::size_t t = first; t < std::min(first + kFlowBlock, skin.triangles.size()); ++t) {
+      const bank::Triangle& corners = skin.triangles[t];
+      const Vec3& normal = skin.normals_m2[t];
+      const double area = std::sqrt(calc_dot(normal, normal));
+      if (!(area > 0.0)) continue;
+      Vec3 direction{};
+      for (int k = 0; k < 3; ++k) {
+        for (const std::int32_t v : corners) direction[k] += bank.vertices_m[v][k] / 3.0;
+        direction[k] -= skin.centre_m[k];
+      }
+      const double length = std::sqrt(calc_dot(direction, direction));
+      for (double& x : direction) x = length > 0.0 ? x / length : 0.0;
+      const std::array<double, kHarmonics> harmonics = calc_harmonics(direction);
+      std::copy(harmonics.begin(), harmonics.end(), harmonic.begin() + static_cast<std::ptrdiff_t>((t - first) * kFlowColumns));
+      const std::int16_t* a = &bank.shape[static_cast<std::size_t>(corners[0]) * modes * 3];
+      const std::int16_t* b = &bank.shape[static_cast<std::size_t>(corners[1]) * modes * 3];
+      const std::int16_t* c = &bank.shape[static_cast<std::size_t>(corners[2]) * modes * 3];
+      for (std::size_t i = 0; i < motion.size(); ++i) motion[i] = a[i] + b[i] + c[i];
+      std::array<float, 3> share{};
+      for (int k = 0; k < 3; ++k) share[k] = static_cast<float>(normal[k] / 3.0 * per_area);
+      const auto per_share = static_cast<float>(1.0 / (area * per_area));
+      float* row = &through[(t - first) * rows];
+      for (std::size_t m = 0; m < modes; ++m) {
+        row[m] = share[0] * static_cast<float>(motion[3 * m]) + share[1] * static_cast<float>(motion[3 * m + 1]) +
+                 share[2] * static_cast<float>(motion[3 * m + 2]);
+      }
+      for (std::size_t m = 0; m < modes; ++m) block_squares[m] += row[m] * row[m] * per_share;
     }
+    add_flow(through.data(), harmonic.data(), rows, flow.data());
+    for (std::size_t m = 0; m < modes; ++m) squares[m] += static_cast<double>(block_squares[m]);
   }
   std::vector<Power> powers(modes);
-  for (std::size_t t = 0; t < skin.triangles.size(); ++t) {
-    const Vec3& normal = skin.normals_m2[t];
-    const double area = std::sqrt(calc_dot(normal, normal));
-    if (!(area > 0.0)) continue;
-    for (std::size_t m = 0; m < modes; ++m) {
-      double through = 0.0;
-      for (const std::int32_t v : skin.triangles[t]) through += calc_dot(bank.shape_at(v, m), normal) / 3.0;
-      powers[m][kOrders] += through * through / (area * skin.radius_m * skin.radius_m);
-    }
-  }
   for (std::size_t m = 0; m < modes; ++m) {
     double told_apart = 0.0;
     for (std::size_t l = 0; l < kOrders; ++l) {
-      for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) powers[m][l] += flow[m][i] * flow[m][i];
+      for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) powers[m][l] += flow[m * kFlowColumns + i] * flow[m * kFlowColumns + i];
       told_apart += powers[m][l];
     }
-    powers[m][kOrders] = std::max(0.0, powers[m][kOrders] - told_apart);
+    powers[m][kOrders] = std::max(0.0, squares[m] - told_apart);
+    for (double& power : powers[m]) power *= bank.shape_scale[m] * bank.shape_scale[m];
   }
   return powers;
 }

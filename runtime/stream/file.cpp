@@ -21,11 +21,12 @@
 namespace carillon::stream {
 namespace {
 
-constexpr std::uint64_t kMostBytes = 1u << 30;
-constexpr double kMostBack = 1.0;           // s
-constexpr double kLongestPulse = 10.0;      // s
-constexpr double kLargest = 1e9;            // of any other amount, in SI units: what is more is a mistake, and would overflow
-constexpr long long kMostBodies = 1 << 20;  // more than any scene holds
+constexpr std::size_t kLongestLine = 256u << 20;  // more than that of the most bodies
+constexpr std::size_t kPiece = 1u << 18;          // of a file, read at once
+constexpr double kMostBack = 1.0;                 // s
+constexpr double kLongestPulse = 10.0;            // s
+constexpr double kLargest = 1e9;                  // of any other amount, in SI units: what is more is a mistake, and would overflow
+constexpr long long kMostBodies = 1 << 20;        // more than any scene holds
 constexpr long long kInt32 = std::numeric_limits<std::int32_t>::max();
 constexpr long long kInt64 = std::numeric_limits<std::int64_t>::max();
 const std::vector<std::string> kShapeNames{"hertz", "gaussian"};     // in the order of PulseShape
@@ -235,10 +236,10 @@ bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b) {
   return true;
 }
 
-std::string format_recording(const Recording& recording) {
-  std::string text = fmt::format(R"({{"carillon_contacts": 1, "events": {}, "bodies": [)", recording.events.size());
-  for (std::size_t i = 0; i < recording.bodies.size(); ++i) {
-    const RecordedBody& body = recording.bodies[i];
+std::string format_header(const std::vector<RecordedBody>& bodies, std::uint64_t events) {
+  std::string text = fmt::format(R"({{"carillon_contacts": 1, "events": {}, "bodies": [)", events);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const RecordedBody& body = bodies[i];
     fmt::format_to(std::back_inserter(text), R"({}{{"name": {}, "triangles": {})", i == 0 ? "" : ", ", config::quote(body.name),
                    body.triangles);
     if (body.surface) {
@@ -247,53 +248,115 @@ std::string format_recording(const Recording& recording) {
     }
     text += '}';
   }
-  text += "]}\n";
-  for (const Event& event : recording.events) {
-    std::visit([&](const auto& e) { write(std::back_inserter(text), e); }, event);
-    text += '\n';
-  }
+  return text + "]}\n";
+}
+
+void append_line(std::string& text, const Event& event) {
+  std::visit([&](const auto& e) { write(std::back_inserter(text), e); }, event);
+  text += '\n';
+}
+
+std::string format_recording(const Recording& recording) {
+  std::string text = format_header(recording.bodies, recording.events.size());
+  for (const Event& event : recording.events) append_line(text, event);
   return text;
 }
 
+namespace {
+
+/// A contacts file, line by line.
+class Lines {
+ public:
+  Lines(std::filesystem::path file, const std::function<void(const Event&)>& sink,
+        const std::function<void(const std::vector<RecordedBody>&)>& begin)
+      : file_(std::move(file)), sink_(sink), begin_(begin) {}
+
+  void take(std::string_view line) {
+    ++number_;
+    if (line.find_first_not_of(" \t\r") == std::string_view::npos) return;
+    const config::Object object = config::parse_document(line, file_, number_).root();
+    if (!has_header_) {
+      announced_ = parse_header(object, bodies_);
+      has_header_ = true;
+      if (begin_) begin_(bodies_);
+      return;
+    }
+    const Event event = parse_event(object, bodies_);
+    const double time = get_time_s(event);
+    if (time < latest_ - kMostBack) {
+      throw InputError(
+          fmt::format("{}:{}: time goes back from {:g} s to {:g} s; put the lines in order", file_.string(), number_, latest_, time));
+    }
+    latest_ = std::max(latest_, time);
+    ++count_;
+    sink_(event);
+  }
+
+  std::vector<RecordedBody> finish() {
+    if (!has_header_) throw InputError(fmt::format("{}:1: the file is empty; it has to begin with the line of its bodies", file_.string()));
+    if (announced_ && *announced_ != count_) {
+      throw InputError(
+          fmt::format("{}:{}: the first line says {} events and there are {}; a part of the file is missing, or its \"events\" has "
+                      "to be changed or left out",
+                      file_.string(), number_, *announced_, count_));
+    }
+    return std::move(bodies_);
+  }
+
+ private:
+  std::filesystem::path file_;
+  const std::function<void(const Event&)>& sink_;
+  const std::function<void(const std::vector<RecordedBody>&)>& begin_;
+  std::vector<RecordedBody> bodies_;
+  std::optional<long long> announced_;
+  long long count_ = 0;
+  bool has_header_ = false;
+  int number_ = 0;
+  double latest_ = -std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
 Recording parse_recording(std::string_view text, const std::filesystem::path& file) {
   Recording recording;
-  std::optional<long long> count;
-  bool has_header = false;
-  int number = 0;
-  double latest = -std::numeric_limits<double>::infinity();
+  const std::function<void(const Event&)> sink = [&](const Event& event) { recording.events.push_back(event); };
+  const std::function<void(const std::vector<RecordedBody>&)> none;
+  Lines lines(file, sink, none);
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = text.substr(0, end);
+    lines.take(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
-    ++number;
-    if (line.find_first_not_of(" \t\r") == std::string_view::npos) continue;
-    const config::Object object = config::parse_document(line, file, number).root();
-    if (!has_header) {
-      count = parse_header(object, recording.bodies);
-      has_header = true;
-      continue;
-    }
-    const Event event = parse_event(object, recording.bodies);
-    const double time = get_time_s(event);
-    if (time < latest - kMostBack) {
-      throw InputError(
-          fmt::format("{}:{}: time goes back from {:g} s to {:g} s; put the lines in order", file.string(), number, latest, time));
-    }
-    latest = std::max(latest, time);
-    recording.events.push_back(event);
   }
-  if (!has_header) throw InputError(fmt::format("{}:1: the file is empty; it has to begin with the line of its bodies", file.string()));
-  if (count && *count != static_cast<long long>(recording.events.size())) {
-    throw InputError(
-        fmt::format("{}:{}: the first line says {} events and there are {}; a part of the file is missing, or its \"events\" has "
-                    "to be changed or left out",
-                    file.string(), number, *count, recording.events.size()));
-  }
+  recording.bodies = lines.finish();
   return recording;
 }
 
-Recording read_recording(const std::filesystem::path& file) {
-  return parse_recording(config::read_file(file, "contacts file", kMostBytes), file);
+std::vector<RecordedBody> read_recording(const std::filesystem::path& file, const std::function<void(const Event&)>& sink,
+                                         const std::function<void(const std::vector<RecordedBody>&)>& begin) {
+  Lines lines(file, sink, begin);
+  std::string line;
+  config::read_pieces(file, "contacts file", kPiece, [&](std::string_view piece) {
+    while (!piece.empty()) {
+      const std::size_t end = piece.find('\n');
+      if (line.size() + std::min(end, piece.size()) > kLongestLine) {
+        throw InputError(fmt::format("{}: a line of more than {} bytes; this is no contacts file", file.string(), kLongestLine));
+      }
+      if (end == std::string_view::npos) {
+        line += piece;
+        return;
+      }
+      if (line.empty()) {
+        lines.take(piece.substr(0, end));
+      } else {
+        line += piece.substr(0, end);
+        lines.take(line);
+        line.clear();
+      }
+      piece.remove_prefix(end + 1);
+    }
+  });
+  if (!line.empty()) lines.take(line);
+  return lines.finish();
 }
 
 }  // namespace carillon::stream

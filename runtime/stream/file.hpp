@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,6 +34,10 @@ struct Recording {
   std::vector<Event> events;
 };
 
+/// The first line of a contacts file of so many events, and the line of one event, both with their end of line.
+std::string format_header(const std::vector<RecordedBody>& bodies, std::uint64_t events);
+void append_line(std::string& text, const Event& event);
+
 /// The text of a contacts file. Every number is read back as the same bits. The events have no fault (find_fault).
 std::string format_recording(const Recording& recording);
 
@@ -41,7 +46,9 @@ std::string format_recording(const Recording& recording);
 /// refuses, time that goes back by more than a second, fewer or more events than the first line says.
 Recording parse_recording(std::string_view text, const std::filesystem::path& file);
 
-/// The same from a file of at most 1 GiB.
-Recording read_recording(const std::filesystem::path& file);
+/// The same from a file of any length, event by event in the order of the file: memory is that of one line. Returns the bodies, which
+/// `begin` (may be empty) is given before the first event.
+std::vector<RecordedBody> read_recording(const std::filesystem::path& file, const std::function<void(const Event&)>& sink,
+                                         const std::function<void(const std::vector<RecordedBody>&)>& begin = {});
 
 }  // namespace carillon::stream

@@ -196,12 +196,24 @@ void Model::add_damped_modes(std::vector<Mode> modes) {
 void Model::copy_shapes(const bank::Bank& bank) {
   columns_ = sound_.size() * kGroup + damped_.size();
   shape_.assign(bank.vertex_count() * 3 * columns_, 0);
+  std::vector<std::uint32_t> first, column;  // of each mode: its place in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {
-    const auto mode = static_cast<std::size_t>(modes_[i].bank_mode);
-    const std::size_t column = i < static_cast<std::size_t>(ringing_) ? i : sound_.size() * kGroup + i - static_cast<std::size_t>(ringing_);
-    for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) {
-      const std::int16_t* from = &bank.shape[(vertex * bank.mode_count() + mode) * 3];
-      for (std::size_t axis = 0; axis < 3; ++axis) shape_[(vertex * 3 + axis) * columns_ + column] = from[axis];
+    first.push_back(3 * static_cast<std::uint32_t>(modes_[i].bank_mode));
+    column.push_back(static_cast<std::uint32_t>(
+        i < static_cast<std::size_t>(ringing_) ? i : sound_.size() * kGroup + i - static_cast<std::size_t>(ringing_)));
+  }
+  largest_.assign(sound_.size() * kGroup, 0.0F);
+  for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) {
+    const std::int16_t* from = &bank.shape[vertex * bank.mode_count() * 3];
+    std::int16_t *x = &shape_[vertex * 3 * columns_], *y = x + columns_, *z = y + columns_;
+    for (std::size_t i = 0; i < modes_.size(); ++i) {
+      x[column[i]] = from[first[i]];
+      y[column[i]] = from[first[i] + 1];
+      z[column[i]] = from[first[i] + 2];
+    }
+    for (std::size_t c = 0; c < largest_.size(); ++c) {
+      const auto fx = static_cast<float>(x[c]), fy = static_cast<float>(y[c]), fz = static_cast<float>(z[c]);
+      largest_[c] = std::max(largest_[c], fx * fx + fy * fy + fz * fz);
     }
   }
 }
@@ -211,18 +223,7 @@ void Model::find_bounds() {
   reach_.resize(sound_.size());
   float largest = 0.0F;
   for (std::size_t g = sound_.size(); g-- > 0;) {
-    std::array<float, kGroup> size{};  // squared, in integer steps
-    for (std::size_t vertex = 0; vertex < shape_.size() / (3 * columns_); ++vertex) {
-      const std::int16_t* row = &shape_[vertex * 3 * columns_ + g * kGroup];
-      for (std::size_t lane = 0; lane < kGroup; ++lane) {
-        float sum = 0.0F;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const auto x = static_cast<float>(row[axis * columns_ + lane]);
-          sum += x * x;
-        }
-        size[lane] = std::max(size[lane], sum);
-      }
-    }
+    const float* size = &largest_[g * kGroup];
     float reach = 0.0F;
     for (std::size_t lane = 0; lane < kGroup; ++lane) {
       weight_[g][lane] = std::hypot(strike_[g].out_re[lane], strike_[g].out_im[lane]);
@@ -231,6 +232,7 @@ void Model::find_bounds() {
     largest = std::max(largest, reach);
     reach_[g] = largest;
   }
+  largest_ = {};
 }
 
 double Model::calc_projection(int mode, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction) const {

@@ -89,6 +89,7 @@ class Model {
   std::vector<TurnTable> turn_;
   std::vector<StrikeTable> strike_;
   std::vector<std::array<float, kGroup>> weight_;  // bound on the pressure of a mode is weight times the size of its state
+  std::vector<float> largest_;                     // while it is made: largest squared motion of each mode, in integer steps
   std::vector<float> reach_;                       // Pa at 1 m per N s: what a strike can make of a group, or of a later one
   std::vector<DampedMode> damped_;                 // ascending in substeps; those that follow come first
   std::vector<std::array<std::int32_t, 3>> triangles_;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -41,7 +42,8 @@ TEST(Feed, HandsOnMoreThanTheRingHolds) {
   events.emplace_back(make_impulse(3, 0.01));  // of nobody
   events.emplace_back(make_impulse(-1, 0.01));
   events.emplace_back(make_impulse(1, std::numeric_limits<double>::quiet_NaN()));
-  Feed feed(events, {{.number = 0, .moves = true}, {.number = 1, .moves = true}, {.number = 2, .moves = true}}, {});
+  const Events kept = make_events(events);
+  Feed feed(kept, {{.number = 0, .moves = true}, {.number = 1, .moves = true}, {.number = 2, .moves = true}}, {});
   play(synthesiser, feed, 0.2);
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   EXPECT_EQ(counters.overflows, 0);
@@ -57,12 +59,15 @@ TEST(Feed, KnowsHowManyWaypointsAreUnderWay) {
   for (int i = 0; i < 5000; ++i) events.emplace_back(stream::Motion{1e-3 * i, 0, {0.0, 343.0, 0.0}, {}});
   events.emplace_back(stream::Motion{0.5, 1, {}, {}});
   const std::vector<stream::Listener> walk{{.time_s = 0.0}, {.time_s = 1.0}, {.time_s = 2.0}};
-  const Feed feed(events, {{.number = 0, .moves = true}, {.number = 1, .moves = true}}, walk);
-  EXPECT_GE(feed.count_waypoints(0, 1.0), 1002);
-  EXPECT_LE(feed.count_waypoints(0, 1.0), 1200);
-  EXPECT_LE(feed.count_waypoints(0, 0.0), 200);
-  EXPECT_LE(feed.count_waypoints(1, 1.0), 5);
-  EXPECT_LE(feed.count_waypoints(-1, 0.0), 6);
+  const Events kept = make_events(events);
+  const Feed feed(kept, {{.number = 0, .moves = true}, {.number = 1, .moves = true}}, walk);
+  const std::vector<int> far = feed.count_waypoints(std::array{1.0, 1.0}), near = feed.count_waypoints(std::array{0.0, 0.0});
+  ASSERT_EQ(far.size(), 3U);
+  EXPECT_GE(far[0], 1002);
+  EXPECT_LE(far[0], 1200);
+  EXPECT_LE(near[0], 200);
+  EXPECT_LE(far[1], 5);
+  EXPECT_LE(far[2], 6);
 }
 
 // With as many waypoints as the feed says, a body that circles far away sounds as with all of them.
@@ -76,11 +81,12 @@ TEST(Feed, SoManyWaypointsAreEnough) {
   }
   for (int i = 0; i < 20; ++i) events.emplace_back(make_impulse(0, 0.05 + 0.06 * i));
   const auto render = [&](int waypoints) {
-    Feed feed(events, {{.number = 0, .moves = true}}, {});
+    const Events kept = make_events(events);
+    Feed feed(kept, {{.number = 0, .moves = true}}, {});
     synth::Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{}}});
     synthesiser.add_body(model, {.position_m = {3.0, 100.0, 0.0},
                                  .longest_m = 110.0,
-                                 .max_waypoints = waypoints > 0 ? waypoints : feed.count_waypoints(0, 110.0 / 343.0)});
+                                 .max_waypoints = waypoints > 0 ? waypoints : feed.count_waypoints(std::array{110.0 / 343.0})[0]});
     std::vector<float> sound(72000);
     for (std::size_t at = 0; at + synth::kPeriod <= sound.size(); at += synth::kPeriod) {
       feed.hand_on(static_cast<double>(at + synth::kPeriod) / kRate, synthesiser);
@@ -92,6 +98,44 @@ TEST(Feed, SoManyWaypointsAreEnough) {
   const std::vector<float> all = render(10000);
   EXPECT_EQ(render(0), all);
   EXPECT_NE(render(300), all);
+}
+
+/// What a feed pushes, by the counters of a synthesiser: all of it must come in time.
+TEST(Feed, WhatIsDueLongBeforeItHappensComesInTime) {
+  // A body that is told of every twenty seconds, a contact that pauses as long, a pulse that lasts for six: the body must be on its way at
+  // once, not jump when its next place comes.
+  const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 0.5}}), {.rate_hz = kRate});
+  const auto render = [&](const std::vector<double>& at) {
+    std::vector<stream::Event> events;
+    for (const double t : at) events.emplace_back(stream::Motion{t, 0, {t, 5.0, 0.0}, {1.0, 0.0, 0.0}});
+    events.emplace_back(make_impulse(0, 30.0, 6.0));
+    events.emplace_back(make_impulse(0, 10.0));
+    std::stable_sort(events.begin(), events.end(),
+                     [](const auto& a, const auto& b) { return stream::get_time_s(a) < stream::get_time_s(b); });
+    const Events kept = make_events(events);
+    Feed feed(kept, {{.number = 0, .moves = true}}, {});
+    synth::Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{}}});
+    synthesiser.add_body(model, {.position_m = {0.0, 5.0, 0.0}, .longest_m = 60.0, .max_waypoints = 5000});
+    std::vector<float> sound(static_cast<std::size_t>(35 * kRate) / synth::kPeriod * synth::kPeriod);
+    for (std::size_t n = 0; n < sound.size(); n += synth::kPeriod) {
+      feed.hand_on(static_cast<double>(n + synth::kPeriod) / kRate, synthesiser);
+      float* out = sound.data() + n;
+      synthesiser.process(&out, 1, synth::kPeriod);
+    }
+    EXPECT_EQ(synthesiser.get_counters().late, 0);
+    EXPECT_EQ(synthesiser.get_counters().strikes, 2);
+    return sound;
+  };
+  std::vector<double> often;
+  for (int i = 0; i <= 80; ++i) often.push_back(0.5 * i);
+  const std::vector<float> sparse = render({0.0, 20.0, 40.0}), dense = render(often);
+  float peak = 0.0F, difference = 0.0F;
+  for (std::size_t n = 0; n < sparse.size(); ++n) {
+    peak = std::max(peak, std::abs(dense[n]));
+    difference = std::max(difference, std::abs(dense[n] - sparse[n]));
+  }
+  EXPECT_GT(peak, 0.0F);
+  EXPECT_LT(difference, 1e-3F * peak);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@ import math
 import os
 import pathlib
 import resource
+import signal
 import struct
 import subprocess
 import tempfile
@@ -255,7 +256,7 @@ class RenderProgram(unittest.TestCase):
         # p = gain 1.1 J sum e^(-d t) (cos w t - d / w sin w t) / r, a distance of r / 343 m/s later.
         strike = {"time_s": 0.1, "body": "cube", "point_m": [-0.05, -0.05, -0.05], "impulse_n_s": [0, 0, 2e-3]}
         scene = self.scene("struck.json", radiation="osg02", bodies=[{"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 0]}], strikes=[strike],
-                           listener={"position_m": [0, -1, 0], "ear_distance_m": 0}, output={"gain": 1.0, "format": "float"})
+                           listener={"position_m": [0, -1, 0], "ear_distance_m": 0}, output={"gain": 1.0, "format": "float", "fade_end": False})
         run = render(scene, "-o", self.root / "struck.wav", "--trajectory", self.root / "struck-path.json", "--report", self.root / "struck-report.json")
         self.assertEqual(run.returncode, 0, run.stderr)
         data = (self.root / "struck.wav").read_bytes()
@@ -526,6 +527,113 @@ class RenderProgram(unittest.TestCase):
         first = min(i["time_s"] - i["duration_s"] / 2 for i in impulses)
         self.assertAlmostEqual(first, math.sqrt(2 * 0.0005 / 9.81), delta=2e-4)
         self.assertGreater(json.loads((self.root / "slight-report.json").read_text())["peak_pa"], 100 * 20e-6)  # 40 dB over the threshold
+
+    def struck_scene(self, name, duration, **changes):
+        """Two cubes that hang still and ring for seconds, ten strikes a second to within half a second of the end."""
+        strikes = [{"time_s": 0.1 * i + 0.05, "body": "ab"[i % 2], "triangle": i % 12, "impulse_n_s": [0, 0, -0.01], "duration_s": 1e-4}
+                   for i in range(int(10 * duration) - 4)]
+        bodies = [{"name": n, "bank": "cube.h5", "fixed": True, "position_m": [x, 0, 1]} for n, x in (("a", 0), ("b", 0.5))]
+        return self.scene(name, duration_s=duration, bodies=bodies, strikes=strikes, **changes)
+
+    def test_memory_does_not_grow_with_the_length(self):
+        peaks = {}
+        for seconds in (6, 240):
+            scene = self.scene(f"long-{seconds}.json", duration_s=seconds)
+            # Played from a file: a body that swings, hits and slides, with a record a centisecond of each.
+            with (self.root / "long.jsonl").open("w") as file:
+                file.write(json.dumps({"carillon_contacts": 1, "bodies": [{"name": "cube", "triangles": 12}]}) + "\n")
+                for i in range(100 * seconds + 1):
+                    t = 0.01 * i
+                    file.write(json.dumps({"motion": {"time_s": t, "body": 0, "position_m": [math.sin(t), 0.0, 0.2], "velocity_m_s": [math.cos(t), 0.0, 0.0],
+                                                      "rotation": [1.0, 0.0, 0.0, 0.0]}}) + "\n")
+                    state = "begin" if i == 0 else "hold"
+                    file.write(json.dumps({"contact": {"time_s": t, "id": 1, "body": 0, "triangle": 1, "state": state, "barycentric": [1.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0],
+                                                       "slip_m_s": [0.1, 0.0, 0.0], "force_n": 1.0, "sweep_m_s": 0.1, "other_sweep_m_s": 0.1, "spin_rad_s": 0.0,
+                                                       "patch_radius_m": 1e-5}}) + "\n")
+                    if i % 10 == 5:
+                        file.write(json.dumps({"impulse": {"time_s": t, "body": 0, "triangle": 3, "barycentric": [1.0, 0.0, 0.0], "impulse_n_s": [0.0, 0.0, 0.01],
+                                                           "duration_s": 1e-4}}) + "\n")
+            child = subprocess.Popen([BIN / "carillon-render", scene, "--contacts", self.root / "long.jsonl", "-o", self.root / "long.wav", "--report",
+                                      self.root / "long-report.json", "--trajectory", self.root / "long-path.json", "--spectrogram", self.root / "long.png",
+                                      "--record", self.root / "long-again.jsonl", "--audit", "-q"], stdout=subprocess.DEVNULL)
+            _, status, usage = os.wait4(child.pid, 0)
+            self.assertEqual(os.waitstatus_to_exitcode(status), 0)
+            child.returncode = 0
+            peaks[seconds] = usage.ru_maxrss / 1024  # MiB
+            self.assertEqual((self.root / "long.wav").stat().st_size, 44 + 6 * 48000 * seconds)
+            self.assertGreater(sum(1 for _ in (self.root / "long-again.jsonl").open()), 200 * seconds)
+        # The sound alone takes 176 MiB as floats. Each list may keep 4 MiB before it goes to disk, and parts of the heap are lost.
+        self.assertLess(peaks[240] - peaks[6], 32.0, peaks)
+
+    def test_a_sound_that_is_cut_off_fades_and_says_so(self):
+        raw = self.struck_scene("raw.json", 1.0, output={"fade_end": False})
+        faded = self.struck_scene("faded.json", 1.0)
+        silent = self.scene("still.json", bodies=[{"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 1]}])
+        runs = {}
+        for scene in (raw, faded, silent):
+            runs[scene.stem] = render(scene, "-o", scene.with_suffix(".wav"), "--report", scene.with_suffix(".report"), "-q")
+            self.assertEqual(runs[scene.stem].returncode, 0, runs[scene.stem].stderr)
+        (_, _, a), (_, _, b) = read_wav(raw.with_suffix(".wav")), read_wav(faded.with_suffix(".wav"))
+        report = {name: json.loads((self.root / f"{name}.report").read_text()) for name in runs}
+        self.assertEqual([report[name]["faded_end_s"] for name in ("raw", "faded", "still")], [0, 0.01, 0])
+        self.assertGreater(np.abs(a[-100:]).max(), 0.001)
+        np.testing.assert_array_equal(a[:-480], b[:-480])
+        u = np.arange(1, 481)[:, None] / 480
+        np.testing.assert_allclose(b[-480:], a[-480:] * (1 + np.cos(np.pi * u)) / 2, atol=3e-7)
+        self.assertEqual(np.abs(b[-1]).max(), 0.0)
+        self.assertIn("faded within the last 10 ms", runs["faded"].stdout)
+        for name in ("raw", "still"):
+            self.assertNotIn("faded", runs[name].stdout)
+
+    def test_the_sound_goes_to_standard_output(self):
+        scene = self.struck_scene("out.json", 2.0)
+        for arguments in ([], ["--format", "float"], ["--format", "pcm16", "--rate", "8000"]):
+            self.assertEqual(render(scene, "-o", self.root / "out.wav", *arguments, "-q").returncode, 0)
+            run = subprocess.run([BIN / "carillon-render", scene, "-o", "-", "--report", self.root / "out.report", *arguments], capture_output=True, cwd=self.root, timeout=200)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual(run.stdout, (self.root / "out.wav").read_bytes())
+            self.assertIn(b"real-time factor", run.stderr)
+            self.assertFalse((self.root / "-").exists())
+        # Whoever listens goes away: one error, no signal, and no other file half made.
+        (self.root / "out.report").unlink()
+        child = subprocess.Popen([BIN / "carillon-render", self.struck_scene("gone.json", 10.0), "-o", "-", "--report", self.root / "out.report", "-q"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=self.root)
+        child.stdout.close()
+        message = child.stderr.read().decode()
+        child.stderr.close()
+        self.assertEqual(child.wait(timeout=200), 4, message)
+        self.assertIn("carillon-render: standard output", message)
+        self.assertFalse((self.root / "out.report").exists())
+
+    def test_a_full_disk_is_one_error_and_leaves_nothing(self):
+        scene = self.struck_scene("full.json", 30.0)
+
+        def limit(size):
+            def apply():
+                signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+                resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+            return apply
+
+        before = sorted(f.name for f in self.root.iterdir())
+        for size in (5 << 20, 9 << 20):  # 11.5 MB while the sound is made, 8.6 MB for the file
+            run = subprocess.run([BIN / "carillon-render", scene, "-o", self.root / "full.wav", "--report", self.root / "full.report", "--format", "pcm32", "-q"],
+                                 capture_output=True, text=True, timeout=200, preexec_fn=limit(size), restore_signals=False)
+            self.assert_refused(run, 4, "File too large")
+            self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
+            self.assertEqual(sorted(f.name for f in self.root.iterdir()), before)
+
+    def test_whatever_ends_it_no_file_is_half_written(self):
+        scene = self.struck_scene("killed.json", 600.0)
+        before = sorted(f.name for f in self.root.iterdir())
+        for how in (signal.SIGKILL, signal.SIGTERM):
+            child = subprocess.Popen([BIN / "carillon-render", scene, "-o", self.root / "killed.wav"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            for line in child.stderr:
+                if line.startswith("sound: 25"):
+                    break
+            child.send_signal(how)
+            child.stderr.close()
+            self.assertEqual(child.wait(timeout=60), -how)
+            self.assertEqual(sorted(f.name for f in self.root.iterdir()), before)
 
     def test_bad_outputs_are_found_before_the_simulation(self):
         scene = self.scene("outputs.json", duration_s=500)  # would take minutes

@@ -3,6 +3,7 @@
 #include <cairo.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -13,11 +14,11 @@
 namespace carillon::host {
 namespace {
 
-Sound make_tone(double freq_hz, double amplitude_pa, int rate_hz, double seconds) {
-  Sound sound;
-  sound.rate_hz = rate_hz;
-  for (auto& ear : sound.pressure_pa) {
-    for (int n = 0; n < seconds * rate_hz; ++n) ear.push_back(amplitude_pa * std::sin(2 * std::numbers::pi * freq_hz * n / rate_hz));
+SoundStore make_tone(double freq_hz, double amplitude_pa, int rate_hz, double seconds, int click_at = -1) {
+  SoundStore sound(rate_hz, 2);
+  for (int n = 0; n < seconds * rate_hz; ++n) {
+    const float p = n == click_at ? 1.0F : static_cast<float>(amplitude_pa * std::sin(2 * std::numbers::pi * freq_hz * n / rate_hz));
+    sound.append(std::array{p, p});
   }
   return sound;
 }
@@ -64,8 +65,7 @@ TEST(Spectrogram, AToneHasItsLevelAndItsBin) {
 
 TEST(Spectrogram, ALongSoundIsAveragedBetweenItsColumns) {
   // 100 columns over 20 s: a click anywhere must be seen.
-  Sound sound = make_tone(1000.0, 0.0, 48000, 20.0);
-  for (auto& ear : sound.pressure_pa) ear[48000 * 7 + 3210] = 1.0;
+  const SoundStore sound = make_tone(1000.0, 0.0, 48000, 20.0, 48000 * 7 + 3210);
   const auto spectrum = calc_short_time_spectrum(sound, 100);
   double loudest = kFloorDb;
   std::size_t where = 0;

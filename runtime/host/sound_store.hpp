@@ -1,0 +1,45 @@
+// The sound of a whole scene, however long.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "runtime/config/spool.hpp"
+
+namespace carillon::host {
+
+/// Pressure [Pa], frame by frame: sample n of all channels, then sample n + 1. Memory does not grow with the number of frames.
+class SoundStore {
+ public:
+  SoundStore(int rate_hz, std::size_t channels, config::Spool spool = config::Spool())
+      : rate_hz_(rate_hz), channels_(channels), samples_(std::move(spool)) {}
+
+  int get_rate_hz() const { return rate_hz_; }
+  std::size_t get_channels() const { return channels_; }
+  std::uint64_t get_frames() const { return samples_.size() / channels_; }
+
+  /// Whole frames. Throws SystemError when the disk refuses.
+  void append(std::span<const float> frames) { samples_.append(frames); }
+  /// Whole frames from `first` on, which are there.
+  void read(std::uint64_t first, std::span<float> frames) const { samples_.read(first * channels_, frames); }
+
+  /// All frames in order, a piece at a time: work(first frame, samples of whole frames).
+  template <class Work>
+  void for_each_piece(Work&& work) const {
+    std::vector<float> piece(kPiece * channels_);
+    for (std::uint64_t first = 0; first < get_frames(); first += kPiece) {
+      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(kPiece, get_frames() - first));
+      const std::span<float> frames = std::span(piece).first(count * channels_);
+      read(first, frames);
+      work(first, std::span<const float>(frames));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kPiece = 4096;  // frames
+  int rate_hz_ = 0;
+  std::size_t channels_ = 0;
+  config::Records<float> samples_;
+};
+
+}  // namespace carillon::host
