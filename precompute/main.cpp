@@ -83,6 +83,11 @@ struct CommandLine {
     CLI::Option* validate =
         app.add_flag("--validate", options.validate, "check the job and its mesh, predict modes, memory and time, and solve nothing")
             ->excludes(matrices);
+    app.add_option("--patience", options.patience_s,
+                   "with --validate: seconds for the mesh of a surface; one that takes longer is estimated from its size")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str()
+        ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
     // What follows "--" is for PETSc and SLEPc.

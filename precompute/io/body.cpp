@@ -45,10 +45,12 @@ void warn_of_mesh(Run& run, const Body& body) {
 }
 
 /// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
-mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
+mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Patience* patience) {
   const bool quadratic = setting.element == spec::Element::T10;
   const spec::JobSpec& job = run.job;
-  mesh::TetMesh mesh = job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}) : mesh::read_mesh(job.mesh);
+  mesh::TetMesh mesh =
+      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, patience) : mesh::read_mesh(job.mesh);
+  if (patience != nullptr && patience->estimate) return {};
   if (job.mesh_scale != 1.0) {
     for (mesh::Vec3& node : mesh.nodes) {
       for (double& x : node) x *= job.mesh_scale;
@@ -108,7 +110,7 @@ bool is_parallel_format(const Run& run) {
   return is_parallel == 1;
 }
 
-Body make_pieces(Run& run, const Setting& setting) {
+Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   if (run.progress) run.progress->learn(find_extent(run, setting, {}));
   if (is_parallel_format(run)) return read_in_parallel(run, setting);
   Body body;
@@ -118,12 +120,17 @@ Body make_pieces(Run& run, const Setting& setting) {
   std::vector<std::int32_t> held;
   petsc::run_agreed(run.comm, [&] {
     if (run.rank != 0) return;
-    mesh = read_checked_mesh(run, setting, body);
+    mesh = read_checked_mesh(run, setting, body, patience);
+    if (patience != nullptr && patience->estimate) return;
     held = find_held_nodes(mesh, run.job);
     body.held_nodes = static_cast<std::int64_t>(held.size());
     say_size(run, static_cast<std::int64_t>(mesh.nodes.size()), mesh.tet_count(), body.check.components, body.held_nodes);
   });
   run.stations.end();
+  if (patience != nullptr && patience->estimate) {
+    body.estimate = patience->estimate;
+    return body;
+  }
 
   run.stations.begin("partition", "METIS k-way on the dual graph");
   body.pieces = name_errors(body.source, run,
@@ -182,8 +189,8 @@ Extent find_extent(const Run& run, const Setting& setting, const Body& body) {
   return extent;
 }
 
-Body make_body(Run& run, const Setting& setting) {
-  Body body = make_pieces(run, setting);
+Body make_body(Run& run, const Setting& setting, Patience* patience) {
+  Body body = make_pieces(run, setting, patience);
   if (run.progress) run.progress->learn(find_extent(run, setting, body));
   return body;
 }

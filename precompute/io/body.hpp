@@ -8,6 +8,7 @@
 
 #include "precompute/fem/distribute.hpp"
 #include "precompute/io/costs.hpp"
+#include "precompute/io/meshing.hpp"
 #include "precompute/io/run.hpp"
 #include "precompute/io/surface_modes.hpp"
 #include "precompute/mesh/check.hpp"
@@ -33,6 +34,7 @@ struct Body {
   Surface surface;                                   // rank 0
   std::map<std::int32_t, std::string> region_names;  // rank 0
   std::string source;                                // "bunny.msh", "bar with 2000 nodes"; for messages
+  std::optional<BodyEstimate> estimate;              // of a surface that took too long to mesh: all but `source` is empty then
 };
 
 /// The key of the job that says in which unit its mesh is, and how, for messages about its size.
@@ -43,6 +45,7 @@ Extent find_extent(const Run& run, const Setting& setting, const Body& body);
 
 /// Reads or makes the mesh, checks it, and gives each rank its piece; rank 0 forgets the mesh. Stations "read" and "partition".
 /// Collective. Throws on every rank: InputError naming the file or the job's line, SystemError.
-Body make_body(Run& run, const Setting& setting);
+/// With `patience` (on one rank) a surface that is not meshed in time is estimated.
+Body make_body(Run& run, const Setting& setting, Patience* patience = nullptr);
 
 }  // namespace carillon::io

@@ -2,21 +2,28 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <poll.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <functional>
+#include <limits>
+#include <string_view>
 #include <vector>
 
 #include "precompute/io/interrupt.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/shapes/shapes.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/config/document.hpp"
 
 extern char** environ;
 
@@ -24,6 +31,8 @@ namespace carillon::io {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kMostPatience = 5;  // times as long for a surface that is still being read
 
 /// Ends of a pipe that close themselves.
 struct Pipe {
@@ -45,11 +54,13 @@ struct Pipe {
 
 struct Ended {
   int status = 0;
-  std::string errors;  // what it wrote to standard error, its end
+  std::string errors;    // what it wrote to standard error, its end
+  bool is_late = false;  // it was ended for taking longer than it might
 };
 
-/// Starts a program, waits for it and keeps the end of its standard error.
-Ended run_program(const std::vector<std::string>& words, Cleanup& cleanup) {
+/// Starts a program, waits for it and keeps the end of its standard error. Once `may_stop` says so it is ended; that is asked every tenth
+/// of a second.
+Ended run_program(const std::vector<std::string>& words, Cleanup& cleanup, const std::function<bool(const std::string& errors)>& may_stop) {
   Pipe pipe;
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -70,6 +81,17 @@ Ended run_program(const std::vector<std::string>& words, Cleanup& cleanup) {
   constexpr std::size_t kKept = 4096;
   std::array<char, 1024> buffer{};
   for (;;) {
+    if (may_stop) {
+      pollfd waiting{pipe.ends[0], POLLIN, 0};
+      constexpr int kAskMs = 100;
+      if (::poll(&waiting, 1, kAskMs) == 0) {
+        if (!ended.is_late && may_stop(ended.errors)) {
+          ended.is_late = true;
+          ::kill(child, SIGKILL);
+        }
+        continue;
+      }
+    }
     const ssize_t got = ::read(pipe.ends[0], buffer.data(), buffer.size());
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) break;
@@ -91,7 +113,25 @@ fs::path find_mesher() {
 
 std::string format_length(double metres) { return fmt::format("{:.17g}", metres); }
 
-mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fineness) {
+constexpr std::string_view kEstimateWord = "estimate ";
+
+/// What the mesher told in `errors` before it meshed, a line of its own, which is taken away.
+std::optional<BodyEstimate> take_estimate(std::string& errors) {
+  const std::size_t begin = errors.starts_with(kEstimateWord) ? 0 : errors.find("\n" + std::string(kEstimateWord)) + 1;
+  if (!errors.substr(begin).starts_with(kEstimateWord)) return std::nullopt;
+  const std::size_t end = std::min(errors.find('\n', begin), errors.size());
+  const std::string line = errors.substr(begin + kEstimateWord.size(), end - begin - kEstimateWord.size());
+  errors.erase(begin, end + 1 - begin);
+  config::Object root = config::parse_document(line, "carillon-mesh --estimate").root();
+  BodyEstimate estimate;
+  estimate.volume_m3 = root.number("volume_m3", config::kPositive);
+  estimate.area_m2 = root.number("area_m2", config::kPositive);
+  estimate.thickness_m = root.number("thickness_m", config::kPositive);
+  estimate.nodes = root.integer("nodes", 1, std::numeric_limits<std::int64_t>::max());
+  return estimate;
+}
+
+mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fineness, Patience* patience) {
   std::string folder = (fs::temp_directory_path() / "carillon-mesh-XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr)
     throw SystemError(fmt::format("{}: cannot make a temporary folder: {}", folder, std::strerror(errno)));
@@ -109,7 +149,26 @@ mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fi
   add("--method", body.method);
   if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
   if (fineness.edge_m) add("--edge", format_length(*fineness.edge_m));
-  const Ended ended = run_program(words, cleanup);
+  std::function<bool(const std::string&)> may_stop;
+  if (patience != nullptr) {
+    words.push_back("--estimate");
+    may_stop = [seconds = patience->seconds, start = std::chrono::steady_clock::now()](const std::string& errors) {
+      const double taken = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const bool has_told = errors.find(kEstimateWord) != std::string::npos;  // it is let speak, unless that takes too long as well
+      return taken > seconds && (has_told || taken > kMostPatience * (seconds + 1));
+    };
+  }
+  Ended ended = run_program(words, cleanup, may_stop);
+  const std::optional<BodyEstimate> estimate = patience != nullptr ? take_estimate(ended.errors) : std::nullopt;
+  if (ended.is_late) {
+    if (!estimate)
+      throw InputError(fmt::format(
+          "{}: the surface is not even read and repaired after {:.0f} s; decimate it, or mesh it beforehand by carillon-mesh and "
+          "name the \"mesh\"",
+          body.place, kMostPatience * (patience->seconds + 1)));
+    patience->estimate = estimate;
+    return {};
+  }
   if (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == 0) return mesh::read_mesh(file);
   const std::string text = fmt::format("{}: the body cannot be meshed: {}", body.place, ended.errors);
   if (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == kExitInput) throw InputError(text);
@@ -118,8 +177,8 @@ mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fi
 
 }  // namespace
 
-mesh::TetMesh make_body_mesh(const spec::Body& body, int order, const Fineness& fineness) {
-  if (body.shape.empty()) return mesh_surface(body, order, fineness);
+mesh::TetMesh make_body_mesh(const spec::Body& body, int order, const Fineness& fineness, Patience* patience) {
+  if (body.shape.empty()) return mesh_surface(body, order, fineness, patience);
   shapes::ShapeOptions options{.shape = body.shape, .dimensions = body.dimensions, .order = order};
   options.target_nodes = fineness.nodes;
   options.edge_m = fineness.edge_m;

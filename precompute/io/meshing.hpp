@@ -16,11 +16,26 @@ struct Fineness {
   std::optional<double> edge_m;
 };
 
+/// What the mesher says of a surface before it meshes.
+struct BodyEstimate {
+  double volume_m3 = 0;
+  double area_m2 = 0;  // of all skins
+  double thickness_m = 0;
+  std::int64_t nodes = 0;
+};
+
+/// How long a mesher may take, and what it found out before it was stopped.
+struct Patience {
+  double seconds = 0;                      // of the clock
+  std::optional<BodyEstimate> estimate{};  // set when they were too few: there is no mesh then
+};
+
 /// Meshes the body with tetrahedra of four (order 1) or ten nodes (order 2), the mid-side ones on the true surface. A surface is meshed by
 /// the program carillon-mesh beside this one, started without a shell, in a temporary folder that is gone afterwards.
 /// Not collective. Throws InputError naming the job's line for what cannot be meshed, SystemError when carillon-mesh does not start or
-/// dies.
-mesh::TetMesh make_body_mesh(const spec::Body& body, int order, const Fineness& fineness);
+/// dies. With `patience`, a surface that is not meshed in time gives an empty mesh and patience->estimate; InputError when not even that
+/// can be told.
+mesh::TetMesh make_body_mesh(const spec::Body& body, int order, const Fineness& fineness, Patience* patience = nullptr);
 
 /// "bar, 20000 nodes" or "bunny.obj, edges of 0.002 m", for people.
 std::string describe(const spec::Body& body, const Fineness& fineness);

@@ -15,6 +15,7 @@ struct RunOptions {
   std::filesystem::path progress;           // progress as JSON lines is appended here; empty: nowhere
   std::filesystem::path matrices;           // folder for K and M as files; empty: none
   bool validate = false;                    // check and predict, do not solve
+  double patience_s = 6;                    // of --validate: a surface that takes longer to mesh is estimated
   bool json = false;                        // what is printed at the end is JSON
 };
 

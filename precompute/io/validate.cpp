@@ -22,6 +22,7 @@
 #include "precompute/io/weyl.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/slabs/read_parallel.hpp"
+#include "runtime/config/printable.hpp"
 
 namespace carillon::io {
 namespace {
@@ -54,7 +55,8 @@ double calc_area(const Surface& surface) {
 
 class Validation {
  public:
-  Validation(MPI_Comm comm, const RunOptions& options) : run_(comm, options), base_bytes_(find_resident_bytes()) {}
+  Validation(MPI_Comm comm, const RunOptions& options, bool tells)
+      : run_(comm, options), tells_(tells), base_bytes_(find_resident_bytes()) {}
 
   void look(const std::filesystem::path& job_file);
   Json::Value describe() const;
@@ -62,6 +64,8 @@ class Validation {
 
  private:
   void look_ahead(const Setting& setting);
+  void look_from_afar(const Setting& setting);
+  void say(const std::string& what) const;
   double calc_matrix_bytes() const;
   void guess();
   bool may_count(const eigen::Outlook& outlook) const;
@@ -73,6 +77,7 @@ class Validation {
   std::int64_t get_most_modes() const { return outlook_.modes.value_or(std::llround(std::ceil(estimate_.high))); }
 
   Run run_;
+  bool tells_ = true;        // of its progress
   std::int64_t base_bytes_;  // of a rank that has nothing yet
   Body body_;
   SolvedBody solved_;
@@ -98,8 +103,13 @@ void Validation::look(const std::filesystem::path& job_file) {
     setting = find_first_setting(run_);
     notes_.push_back("\"accuracy_cents\" chooses the mesh by trial: this is the first and coarsest trial, and those that follow need more");
   }
-  body_ = make_body(run_, setting);
-  look_ahead(setting);
+  Patience patience{.seconds = run_.options.patience_s};
+  say(fmt::format("reading {}", run_.job.body ? describe(*run_.job.body, {setting.nodes, setting.edge_m}) : run_.job.mesh.string()));
+  body_ = make_body(run_, setting, &patience);
+  if (body_.estimate)
+    look_from_afar(setting);
+  else
+    look_ahead(setting);
   predict_modes();
   predict_memory();
   predict_time();
@@ -116,6 +126,33 @@ double Validation::get_pace() const {
   return (outlook_.factor_seconds + kTrustSeconds / speed_) / (foreseen + kTrustSeconds);
 }
 
+/// Progress on standard error, so that nobody waits before an empty screen.
+void Validation::say(const std::string& what) const {
+  if (run_.rank == 0 && tells_) fmt::print(stderr, "carillon-precompute: {}\n", config::printable(what));
+}
+
+/// A surface that takes long to mesh: all from its volume, area and thickness.
+void Validation::look_from_afar(const Setting& setting) {
+  const BodyEstimate& known = *body_.estimate;
+  speed_ = measure_speed();
+  extent_ = {};
+  extent_.is_quadratic = setting.element == spec::Element::T10;
+  extent_.is_lumped = run_.job.mass == spec::Mass::lumped;
+  extent_.nodes = known.nodes;
+  // One layer of elements has two tetrahedra of ten nodes for every four nodes, a solid two for three.
+  extent_.tets = extent_.is_quadratic ? known.nodes * 3 / 5 : known.nodes * 4;
+  extent_.unknowns = 3 * known.nodes;
+  extent_.surface_nodes = known.nodes / 2;
+  left_bytes_ = eigen::find_memory_left() + find_resident_bytes() - base_bytes_;
+  solved_.materials.list = {run_.job.material};
+  solved_.volume_m3 = {known.volume_m3};
+  guess();
+  notes_.push_back(fmt::format(
+      "the surface was not meshed, since that takes longer than {:g} s (--patience): its nodes are estimated from volume ({:.4g} m^3), "
+      "area ({:.4g} m^2) and thickness ({:.4g} m), to a factor of two, and so is all that follows; fixed nodes are not counted",
+      run_.options.patience_s, known.volume_m3, known.area_m2, known.thickness_m));
+}
+
 /// The room that K and M will take [byte].
 double Validation::calc_matrix_bytes() const {
   const double neighbours = extent_.is_quadratic ? 28 : 15;  // nodes, itself among them, that share an element with a node
@@ -124,8 +161,10 @@ double Validation::calc_matrix_bytes() const {
 
 /// A body that is too large to be assembled here: all by powers of its unknowns.
 void Validation::guess() {
-  solved_.materials = fem::find_materials(run_.comm, body_.pieces.local, run_.job, body_.region_names);
-  solved_.volume_m3 = fem::calc_volumes(run_.comm, body_.pieces.local, solved_.materials);
+  if (!body_.estimate) {
+    solved_.materials = fem::find_materials(run_.comm, body_.pieces.local, run_.job, body_.region_names);
+    solved_.volume_m3 = fem::calc_volumes(run_.comm, body_.pieces.local, solved_.materials);
+  }
   const Extent whole = complete(extent_);
   outlook_.entries = whole.factor_entries;
   outlook_.flops = whole.factor_flops;
@@ -133,6 +172,9 @@ void Validation::guess() {
   outlook_.factor_bytes = outlook_.factor_kept_bytes * 3 / 2;  // with the update matrices
   outlook_.copies_bytes = outlook_.copies_kept_bytes = static_cast<std::int64_t>(calc_matrix_bytes());
   held_bytes_ = find_resident_bytes() + static_cast<std::int64_t>(calc_matrix_bytes());
+  extent_.factor_flops = outlook_.flops;
+  extent_.factor_entries = outlook_.entries;
+  if (body_.estimate) return;
   notes_.push_back(
       "too large to be assembled in the memory that is left here: memory and time are guessed by powers of the unknowns, to a factor of "
       "two");
@@ -157,10 +199,12 @@ void Validation::look_ahead(const Setting& setting) {
   if (2 * calc_matrix_bytes() > kRoomUsed * static_cast<double>(left)) {
     guess();
   } else {
+    say(fmt::format("assembling {} unknowns", extent_.unknowns));
     const fem::System system = assemble_body(run_, setting, body_, solved_);
     held_bytes_ = find_resident_bytes();
     read_bytes_ = find_peak_bytes();
     assembled_s_ = find_cpu_seconds();
+    say("analysing the factorisation");
     outlook_ = name_errors(body_.source, run_, [&] {
       return eigen::look_ahead({system.stiffness, system.mass, make_layout(body_.pieces)}, make_options(run_, setting),
                                [&](const eigen::Outlook& outlook) { return may_count(outlook); });
@@ -171,7 +215,8 @@ void Validation::look_ahead(const Setting& setting) {
 }
 
 void Validation::predict_modes() {
-  estimate_ = estimate_modes(solved_.materials.list, solved_.volume_m3, calc_area(body_.surface), run_.job.band_hz[0], run_.job.band_hz[1]);
+  estimate_ = estimate_modes(solved_.materials.list, solved_.volume_m3, body_.estimate ? body_.estimate->area_m2 : calc_area(body_.surface),
+                             run_.job.band_hz[0], run_.job.band_hz[1]);
   if (run_.job.max_modes) {
     const auto most = static_cast<double>(*run_.job.max_modes);
     for (double* count : {&estimate_.count, &estimate_.low, &estimate_.high}) *count = std::min(*count, most);
@@ -221,8 +266,9 @@ Json::Value Validation::describe() const {
   root["ok"] = true;
   Json::Value& mesh = root["mesh"];
   mesh["source"] = body_.source;
-  mesh["nodes"] = Json::Int64(body_.pieces.nodes);
-  mesh["tets"] = Json::Int64(body_.pieces.tets);
+  mesh["how"] = body_.estimate ? "estimated" : "made";
+  mesh["nodes"] = Json::Int64(extent_.nodes);
+  mesh["tets"] = Json::Int64(extent_.tets);
   mesh["components"] = body_.pieces.components;
   mesh["held_nodes"] = Json::Int64(body_.held_nodes);
   mesh["min_dihedral_deg"] = body_.check.min_dihedral_deg;
@@ -248,8 +294,8 @@ Json::Value Validation::describe() const {
 }
 
 std::string Validation::describe_for_people() const {
-  std::string text = fmt::format("{}: well\n{} nodes, {} tetrahedra, {} unknowns\n", run_.job.file.string(), body_.pieces.nodes,
-                                 body_.pieces.tets, extent_.unknowns);
+  std::string text = fmt::format("{}: well\n{}{} nodes, {} tetrahedra, {} unknowns\n", run_.job.file.string(),
+                                 body_.estimate ? "about " : "", extent_.nodes, extent_.tets, extent_.unknowns);
   text += outlook_.modes
               ? fmt::format("{} modes in {:g} .. {:g} Hz, counted by inertia\n", extent_.modes, run_.job.band_hz[0], run_.job.band_hz[1])
               : fmt::format("about {} modes in {:g} .. {:g} Hz\n", extent_.modes, run_.job.band_hz[0], run_.job.band_hz[1]);
@@ -268,7 +314,7 @@ std::string Validation::describe_for_people() const {
 std::string validate_job(MPI_Comm comm, const std::filesystem::path& job_file, const RunOptions& options) {
   RunOptions silent = options;
   silent.quiet = true;
-  Validation validation(comm, silent);
+  Validation validation(comm, silent, !options.quiet);
   validation.look(job_file);
   return options.json ? write_json(validation.describe()) : validation.describe_for_people();
 }

@@ -37,6 +37,7 @@ struct Order {
   std::string up, method;
   int order = 1;
   bool straight = false, facets = false;
+  bool estimate = false;
   bool quiet = false;
 };
 
@@ -115,6 +116,7 @@ void check_options(const Order& order) {
                           : !order.up.empty()     ? "--up"
                           : !order.method.empty() ? "--method"
                           : order.facets          ? "--facets"
+                          : order.estimate        ? "--estimate"
                                                   : nullptr;
     if (foreign) {
       throw InputError(fmt::format("{} is for surfaces; --shape {} takes its dimensions in metres: {}", foreign, shape.name, takes));
@@ -148,6 +150,13 @@ Result make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.facets = order.facets;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
+  if (order.estimate) {
+    options.on_estimate = [](const mesher::SurfaceEstimate& estimate) {
+      fmt::print(stderr, "estimate {{\"volume_m3\": {:.12g}, \"area_m2\": {:.12g}, \"thickness_m\": {:.12g}, \"nodes\": {}}}\n",
+                 estimate.volume_m3, estimate.area_m2, estimate.thickness_m, estimate.nodes);
+      std::fflush(stderr);
+    };
+  }
   Result result;
   mesher::SurfaceReport report;
   result.mesh = mesher::mesh_surface(options, report, progress);
@@ -321,6 +330,8 @@ int run(int argc, char** argv) {
   app.add_flag("--straight", order.straight, "Order 2: mid-side nodes in the middle of their edges, not on the true surface");
   app.add_flag("--facets", order.facets, "Surface: its facets are the body; without this a smooth surface through their corners is");
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
+  app.add_flag("--estimate", order.estimate,
+               "Surface: says on standard error, before meshing, volume, area, thickness and about how many nodes there will be");
   app.add_flag("--quiet", order.quiet, "No progress on the way");
   std::map<std::string, std::string> help{
       {"wall", "Surface: thickness of the hollow shell in metres, inward; solid without it. Also of tube, sphere, bowl and hollow-box"},

@@ -340,6 +340,10 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   if (!options.edge_m && !options.nodes)
     report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
+  if (options.on_estimate)
+    options.on_estimate(
+        {body.model.volume_m3, body.model.area_m2, body.thickness_m, std::llround(std::max(body.model.calc_nodes(edge), least))});
+
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
   body.nearest.emplace(surface);
   if (body.wall_m > 0 || !body.mended.clean || report.method == Method::kStuffing)

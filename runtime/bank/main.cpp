@@ -13,6 +13,7 @@
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/report.hpp"
 #include "runtime/config/printable.hpp"
+#include "runtime/config/solids.hpp"
 
 namespace {
 
@@ -72,6 +73,8 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas;
   bank::Bank bank = bank::read_bank(file);
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
+  if (const auto question = config::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
+    fmt::print(stderr, "carillon-bank: warning: {}\n", config::printable(*question));
   if (is_reduced) bank = bank::calc_reduced(bank, wishes.reduction);
   bank::write_bank(bank, out);
 }

@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "runtime/config/printable.hpp"
 #include "runtime/contact/world.hpp"
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
@@ -116,6 +117,7 @@ void play(const PlayerOptions& options) {
   const host::Banks banks = host::read_banks(scene);
   std::vector<const bank::Bank*> body_banks;
   for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", config::printable(warning));
   const double rate_hz = scene.sample_rate_hz;
 
   const host::Microphones microphones = host::make_microphones(scene);

@@ -5,6 +5,7 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/seal.hpp"
+#include "tests/bank/seal_again.hpp"
 
 namespace {
 
@@ -26,31 +27,12 @@ void read(std::span<const std::byte> bytes) {
   }
 }
 
-/// The length in line 2 and the SHA-256 made right.
-std::string seal_again(std::string bytes) {
-  const std::size_t line = bytes.find('\n') + 1;
-  const std::size_t end = bytes.find('\n', line);
-  if (line == 0 || end == std::string::npos || end >= bank::kTextBytes) return bytes;
-  std::string length = "length " + std::to_string(bytes.size());
-  if (line + length.size() > bank::kTextBytes) return bytes;
-  // The text keeps its place: a length of other digits is cut from, or put into, the padding at its end.
-  std::string text = bytes.substr(0, line) + length + bytes.substr(end, bank::kTextBytes - end);
-  text.resize(bank::kTextBytes, '\n');
-  bytes.replace(0, bank::kTextBytes, text);
-  bank::Digest digest;
-  const auto all = std::as_bytes(std::span(bytes));
-  digest.update(all.first(bank::kTextBytes));
-  digest.update(all.subspan(bank::kSealBytes));
-  bytes.replace(bank::kTextBytes, bank::kDigestBytes, digest.finish());
-  return bytes;
-}
-
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   read(std::as_bytes(std::span(data, size)));
   if (size >= bank::kSealBytes) {
-    const std::string sealed = seal_again({reinterpret_cast<const char*>(data), size});
+    const std::string sealed = bank::seal_again({reinterpret_cast<const char*>(data), size});
     read(std::as_bytes(std::span(sealed)));
   }
   return 0;

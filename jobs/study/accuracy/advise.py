@@ -14,13 +14,15 @@ import pathlib
 import pkgutil
 import re
 import shutil
+import subprocess
 import sys
+import tempfile
 
 import programs
 import scaling
 from accuracy import bodies, forecast, targets
 from accuracy.lab import Case, Lab
-from errors import InputError, RunError
+from errors import InputError, RunError, printable
 
 RANKS_FROM_S = 4.0  # CPU seconds from which a second rank saves more of the clock than its start takes
 PROBE_NODES, PROBE_GROWTH, MOST_PROBE_NODES = {"shape": 1000, "surface": 2500}, {"shape": 3, "surface": 2}, 60000
@@ -28,6 +30,7 @@ TRIAL_TOLERANCE = 1e-6
 START_S = 0.15  # CPU seconds of starting, which no station of a run's record claims
 BUDGET_MARGIN = 0.85  # of --seconds: what is aimed at
 CHECK_GROWTH = 2.5  # of the nodes, for --check
+PATIENCE_S = 3.0  # for the mesh of a surface, before it is estimated from its size
 MOST_CENTS, MOST_SECONDS = 2400.0, 1e6
 PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
 
@@ -131,8 +134,31 @@ class Adviser:
 
     # --- before
 
+    def say(self, text):
+        """Progress: trials take their time."""
+        print(f"carillon-study: {printable(text)}", file=sys.stderr, flush=True)
+
+    def estimate(self):
+        """What carillon-precompute --validate says of a surface that takes long to mesh, from its size alone; None of any other body."""
+        if self.target.kind != "surface":
+            return None
+        self.say(f"looking at {self.target.name}")
+        setting = forecast.Setting("T10", PROBE_NODES["surface"], TRIAL_TOLERANCE)
+        job = self.target.target.make_job(setting) | {"bank": "bank.hdf"}
+        del job["body"]["nodes"]  # what its thickness needs
+        with tempfile.TemporaryDirectory(dir=self.lab.runs) as folder:
+            file = pathlib.Path(folder) / "job.json"
+            file.write_text(json.dumps(job))
+            command = [self.lab.find_program("carillon-precompute"), "--validate", "--json", "--quiet", "--patience", str(PATIENCE_S), file]
+            done = subprocess.run(command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL)
+        if done.returncode != 0:
+            return None  # the first trial says why, in the words of a run
+        found = json.loads(done.stdout)
+        return found if found["mesh"]["how"] == "estimated" else None
+
     def calibrate(self):
         """How fast this machine is beside the study's, by the study's small solve."""
+        self.say("measuring the pace of this machine")
         known = self.advice.get_calibration()
         solve = self.lab.measure([Case("calibration", known["job"])], 2, is_fresh=True)["calibration"]
         self.pace = min(max(min(solve.cpu_s) / known["cpu_s"], 0.05), 20.0)
@@ -215,6 +241,7 @@ class Adviser:
         return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, find_bars(solve), solve.cpu, mesh_s)
 
     def solve(self, setting, name):
+        self.say(f"solving: {name}")
         case = self.target.make_case(self.lab, setting, name)
         return self.lab.measure([case], is_fresh=True)[case.name]
 
@@ -324,6 +351,18 @@ def describe_prediction(adviser, found, remark):
     return lines
 
 
+def describe_estimate(adviser, found, options):
+    asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
+    memory = found["memory_bytes"]["1"] * 1e-9
+    lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]]
+    lines += [f"asked:     {asked}",
+              f"estimate:  so thin a body takes long to mesh. Its coarsest mesh has about {found['mesh']['nodes']:,} nodes (T10), about {found['modes']['count']} modes in the band, "
+              f"{found['cpu_seconds']:.0f} CPU s and {memory:.1f} GB, by its size alone and to a factor of two"]
+    if options.dry_run:
+        lines.append("           cents are not foreseen without a trial: leave --dry-run away for the trials")
+    return lines
+
+
 def is_met(outcome, options):
     return (options.cents is None or outcome.cents <= options.cents) and (options.seconds is None or outcome.cpu_s <= options.seconds)
 
@@ -367,6 +406,26 @@ def run(options):
     if options.cents is None and options.seconds is None:
         raise InputError("give --cents, how wrong a frequency may be, or --seconds, how much CPU time may be spent, or both")
     adviser = Adviser(options, programs.find_all(options.bin, PROGRAMS), read_packed_advice(options.advice))
+    with contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext():
+        estimate = adviser.estimate()
+        if estimate:
+            print("\n".join(describe_estimate(adviser, estimate, options)), flush=True)
+    if not (estimate and options.dry_run):
+        return advise(adviser, options)
+    if options.json:
+        print(json.dumps(make_estimate_document(adviser, estimate), indent=2))
+    return 0
+
+
+def make_estimate_document(adviser, found):
+    options = adviser.options
+    return {"body": adviser.target.name, "kind": adviser.target.kind, "notes": adviser.target.notes, "asked": {"cents": options.cents, "cpu_seconds": options.seconds},
+            "setting": {"element": "T10", "mass": "consistent", "nodes": found["mesh"]["nodes"], "ranks": 1},
+            "predicted": {"cents": None, "cpu_seconds": found["cpu_seconds"], "wall_seconds": found["wall_seconds"]["1"]}, "is_estimate": True, "reached": None}
+
+
+def advise(adviser, options):
+    """Trials, the advice, and what it comes to."""
     with contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext():
         adviser.calibrate()
         found, remark = adviser.choose()

@@ -1,0 +1,23 @@
+// Any bytes as a scene: read and played, or refused with an InputError. What is long, or of many bodies or strikes, is only read.
+#include "runtime/host/scene.hpp"
+#include "tests/fuzz/play.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace carillon;
+  const fuzz::Folder& folder = fuzz::get_folder();
+  const std::filesystem::path file = folder.write("scene.json", fuzz::to_text(data, size));
+  try {
+    const host::Scene scene = host::read_scene(file);
+    const bool is_small =
+        scene.duration_s <= 0.15 && scene.bodies.size() <= 4 && scene.strikes.size() <= 100 && scene.sample_rate_hz <= 96000;
+    if (!is_small || scene.quality.contact_step_s < 1e-4) {
+      fuzz::tell("only read");
+      return 0;
+    }
+  } catch (const InputError&) {
+    fuzz::tell("refused");
+    return 0;
+  }
+  fuzz::play({.scene = file});
+  return 0;
+}
