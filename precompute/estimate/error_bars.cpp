@@ -1,5 +1,6 @@
 // Method: discretisation: the strains of a mode are smoothed over patches of elements; the energy of the difference is about lambda_h -
-//   lambda, since lambda_h - lambda = |u - u_h|_E^2 - lambda |u - u_h|_M^2 for a consistent mass and the second term is of higher order. A
+//   lambda, since lambda_h - lambda = |u - u_h|_E^2 - lambda |u - u_h|_M^2 for a consistent mass and the second term is of higher order.
+//   What smoothed strains cannot show is an error that they share: tractions on the free surface (recovery.cpp), added for T10. A
 //   lumped mass adds lambda phi^T (M_l - M) phi, known exactly. A smooth surface that the mesh cuts short changes lambda by Hadamard's
 //   formula, integral (2 W - lambda rho |u|^2) V_n dS. Cents: predict.cpp. Modes may change places: from the interval of each mode follow
 //   those of the k-th lowest.
@@ -100,6 +101,7 @@ Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, spec::Ma
   }
   kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[1]);
   kernels.add_shifts(recovery.shifts, values, displacement, lambda, sums[3], sums[4]);
+  kernels.add_tractions(recovery.tractions, values, sums[0]);
   for (int m = 0; m < kLanes; ++m) sums[2].lane[m] *= lambda.lane[m];
   return sums;
 }
@@ -171,7 +173,7 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
   ErrorBars bars;
   if (solution.lambda.empty()) return bars;
   bars.algebraic_cents = calc_algebraic_cents(comm, stiffness, mass, find_mass_bounds(comm, local, mass_kind), solution);
-  Recovery recovery = make_recovery(comm, local, solids, material_of_tet);
+  Recovery recovery = make_recovery(comm, local, solids, material_of_tet, mass_kind);
   const std::vector<double> sums = calc_sums(comm, local, recovery, mass_kind, solution);
   bars.kind = local.order == 1 ? Kind::kT4 : is_curved(comm, local) ? Kind::kT10Curved : Kind::kT10;
   std::vector<double> cents, cents_above;

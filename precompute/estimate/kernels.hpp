@@ -60,6 +60,12 @@ struct Shift {
   float density = 0.0F;                 // 0 where held
 };
 
+/// A node of the free surface, where no traction acts.
+struct Traction {
+  std::int32_t value = 0;        // the recovered strain there
+  std::array<float, 18> part{};  // (3, 6): of a scaled strain what makes traction, times the root of the node's volume [m^1.5]
+};
+
 /// The loops for one kind of element and one instruction set. displacement: (nodes, 3), of T4 FloatLanes, of T10 DoubleLanes (their error
 /// energies are smaller than what the differences of single precision leave).
 struct Kernels {
@@ -76,6 +82,8 @@ struct Kernels {
   /// Adds gap times (2 W - lambda rho |u|^2), and the sum of its magnitudes.
   void (*add_shifts)(const std::vector<Shift>& shifts, const Strain* values, const void* displacement, const DoubleLanes& lambda,
                      DoubleLanes& change, DoubleLanes& magnitude);
+  /// Adds the energy that the recovered strains spend on tractions.
+  void (*add_tractions)(const std::vector<Traction>& tractions, const Strain* values, DoubleLanes& error);
   const char* name;
 };
 

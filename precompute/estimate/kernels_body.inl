@@ -243,11 +243,29 @@ void add_shifts(const std::vector<Shift>& shifts, const Strain* values, const vo
   }
 }
 
+void add_tractions(const std::vector<Traction>& tractions, const Strain* values, DoubleLanes& error) {
+  for (std::size_t begin = 0; begin < tractions.size(); begin += kChunk) {
+    Lanes errors = {};
+    for (std::size_t i = begin; i < std::min(tractions.size(), begin + kChunk); ++i) {
+      const Traction& traction = tractions[i];
+      Lanes part[3] = {};
+      for (int r = 0; r < 6; ++r) {
+        const Lanes q = values[traction.value][r];
+        for (int k = 0; k < 3; ++k) part[k] += q * traction.part[6 * k + r];
+      }
+      errors += part[0] * part[0] + part[1] * part[1] + part[2] * part[2];
+    }
+    flush(errors, error);
+  }
+}
+
 }  // namespace
 
 extern const Kernels kT4;
 extern const Kernels kT10;
-const Kernels kT4{add_strains<4, 1, 1, FloatLanes>, find_middles, add_energies_t4, add_shifts<FloatLanes>, CARILLON_ISA_NAME};
-const Kernels kT10{add_strains<10, 4, 10, DoubleLanes>, find_middles, add_energies_t10, add_shifts<DoubleLanes>, CARILLON_ISA_NAME};
+const Kernels kT4{add_strains<4, 1, 1, FloatLanes>, find_middles,  add_energies_t4,
+                  add_shifts<FloatLanes>,           add_tractions, CARILLON_ISA_NAME};
+const Kernels kT10{
+    add_strains<10, 4, 10, DoubleLanes>, find_middles, add_energies_t10, add_shifts<DoubleLanes>, add_tractions, CARILLON_ISA_NAME};
 
 }  // namespace carillon::estimate::CARILLON_ISA

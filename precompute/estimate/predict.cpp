@@ -21,7 +21,7 @@ Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double densi
 }
 
 double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio) {
-  constexpr double kMostOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15;
+  constexpr double kMostOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15, kT10 = 3.5, kT10Lumped = 4.5;
   const double second = edge_ratio * edge_ratio, fourth = second * second;
   const double interpolation = parts.interpolation * (kind == Kind::kT4 ? second : fourth), lumping = std::abs(parts.lumping) * second;
   // A share of the computed lambda as a share of the true one, which is smaller, times a safety factor.
@@ -30,11 +30,11 @@ double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio
     return factor * s / (1.0 - s);
   };
   // Interpolation raises lambda and a lumped mass lowers it. Where both matter they are trusted to cancel within limits only.
-  double mesh = enlarge(kind == Kind::kT4 ? 2.0 : 4.5, interpolation);
+  double mesh = enlarge(kind == Kind::kT4 ? 2.0 : kT10, interpolation);
   if (lumping > 0.0 && kind == Kind::kT4)
     mesh = enlarge(2.0, std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
   else if (lumping > 0.0)  // how far up, and how far down
-    mesh = std::max(enlarge(4.5, interpolation) - lumping, 1.75 * lumping - 0.65 * interpolation);
+    mesh = std::max(enlarge(kT10Lumped, interpolation) - lumping, 1.75 * lumping - 0.65 * interpolation);
   const double geometry =
       (kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise) * (kind == Kind::kT10Curved ? fourth : second);
   return 600.0 * std::log2(1.0 + mesh + geometry);

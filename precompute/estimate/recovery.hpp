@@ -24,11 +24,12 @@ struct Recovery {
   std::vector<Middle> middles;             // T10 only
   std::vector<std::int32_t> value_of;      // (e, n) where the recovered value of an element's node is
   std::vector<Shift> shifts;
+  std::vector<Traction> tractions;  // T10 with a consistent mass only
   NodeExchange nodes, vertices;
 };
 
 /// Collective. Throws InputError naming an element without volume and a material that is not positive definite, on all ranks alike.
 Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
-                       std::span<const std::int32_t> material_of_tet);
+                       std::span<const std::int32_t> material_of_tet, spec::Mass mass_kind);
 
 }  // namespace carillon::estimate

@@ -3,6 +3,7 @@
 
 #include <mpi.h>
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -20,8 +21,22 @@ struct SurfaceEdge {
   double third_m2 = 0.0;  // a third of the face's area
 };
 
-/// The edges of all surface faces of this rank's elements. Faces that meet at less than 50 degrees belong to one smooth surface; at sharper
-/// edges each side is smooth by itself. Collective.
-std::vector<SurfaceEdge> find_surface_edges(MPI_Comm comm, const fem::LocalMesh& local);
+/// A face of the surface on which nothing is fixed, so that no traction acts on it.
+struct FreeFace {
+  std::int32_t tet = 0;               // local element
+  std::int8_t face = 0;               // of mesh::kFaces
+  std::array<fem::Vec3, 3> normal{};  // unit, of the smooth surface, in the middles of its edges
+  double area_m2 = 0.0;
+  double height_m = 0.0;  // of the element over it
+};
+
+struct Surface {
+  std::vector<SurfaceEdge> edges;
+  std::vector<FreeFace> free_faces;
+};
+
+/// The surface faces of this rank's elements. Faces that meet at less than 50 degrees belong to one smooth surface; at sharper edges each
+/// side is smooth by itself. Collective.
+Surface find_surface(MPI_Comm comm, const fem::LocalMesh& local);
 
 }  // namespace carillon::estimate

@@ -123,6 +123,17 @@ TetMesh finish(TetMesh mesh, MeshKind kind) {
   return kind == MeshKind::T10Curved && mesh.order == 2 ? mesh : mesh::to_quadratic(mesh::to_linear(mesh));
 }
 
+/// The nodes of the face of lowest x, if the body is fixed there.
+std::vector<std::int32_t> find_fixed(const Body& body, const TetMesh& mesh) {
+  std::vector<std::int32_t> held;
+  if (!body.fixed) return held;
+  double low = 1e300;
+  for (const Vec3& x : mesh.nodes) low = std::min(low, x[0]);
+  for (std::size_t i = 0; i < mesh.nodes.size(); ++i)
+    if (mesh.nodes[i][0] < low + 1e-9) held.push_back(static_cast<std::int32_t>(i));
+  return held;
+}
+
 TetMesh make_shape_mesh(const std::string& shape, const std::map<std::string, double>& dimensions, int nodes, MeshKind kind) {
   return finish(
       shapes::make_shape({.shape = shape, .dimensions = dimensions, .order = kind == MeshKind::T10Curved ? 2 : 1, .target_nodes = nodes}),
@@ -175,12 +186,13 @@ const std::vector<Body>& get_bodies() {
   const auto pair = [&](double nu_steel, double nu_aluminium) {
     return std::vector<spec::Material>{solid(200e9, nu_steel, 7850)[0], solid(70e9, nu_aluminium, 2700)[0]};
   };
-  // A fineness is cells along the shortest edge of a box (negative: not shaken), rings of a cylinder, or the nodes of a shape.
+  // A fineness is cells along the shortest edge of a box (negative: not shaken), ten times the cells across a strip and its
+  // layers, rings of a cylinder, or the nodes of a shape.
   static const std::vector<Body> bodies{
       {"cube", solid(200e9, 0.3, 7850), false, true, {3, 6, 10}},
       {"bar", solid(70e9, 0.33, 2700), false, true, {-1, 2, 4}},
       {"plate", solid(200e9, 0.3, 7850), false, true, {-1, 2, 3}},
-      {"cantilever", solid(70e9, 0.33, 2700), false, true, {-1, 2, 4}},
+      {"cantilever", solid(70e9, 0.33, 2700), false, true, {-1, 2, 4}, false, true},
       {"ball", solid(200e9, 0.3, 7850), true, true, {300, 1200, 6000}},
       {"thin-shell", solid(200e9, 0.3, 7850), true, true, {800, 3000, 9000}},
       {"ring", solid(100e9, 0.34, 8500), true, true, {300, 1200, 6000}},
@@ -201,6 +213,16 @@ const std::vector<Body>& get_bodies() {
       {"rod-two", pair(0, 0), false, false, {1, 2, 4}},
       {"bar-two", pair(0.3, 0.33), false, false, {1, 2, 4}},
       {"rubber-ball", solid(10e6, 0.4999, 1100), true, false, {300, 1200}, true},
+      {"strip-thin", solid(200e9, 0.3, 7850), false, false, {41, 62, 63}},
+      {"strip-thick", solid(200e9, 0.3, 7850), false, false, {41, 62, 63}},
+      {"strip-nu0", solid(200e9, 0, 7850), false, false, {41, 62, 63}},
+      {"strip-nu045", solid(200e9, 0.45, 7850), false, false, {41, 62, 63}},
+      {"strip-spruce", {spruce}, false, false, {41, 62, 63}},
+      {"strip-fixed", solid(200e9, 0.3, 7850), false, false, {41, 62, 63}, false, true},
+      {"plate-thin", solid(200e9, 0.3, 7850), false, false, {61, 122, 123}},
+      {"shell-3", solid(200e9, 0.3, 7850), true, false, {300, 1200, 4000}},
+      {"shell-5", solid(200e9, 0.3, 7850), true, false, {300, 1200, 4000}},
+      {"shell-7", solid(200e9, 0.3, 7850), true, false, {400, 1600, 4000}},
   };
   return bodies;
 }
@@ -231,14 +253,22 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
       {"bar-two", {{0.3, 0.03, 0.02}, {14 * n, 2 * n, n}}}};
   if (const auto found = boxes.find(body.name); found != boxes.end()) {
     TetMesh mesh = finish(make_lattice(found->second.first, found->second.second, shaken, body.materials.size() == 2), kind);
-    if (body.name == "cantilever") {
-      double low = 0;
-      for (const Vec3& x : mesh.nodes) low = std::min(low, x[0]);
-      for (std::size_t i = 0; i < mesh.nodes.size(); ++i)
-        if (mesh.nodes[i][0] < low + 1e-9) held.push_back(static_cast<std::int32_t>(i));
-    }
+    held = find_fixed(body, mesh);
     return mesh;
   }
+  const std::map<std::string, std::pair<Vec3, int>> strips{
+      {"strip-thin", {{0.3, 0.03, 0.001}, 10}},  {"strip-thick", {{0.3, 0.03, 0.003}, 10}}, {"strip-nu0", {{0.2, 0.025, 0.002}, 8}},
+      {"strip-nu045", {{0.1, 0.01, 0.001}, 10}}, {"strip-spruce", {{0.3, 0.04, 0.003}, 8}}, {"strip-fixed", {{0.2, 0.02, 0.001}, 10}},
+      {"plate-thin", {{0.1, 0.09, 0.002}, 1}}};
+  if (const auto found = strips.find(body.name); found != strips.end()) {
+    const int across = n / 10, layers = n % 10;
+    TetMesh mesh = finish(make_lattice(found->second.first, {found->second.second * across, across, layers}, layers > 1, false), kind);
+    held = find_fixed(body, mesh);
+    return mesh;
+  }
+  for (const int tenths : {3, 5, 7})
+    if (body.name == "shell-" + std::to_string(tenths))
+      return make_shape_mesh("sphere", {{"radius", 0.1}, {"wall", 0.1 - 0.01 * tenths}}, n, kind);
   if (body.name == "slender-bar") return make_shape_mesh("bar", {{"length", 0.3}, {"width", 0.02}, {"thickness", 0.01}}, n, kind);
   if (body.name == "ball" || body.name == "rubber-ball") return make_shape_mesh("sphere", {{"radius", 0.05}}, n, kind);
   if (body.name == "thick-shell") return make_shape_mesh("sphere", {{"radius", 6.0}, {"wall", 4.2}}, n, kind);
@@ -305,17 +335,21 @@ Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t
   return outcome;
 }
 
-Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, double tolerance) {
+Outcome solve(MPI_Comm comm, const Body& body, const TetMesh& given, MeshKind kind, double tolerance) {
   const std::vector<Truth> truth = read_truth(body.name);
-  std::vector<std::int32_t> held;
-  const TetMesh mesh = make_mesh(body, fineness, kind, held);
-  Outcome outcome = solve(comm, mesh, held, body.materials, kind == MeshKind::T4Lumped || kind == MeshKind::T10Lumped,
+  const TetMesh mesh = finish(given, kind);
+  Outcome outcome = solve(comm, mesh, find_fixed(body, mesh), body.materials, kind == MeshKind::T4Lumped || kind == MeshKind::T10Lumped,
                           0.2 * truth.front().freq_hz, 30 * truth.back().freq_hz, static_cast<int>(truth.size()), tolerance);
   for (std::size_t m = 0; m < outcome.freq_hz.size(); ++m) {
     outcome.true_hz.push_back(truth[m].freq_hz);
     outcome.truth_cents.push_back(1200 * std::log2(1 + truth[m].uncertainty));
   }
   return outcome;
+}
+
+Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, double tolerance) {
+  std::vector<std::int32_t> held;
+  return solve(comm, body, make_mesh(body, fineness, kind, held), kind, tolerance);
 }
 
 }  // namespace carillon::tests

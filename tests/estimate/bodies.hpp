@@ -33,6 +33,7 @@ struct Body {
   bool training = false;                  // the safety factors were chosen on it
   std::vector<int> fineness;              // meshes from coarse to fine, in numbers that make_mesh knows
   bool locks = false;                     // T4 are not for it
+  bool fixed = false;                     // at its face of lowest x
 };
 
 const std::vector<Body>& get_bodies();
@@ -59,6 +60,9 @@ struct Outcome {
 
 /// Solves for the known modes of the body and calculates the error bars. Collective.
 Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, double tolerance = 1e-8);
+
+/// The same on a given mesh of the body, in its place and in metres. Collective.
+Outcome solve(MPI_Comm comm, const Body& body, const mesh::TetMesh& mesh, MeshKind kind, double tolerance = 1e-8);
 
 /// The same for any mesh, without truth, up to `high_hz`. Collective.
 Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held, std::span<const spec::Material> materials,

@@ -17,6 +17,7 @@ struct Work {
   std::vector<std::int32_t> value_of;
   std::vector<Shift> shifts;
   std::vector<Middle> middles;
+  std::vector<Traction> tractions;
   std::vector<FloatLanes> displacement;
   std::vector<DoubleLanes> displacement2;
 };
@@ -54,6 +55,11 @@ Work make_work(int nodes) {
   for (int i = 0; i < 120; ++i)
     for (int l = 0; l < kLanes; ++l) work.displacement[i].lane[l] = work.displacement2[i].lane[l] = value(random);
   for (int i = 0; i < 45; ++i) work.shifts.push_back({{node(random), node(random)}, {node(random), node(random)}, value(random), 2.0F});
+  for (int i = 0; i < 45; ++i) {
+    Traction traction{node(random), {}};
+    for (float& entry : traction.part) entry = value(random);
+    work.tractions.push_back(traction);
+  }
   for (std::int32_t i = 0; i < 20; ++i) {
     Middle middle{i, {node(random), node(random)}, {}};
     for (auto& end : middle.monomials)
@@ -70,18 +76,19 @@ TEST_P(Loops, give_the_same_with_every_instruction_set) {
   const void* displacement = GetParam() == 4 ? static_cast<const void*>(work.displacement.data()) : work.displacement2.data();
   DoubleLanes lambda;
   for (int l = 0; l < kLanes; ++l) lambda.lane[l] = 0.1 * (l + 1);
-  std::array<DoubleLanes, 5> first{};
+  std::array<DoubleLanes, 6> first{};
   const std::vector<const Kernels*> tables = list_kernels(GetParam());
   for (const Kernels* kernels : tables) {
     std::vector<Strain> patches(40 * work.elements.terms, Strain{}), strains(work.elements.count * work.elements.samples);
-    std::array<DoubleLanes, 5> sums{};
+    std::array<DoubleLanes, 6> sums{};
     kernels->add_strains(work.elements, true, displacement, strains.data(), patches.data(), sums[2]);
     std::vector<Strain> values(patches.begin(), patches.begin() + 40);
     if (GetParam() == 10) kernels->find_middles(work.middles, 1, patches.data(), values.data());
     kernels->add_energies(work.elements, work.value_of.data(), values.data(), displacement, strains.data(), sums[0], sums[1]);
     kernels->add_shifts(work.shifts, patches.data(), displacement, lambda, sums[3], sums[4]);
+    kernels->add_tractions(work.tractions, patches.data(), sums[5]);
     if (kernels == tables.front()) first = sums;
-    for (int s = 0; s < 5; ++s)
+    for (int s = 0; s < 6; ++s)
       for (int l = 0; l < kLanes; ++l) {
         EXPECT_NEAR(sums[s].lane[l], first[s].lane[l], 1e-5 * first[s == 3 ? 4 : s].lane[l]) << kernels->name << " " << s;
         EXPECT_GT(first[s == 3 ? 4 : s].lane[l], 0) << s;

@@ -35,7 +35,7 @@ TEST(Order, holds_at_the_end_of_a_list_wherever_it_is_cut) {
     const Outcome outcome = solve_slab(1e6, count);
     ASSERT_EQ(outcome.freq_hz.size(), static_cast<std::size_t>(count));
     EXPECT_EQ(outcome.coverage(), 1.0) << count;
-    for (std::size_t m = 0; m < outcome.freq_hz.size(); ++m) EXPECT_LT(outcome.bar_cents(m), 600) << count << ": mode " << m;
+    for (std::size_t m = 0; m < outcome.freq_hz.size(); ++m) EXPECT_LT(outcome.bar_cents(m), 650) << count << ": mode " << m;
   }
 }
 
@@ -45,7 +45,7 @@ TEST(Order, holds_at_the_upper_end_of_a_band) {
   EXPECT_GT(outcome.error_cents(13), 50);
   EXPECT_EQ(outcome.coverage(), 1.0);
   EXPECT_LT(outcome.bar_cents(9), 300) << "what lies far below the end is as sure as by itself";
-  EXPECT_LT(outcome.bar_cents(0), 60);
+  EXPECT_LT(outcome.bar_cents(0), 120);
 }
 
 /// One mode of a made-up body: its true place and where a mesh puts it, cents above 100 Hz.

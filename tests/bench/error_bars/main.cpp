@@ -1,9 +1,12 @@
 // Error bars against known frequencies: a table on the screen and, on request, every mode as CSV.
 //
 //   error_bars [--modes FILE.csv] [--body NAME]... [--element "T4"|"T4 lumped"|"T10"|"T10 curved"|"T10 lumped"]...
-//   error_bars [--modes FILE.csv] --finest FINEST.msh [--mesh COARSER.msh]... [--count 30]
+//   error_bars [--modes FILE.csv] --body NAME --mesh FILE.msh [--mesh FILE.msh]...      meshes of that body, its lower x face fixed if it
+//   is fixed error_bars [--modes FILE.csv] --body NAME --element KIND --mesh FILE.msh [--mesh FILE.msh]... error_bars [--modes FILE.csv]
+//   --finest FINEST.msh [--mesh COARSER.msh]... [--count 30]
 //
-// The second form: the ceramic of OSG02's bunny in any shape; the modes of the finest mesh stand for the truth, within their own bars.
+// The second form: meshes of a known body from elsewhere, in its place and in metres. The third: the ceramic of OSG02's bunny in any shape;
+// the modes of the finest mesh stand for the truth, within their own bars.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -85,7 +88,7 @@ void compare_meshes(const std::string& finest, const std::vector<std::string>& c
 }
 
 constexpr const char* kUsage =
-    "usage: error_bars [--modes FILE.csv] [--body NAME]... [--element KIND]... [--finest FINEST.msh [--mesh COARSER.msh]... [--count N]]";
+    "usage: error_bars [--modes FILE.csv] [--body NAME]... [--element KIND]... [--mesh FILE.msh]... [--finest FINEST.msh [--count N]]";
 
 struct Choice {
   std::set<std::string> bodies, elements;  // empty: all
@@ -135,6 +138,21 @@ int run(const Choice& choice, int rank) {
                "body,set,element,fineness,unknowns,mode,freq_hz,true_hz,truth_cents,algebraic_cents,discretisation_cents,error_cents,"
                "interpolation,energy,lumping,geometry,geometry_magnitude\n");
   });
+  if (!choice.coarser.empty() && choice.finest.empty()) {
+    if (choice.bodies.size() != 1 || choice.elements.size() != 1)
+      throw std::runtime_error("--mesh wants one --body and one --element, or --finest");
+    const Body& body = get_body(*choice.bodies.begin());
+    const MeshKind kind =
+        *std::find_if(std::begin(kKinds), std::end(kKinds), [&](MeshKind k) { return describe(k) == *choice.elements.begin(); });
+    if (rank == 0) print_head();
+    for (const std::string& file : choice.coarser) {
+      const mesh::TetMesh mesh = mesh::read_mesh(file);
+      const Outcome outcome = solve(PETSC_COMM_WORLD, body, mesh, kind);
+      if (modes) write_modes(modes.get(), body, static_cast<int>(outcome.unknowns), kind, outcome);
+      if (rank == 0) print_row(body.name + ", " + file, body.training ? "training" : "test", describe(kind), outcome);
+    }
+    return 0;
+  }
   if (!choice.finest.empty()) {
     compare_meshes(choice.finest, choice.coarser, choice.count, rank, modes.get());
     return 0;
