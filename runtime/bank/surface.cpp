@@ -19,14 +19,24 @@ std::vector<std::size_t> find_shells(const std::vector<Triangle>& triangles) {
     std::size_t triangle;
     auto operator<=>(const Edge&) const = default;
   };
-  std::vector<Edge> edges;
-  edges.reserve(3 * triangles.size());
+  // Edges lie in buckets by their lower vertex, and are sorted within them.
+  std::int32_t last = -1;
+  for (const Triangle& triangle : triangles)
+    for (const std::int32_t v : triangle) last = std::max(last, v);
+  const auto find_ends = [](const Triangle& triangle, std::size_t i) { return std::minmax({triangle[i], triangle[(i + 1) % 3]}); };
+  std::vector<std::size_t> begin(static_cast<std::size_t>(last) + 2, 0);
+  for (const Triangle& triangle : triangles)
+    for (std::size_t i = 0; i < 3; ++i) ++begin[static_cast<std::size_t>(find_ends(triangle, i).first) + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
+  std::vector<Edge> edges(3 * triangles.size());
   for (std::size_t t = 0; t < triangles.size(); ++t)
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto [low, high] = std::minmax(triangles[t][i], triangles[t][(i + 1) % 3]);
-      edges.push_back({low, high, t});
+      const auto [low, high] = find_ends(triangles[t], i);
+      edges[next[static_cast<std::size_t>(low)]++] = {low, high, t};
     }
-  std::sort(edges.begin(), edges.end());
+  for (std::size_t v = 0; v + 1 < begin.size(); ++v)
+    std::sort(edges.begin() + static_cast<std::ptrdiff_t>(begin[v]), edges.begin() + static_cast<std::ptrdiff_t>(begin[v + 1]));
   std::vector<std::size_t> shell(triangles.size());
   std::iota(shell.begin(), shell.end(), std::size_t{0});
   const auto find = [&](std::size_t t) {

@@ -95,7 +95,7 @@ void Engine::check_overlaps() const {
     const Surface& sa = surface(a);
     if (world_.ground && !is_fixed(a)) {
       double lowest = SimTK::Infinity;
-      for (int v = 0; v < sa.mesh().getNumVertices(); ++v) lowest = std::min(lowest, (now.poses[a] * sa.vertex(v))[2]);
+      for (int v = 0; v < sa.mesh().vertex_count(); ++v) lowest = std::min(lowest, (now.poses[a] * sa.vertex(v))[2]);
       const double depth = world_.ground->height_m - lowest;
       if (depth > allowed_m(a)) {
         throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much",

@@ -265,7 +265,7 @@ void Island::emit_spot(const std::vector<const ImpactPoint*>& points, double tou
     bool inside = false;
     int face = 0;
     SimTK::Vec2 uv;
-    engine_.surface(body).mesh().findNearestPoint(~pose * where, inside, face, uv);
+    engine_.surface(body).mesh().find_nearest(~pose * where, inside, face, uv);
     pulse.body = find_member(body);
     pulse.other = find_member(side == 0 ? first.b : first.a);
     pulse.triangle = engine_.surface(body).bank_triangle(face);

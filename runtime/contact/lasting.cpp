@@ -134,7 +134,7 @@ void record(const Engine& engine, const Snapshot& now, const Group& g, Spot& spo
     bool inside = false;
     int face = 0;
     SimTK::Vec2 uv;
-    engine.surface(body).mesh().findNearestPoint(~pose * g.where, inside, face, uv);
+    engine.surface(body).mesh().find_nearest(~pose * g.where, inside, face, uv);
     stream::Contact c;
     c.time_s = now.time_s;
     c.id = spot.id;

@@ -1,8 +1,8 @@
 // Method: the bank's triangles are checked to be closed and oriented (two triangles an edge), split into components by shared edges, and
 // the
-//   components with positive signed volume (outer walls) become one Simbody TriangleMesh. Where several fans of triangles meet in one
-//   vertex, each fan gets a vertex of its own, since Simbody knows one fan a vertex only. Curvature by a least-squares paraboloid.
-// Source: M. Sherman, A. Seth, S. Delp, "Simbody: multibody dynamics for biomedical research" (2011), mesh contact geometry.
+//   components with positive signed volume (outer walls) become one mesh. Where several fans of triangles meet in one vertex, each fan gets
+//   a vertex of its own. Curvature by a least-squares paraboloid.
+// Source: textbook.
 // Deviations: none.
 #include "runtime/contact/surface.hpp"
 
@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <utility>
 
@@ -23,15 +22,13 @@ namespace {
 using SimTK::Vec3;
 
 struct Selection {
-  SimTK::Array_<Vec3> vertices;
-  SimTK::Array_<int> indices;
+  std::vector<Vec3> vertices;
+  std::vector<Face> faces;
   std::vector<std::int32_t> bank_triangle;
 };
 
-using EdgeMap = std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t>;  // directed edge to its triangle
-
-/// Checks that every edge has exactly two triangles that run along it in opposite directions.
-EdgeMap make_directed_edges(const Vertices& vertices, const Triangles& triangles, const std::string& body) {
+/// The opposite of every half-edge. Checks that every edge has exactly two triangles that run along it in opposite directions.
+std::vector<std::int32_t> find_checked_opposites(const Vertices& vertices, const Triangles& triangles, const std::string& body) {
   const auto count = static_cast<std::int32_t>(vertices.size());
   if (triangles.empty()) {
     throw InputError(fmt::format("body '{}': its bank has no surface triangles; make the bank again", body));
@@ -42,33 +39,26 @@ EdgeMap make_directed_edges(const Vertices& vertices, const Triangles& triangles
         throw InputError(fmt::format("body '{}': surface vertex {} is not a finite point; make the bank again", body, v));
     }
   }
-  EdgeMap edges;
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const auto& corners = triangles[t];
-    for (int k = 0; k < 3; ++k) {
-      if (corners[k] < 0 || corners[k] >= count) {
+    for (const std::int32_t v : triangles[t]) {
+      if (v < 0 || v >= count) {
         throw InputError(fmt::format("body '{}': surface triangle {} names vertex {}, but there are {} vertices; make the bank again", body,
-                                     t, corners[k], count));
-      }
-    }
-    for (int k = 0; k < 3; ++k) {
-      const auto edge = std::make_pair(corners[k], corners[(k + 1) % 3]);
-      if (edge.first == edge.second || !edges.emplace(edge, static_cast<std::int32_t>(t)).second) {
-        throw InputError(
-            fmt::format("body '{}': the surface is not a manifold at edge {}-{} (triangle {}): more than two triangles meet there or two "
-                        "disagree about "
-                        "which side is outside; mend the mesh and make the bank again",
-                        body, edge.first, edge.second, t));
+                                     t, v, count));
       }
     }
   }
-  for (const auto& [edge, triangle] : edges) {
-    if (!edges.count({edge.second, edge.first})) {
-      throw InputError(fmt::format("body '{}': the surface is open at edge {}-{} (triangle {}); close the mesh and make the bank again",
-                                   body, edge.first, edge.second, triangle));
-    }
-  }
-  return edges;
+  std::vector<std::int32_t> opposite = find_opposite_edges(triangles, vertices.size());
+  const auto describe = [&](std::int32_t missing, const char* what) {
+    const auto e = static_cast<std::size_t>(std::find(opposite.begin(), opposite.end(), missing) - opposite.begin());
+    if (e == opposite.size()) return;
+    throw InputError(fmt::format("body '{}': the surface is {} (triangle {}){} and make the bank again", body,
+                                 fmt::format(fmt::runtime(missing == -1 ? "open at edge {}-{}" : "not a manifold at edge {}-{}"),
+                                             triangles[e / 3][e % 3], triangles[e / 3][(e % 3 + 1) % 3]),
+                                 e / 3, what));
+  };
+  describe(-2, ": more than two triangles meet there or two disagree about which side is outside; repair the mesh");
+  describe(-1, "; close the mesh");
+  return opposite;
 }
 
 /// Union-find: the smallest member of the group of each of `count` things, `joined` two and two.
@@ -88,24 +78,23 @@ std::vector<std::int32_t> find_groups(std::size_t count, const std::vector<std::
 }
 
 /// The component of every triangle.
-std::vector<std::int32_t> find_components(const Triangles& triangles, const EdgeMap& edges) {
+std::vector<std::int32_t> find_components(const std::vector<std::int32_t>& opposite) {
   std::vector<std::pair<std::int32_t, std::int32_t>> joined;
-  for (const auto& [edge, triangle] : edges) joined.emplace_back(triangle, edges.at({edge.second, edge.first}));
-  return find_groups(triangles.size(), joined);
+  joined.reserve(opposite.size() / 2);
+  for (std::int32_t e = 0; e < static_cast<std::int32_t>(opposite.size()); ++e)
+    if (e < opposite[e]) joined.emplace_back(e / 3, opposite[e] / 3);
+  return find_groups(opposite.size() / 3, joined);
 }
 
 /// The fan of every corner of a triangle: corners of one vertex have the same number when edges at that vertex lead from one triangle to
 /// the other.
-std::vector<std::int32_t> find_fans(const Triangles& triangles, const EdgeMap& edges) {
-  const auto corner_at = [&](std::int32_t t, std::int32_t vertex) {
-    return 3 * t + static_cast<std::int32_t>(std::find(triangles[t].begin(), triangles[t].end(), vertex) - triangles[t].begin());
-  };
+std::vector<std::int32_t> find_fans(const std::vector<std::int32_t>& opposite) {
   std::vector<std::pair<std::int32_t, std::int32_t>> joined;
-  for (const auto& [edge, t] : edges) {
-    const std::int32_t other = edges.at({edge.second, edge.first});
-    joined.emplace_back(corner_at(t, edge.first), corner_at(other, edge.first));
-  }
-  return find_groups(3 * triangles.size(), joined);
+  joined.reserve(opposite.size());
+  // The corner a half-edge begins at is where its opposite ends.
+  for (std::int32_t e = 0; e < static_cast<std::int32_t>(opposite.size()); ++e)
+    joined.emplace_back(e, opposite[e] / 3 * 3 + (opposite[e] % 3 + 1) % 3);
+  return find_groups(opposite.size(), joined);
 }
 
 Vec3 corner(const Vertices& vertices, const Triangles& triangles, std::int32_t triangle, int k) {
@@ -114,11 +103,11 @@ Vec3 corner(const Vertices& vertices, const Triangles& triangles, std::int32_t t
 }
 
 Selection select_outer(const Vertices& vertices, const Triangles& triangles, const std::string& body) {
-  const EdgeMap edges = make_directed_edges(vertices, triangles, body);
-  const auto component = find_components(triangles, edges);
-  const auto fan = find_fans(triangles, edges);
+  const std::vector<std::int32_t> opposite = find_checked_opposites(vertices, triangles, body);
+  const auto component = find_components(opposite);
+  const auto fan = find_fans(opposite);
   Vec3 origin = corner(vertices, triangles, 0, 0);
-  std::map<std::int32_t, double> volume;  // six times
+  std::vector<double> volume(triangles.size(), 0.0);  // of a component: six times
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const auto i = static_cast<std::int32_t>(t);
     const Vec3 a = corner(vertices, triangles, i, 0) - origin, b = corner(vertices, triangles, i, 1) - origin,
@@ -126,7 +115,7 @@ Selection select_outer(const Vertices& vertices, const Triangles& triangles, con
     volume[component[t]] += SimTK::dot(a, SimTK::cross(b, c));
     const Vec3 twice_area = SimTK::cross(b - a, c - a);
     if (!(twice_area.norm() > 1e-14 * (b - a).normSqr())) {
-      throw InputError(fmt::format("body '{}': surface triangle {} has no area; mend the mesh and make the bank again", body, t));
+      throw InputError(fmt::format("body '{}': surface triangle {} has no area; repair the mesh and make the bank again", body, t));
     }
   }
   Selection s;
@@ -134,73 +123,62 @@ Selection select_outer(const Vertices& vertices, const Triangles& triangles, con
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     if (volume[component[t]] <= 0.0) continue;
     s.bank_triangle.push_back(static_cast<std::int32_t>(t));
+    Face face{};
     for (int k = 0; k < 3; ++k) {
       int& index = renumbered[fan[3 * t + k]];
       if (index < 0) {
         index = static_cast<int>(s.vertices.size());
         s.vertices.push_back(corner(vertices, triangles, static_cast<std::int32_t>(t), k));
       }
-      s.indices.push_back(index);
+      face[k] = index;
     }
+    s.faces.push_back(face);
   }
-  if (s.indices.empty()) {
+  if (s.faces.empty()) {
     throw InputError(fmt::format(
         "body '{}': the surface is inside out (its signed volume is negative); turn the triangles and make the bank again", body));
   }
   return s;
 }
 
-SimTK::ContactGeometry::TriangleMesh make_mesh(const Vertices& vertices, const Triangles& triangles, const std::string& body,
-                                               std::vector<std::int32_t>& bank_triangle) {
-  const Selection s = select_outer(vertices, triangles, body);
-  bank_triangle = s.bank_triangle;
-  try {
-    return {s.vertices, s.indices, false};
-  } catch (const SimTK::Exception::Base& e) {
-    throw InputError(fmt::format("body '{}': Simbody refuses the surface as contact geometry ({}); mend the mesh", body, e.what()));
-  }
+Mesh make_mesh(const Vertices& vertices, const Triangles& triangles, const std::string& body, std::vector<std::int32_t>& bank_triangle) {
+  Selection s = select_outer(vertices, triangles, body);
+  bank_triangle = std::move(s.bank_triangle);
+  return {std::move(s.vertices), std::move(s.faces)};
 }
 
 }  // namespace
 
 Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std::string& body)
     : mesh_(make_mesh(vertices, triangles, body, bank_triangle_)) {
-  neighbours_.resize(mesh_.getNumVertices());
-  face_ridges_.resize(mesh_.getNumFaces());
+  neighbours_.resize(mesh_.vertex_count());
+  face_ridges_.resize(mesh_.face_count());
+  for (int f = 0; f < mesh_.face_count(); ++f) face_middles_m_.push_back(mesh_.calc_centroid(f));
   std::vector<double> lengths;
-  for (int e = 0; e < mesh_.getNumEdges(); ++e) {
-    const int a = mesh_.getEdgeVertex(e, 0), b = mesh_.getEdgeVertex(e, 1);
+  for (const Mesh::Edge& edge : mesh_.edges()) {
+    const auto [a, b] = edge.vertices;
     neighbours_[a].push_back(b);
     neighbours_[b].push_back(a);
     const Vec3 along = vertex(b) - vertex(a);
     lengths.push_back(along.norm());
     RidgeEdge ridge;
-    ridge.vertices = {a, b};
+    ridge.vertices = edge.vertices;
     for (int k = 0; k < 2; ++k) {
-      const int f = mesh_.getEdgeFace(e, k);
-      Vec3 in = mesh_.findCentroid(f) - vertex(a);
+      Vec3 in = face_middles_m_[edge.faces[k]] - vertex(a);
       in -= along * (SimTK::dot(in, along) / along.normSqr());
       ridge.into_face[k] = in / in.norm();
     }
     // A flat or hollow edge can never be the one that touches first.
-    const Vec3 n0 = Vec3(mesh_.getFaceNormal(mesh_.getEdgeFace(e, 0)));
-    if (SimTK::dot(n0, ridge.into_face[1]) > -1e-3) continue;
-    for (int k = 0; k < 2; ++k) face_ridges_[mesh_.getEdgeFace(e, k)].push_back(static_cast<int>(ridges_.size()));
+    if (SimTK::dot(mesh_.normal(edge.faces[0]), ridge.into_face[1]) > -1e-3) continue;
+    for (const int f : edge.faces) face_ridges_[f].push_back(static_cast<int>(ridges_.size()));
     ridges_.push_back(ridge);
   }
   std::nth_element(lengths.begin(), lengths.begin() + lengths.size() / 2, lengths.end());
   edge_m_ = lengths[lengths.size() / 2];
-  Vec3 low(SimTK::Infinity), high(-SimTK::Infinity);
-  for (int v = 0; v < mesh_.getNumVertices(); ++v) {
-    for (int k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], vertex(v)[k]);
-      high[k] = std::max(high[k], vertex(v)[k]);
-    }
-  }
-  for (int f = 0; f < mesh_.getNumFaces(); ++f) {
-    face_middles_m_.push_back(mesh_.findCentroid(f));
+  const Vec3 &low = mesh_.box().low, &high = mesh_.box().high;
+  for (int f = 0; f < mesh_.face_count(); ++f) {
     double radius = 0.0;
-    for (int k = 0; k < 3; ++k) radius = std::max(radius, (vertex(mesh_.getFaceVertex(f, k)) - face_middles_m_[f]).norm());
+    for (const int v : mesh_.face(f)) radius = std::max(radius, (vertex(v) - face_middles_m_[f]).norm());
     face_radii_m_.push_back(radius);
   }
   find_corners();
@@ -211,14 +189,13 @@ Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std
 
 void Surface::find_corners() {
   constexpr double kStraight = 2e-4;  // rad
-  const int count = mesh_.getNumVertices();
+  const int count = mesh_.vertex_count();
   is_corner_.assign(count, 0);
   std::vector<int> any_face(count, -1);
-  for (int f = 0; f < mesh_.getNumFaces(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const int v = mesh_.getFaceVertex(f, k);
+  for (int f = 0; f < mesh_.face_count(); ++f) {
+    for (const int v : mesh_.face(f)) {
       if (any_face[v] < 0) any_face[v] = f;
-      const Vec3 bend = Vec3(mesh_.getFaceNormal(f)) - Vec3(mesh_.getFaceNormal(any_face[v]));
+      const Vec3 bend = mesh_.normal(f) - mesh_.normal(any_face[v]);
       if (bend.norm() > kStraight) is_corner_[v] = 1;
     }
   }
@@ -237,7 +214,7 @@ void Surface::find_corners() {
 double Surface::calc_curvature(const Vec3& point, const Vec3& normal) const {
   const double reach = std::max(2.5 * edge_m_, 0.04 * size_m_);
   double numerator = 0.0, denominator = 0.0;
-  for (int v = 0; v < mesh_.getNumVertices(); ++v) {
+  for (int v = 0; v < mesh_.vertex_count(); ++v) {
     const Vec3 d = vertex(v) - point;
     const double dist2 = d.normSqr();
     if (dist2 > reach * reach || dist2 == 0.0) continue;

@@ -1,12 +1,14 @@
-// The outer surface of a body as Simbody's mesh contact geometry, with the neighbourhoods that tell which features can touch.
+// The outer surface of a body as a mesh, with the neighbourhoods that tell which features can touch.
 #pragma once
 
-#include <SimTKmath.h>
+#include <SimTKcommon.h>
 
 #include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include "runtime/contact/mesh.hpp"
 
 namespace carillon::contact {
 
@@ -27,8 +29,8 @@ class Surface {
   /// names `body` and the place. Vertices in which several fans of triangles meet are split, so vertex numbers are not those of the bank.
   Surface(const Vertices& vertices_m, const Triangles& triangles, const std::string& body);
 
-  const SimTK::ContactGeometry::TriangleMesh& mesh() const { return mesh_; }
-  const SimTK::Vec3& vertex(int v) const { return mesh_.getVertexPosition(v); }
+  const Mesh& mesh() const { return mesh_; }
+  const SimTK::Vec3& vertex(int v) const { return mesh_.vertex(v); }
   const std::vector<int>& neighbours(int v) const { return neighbours_[v]; }
   /// Is v a corner of the shape, not merely of its mesh? One amid a flat face or on a straight edge is never the first to touch.
   bool is_corner(int v) const { return is_corner_[v] != 0; }
@@ -52,7 +54,7 @@ class Surface {
 
  private:
   std::vector<std::int32_t> bank_triangle_;  // before mesh_, whose making fills it
-  SimTK::ContactGeometry::TriangleMesh mesh_;
+  Mesh mesh_;
   void find_corners();
 
   std::vector<std::vector<int>> neighbours_;

@@ -1,4 +1,4 @@
-// Method: the two trees of oriented boxes that Simbody keeps for its meshes are walked together down to the triangles near the cut; of
+// Method: the trees of boxes of two meshes are walked together down to the triangles near the cut; of
 // these,
 //   a vertex inside the other body carries when none of its neighbours is deeper along the other's normal, and two ridges carry when their
 //   arcs on the Gauss map cross (the only two ways in which polyhedra touch first).
@@ -21,11 +21,11 @@ using SimTK::dot;
 using SimTK::Transform;
 using SimTK::UnitVec3;
 using SimTK::Vec3;
-using Node = SimTK::ContactGeometry::TriangleMesh::OBBTreeNode;
 
 constexpr double kFlat =
     0.02;  // rad; how far below the plane a neighbour may point: a flat face that lands nearly flat lands with all of itself
 
+constexpr double kRounding = 1e-12;   // of the size
 constexpr double kSunk = 2e-3;        // of the size
 constexpr double kMargin = 0.01;      // of the thinner body's thickness
 constexpr double kEnd = 1e-6;         // of an edge: two that cross where the next one begins must not be missed
@@ -44,34 +44,27 @@ bool carries(const Surface& surface, int v, const Vec3& normal) {
   return true;
 }
 
-/// Do the boxes of two nodes come within the margin of each other?
-bool are_boxes_near(const Node& a, const Node& b, const Transform& X_ba, double margin_m) {
-  const Transform X_box = X_ba * a.getBounds().getTransform();  // of a corner of the box
-  const SimTK::OrientedBoundingBox box(Transform(X_box.R(), X_box * Vec3(-margin_m)), a.getBounds().getSize() + Vec3(2 * margin_m));
-  return box.intersectsBox(b.getBounds());
-}
-
 /// The faces of both meshes whose leaves cut each other or are within the margin.
-void find_near_faces(const Node& a, const Node& b, const Transform& X_ba, double margin_m, std::set<int>& faces_a, std::set<int>& faces_b) {
-  if (!are_boxes_near(a, b, X_ba, margin_m)) return;
-  if (a.isLeafNode() && b.isLeafNode()) {
-    for (const int f : a.getTriangles()) faces_a.insert(f);
-    for (const int f : b.getTriangles()) faces_b.insert(f);
+void find_near_faces(const Mesh& a, int node_a, const Mesh& b, int node_b, const Transform& X_ba, double margin_m, std::set<int>& faces_a,
+                     std::set<int>& faces_b) {
+  const Mesh::Node &na = a.node(node_a), &nb = b.node(node_b);
+  if (!are_boxes_near(na.box, nb.box, X_ba, margin_m)) return;
+  if (na.child < 0 && nb.child < 0) {
+    for (int i = 0; i < na.count; ++i) faces_a.insert(a.order()[na.first + i]);
+    for (int i = 0; i < nb.count; ++i) faces_b.insert(b.order()[nb.first + i]);
     return;
   }
-  if (b.isLeafNode() || (!a.isLeafNode() && a.getNumTriangles() >= b.getNumTriangles())) {
-    find_near_faces(a.getFirstChildNode(), b, X_ba, margin_m, faces_a, faces_b);
-    find_near_faces(a.getSecondChildNode(), b, X_ba, margin_m, faces_a, faces_b);
+  if (nb.child < 0 || (na.child >= 0 && na.count >= nb.count)) {
+    for (int k = 0; k < 2; ++k) find_near_faces(a, na.child + k, b, node_b, X_ba, margin_m, faces_a, faces_b);
   } else {
-    find_near_faces(a, b.getFirstChildNode(), X_ba, margin_m, faces_a, faces_b);
-    find_near_faces(a, b.getSecondChildNode(), X_ba, margin_m, faces_a, faces_b);
+    for (int k = 0; k < 2; ++k) find_near_faces(a, node_a, b, nb.child + k, X_ba, margin_m, faces_a, faces_b);
   }
 }
 
 std::set<int> find_vertices(const Surface& surface, const std::set<int>& faces) {
   std::set<int> vertices;
   for (const int f : faces) {
-    for (int k = 0; k < 3; ++k) vertices.insert(surface.mesh().getFaceVertex(f, k));
+    for (const int v : surface.mesh().face(f)) vertices.insert(v);
   }
   return vertices;
 }
@@ -84,24 +77,24 @@ bool find_carrying_face(const Surface& mine, int v, const Surface& theirs, const
   int face = 0;
   SimTK::Vec2 uv;
   const auto& mesh = theirs.mesh();
-  const Vec3 nearest = mesh.findNearestPoint(x, inside, face, uv);
+  const Vec3 nearest = mesh.find_nearest(x, inside, face, uv);
   const double brim = kBrim * mine.size_m();
   if (!inside && (x - nearest).norm() > brim) return false;
   // A vertex that has sunk in counts whatever its neighbours do: something touched that none of the two tests knows.
   const bool sunk = (x - nearest).norm() > kSunk * mine.size_m();
-  if (inside && (sunk || carries(mine, v, ~R_theirs_mine * Vec3(mesh.getFaceNormal(face))))) {
+  if (inside && (sunk || carries(mine, v, ~R_theirs_mine * mesh.normal(face)))) {
     touch.plane_point = nearest;
-    touch.plane_normal = Vec3(mesh.getFaceNormal(face));
+    touch.plane_normal = mesh.normal(face);
     return true;
   }
   double least = 0.05 * mine.size_m();
   bool found = false;
   for (const int f : their_faces) {
-    const Vec3 n(mesh.getFaceNormal(f));
-    const double depth = dot(n, mesh.getVertexPosition(mesh.getFaceVertex(f, 0)) - x);
+    const Vec3& n = mesh.normal(f);
+    const double depth = dot(n, mesh.vertex(mesh.face(f)[0]) - x);
     if (depth <= 0.0 || depth >= least) continue;
     const Vec3 on_plane = x + depth * n;
-    if ((mesh.findNearestPointToFace(on_plane, f, uv) - on_plane).norm() > brim || !carries(mine, v, ~R_theirs_mine * n)) continue;
+    if ((mesh.find_nearest_on_face(on_plane, f, uv) - on_plane).norm() > brim || !carries(mine, v, ~R_theirs_mine * n)) continue;
     least = depth;
     touch.plane_point = on_plane;
     touch.plane_normal = n;
@@ -110,8 +103,8 @@ bool find_carrying_face(const Surface& mine, int v, const Surface& theirs, const
   return found;
 }
 
-/// A cheap look at the faces near the cut alone: may x (frame of `theirs`) be inside? Simbody's search over the whole mesh takes
-/// milliseconds for a point that many faces are about equally far from, so only the few points that pass come to it.
+/// A cheap look at the faces near the cut alone: may x (frame of `theirs`) be inside? A search over the whole mesh takes long
+/// for a point that many faces are about equally far from, so only the few points that pass come to it.
 bool may_be_inside(const Surface& theirs, const std::set<int>& their_faces, const Vec3& x, double brim) {
   const auto& mesh = theirs.mesh();
   double least = SimTK::Infinity;
@@ -121,11 +114,11 @@ bool may_be_inside(const Surface& theirs, const std::set<int>& their_faces, cons
     const double reach = least_root + theirs.face_radius_m(f);
     if ((x - theirs.face_middle_m(f)).normSqr() > reach * reach * (1.0 + 1e-9)) continue;
     SimTK::Vec2 uv;
-    const Vec3 d = x - mesh.findNearestPointToFace(x, f, uv);
+    const Vec3 d = x - mesh.find_nearest_on_face(x, f, uv);
     const double dist2 = d.normSqr();
     if (dist2 > least) continue;
     // Where two faces are equally near, inside either will do.
-    inside = (dist2 == least && inside) || dot(d, Vec3(mesh.getFaceNormal(f))) < 0.0;
+    inside = (dist2 == least && inside) || dot(d, mesh.normal(f)) < 0.0;
     least = dist2;
     least_root = std::sqrt(dist2);
   }
@@ -217,16 +210,10 @@ void place_touch(TouchPoint& t, const Transform& X_a, const Transform& X_b) {
 std::vector<TouchPoint> find_ground_touches(int a, const Surface& surface, const Transform& X_a, double height_m) {
   std::vector<TouchPoint> out;
   if ((X_a * surface.middle_m())[2] - surface.radius_m() > height_m) return out;
-  // Simbody's half space fills x > 0 of its own frame, so its x axis points down.
-  static const SimTK::ContactTracker::HalfSpaceTriangleMesh tracker;
-  static const SimTK::ContactGeometry::HalfSpace half_space;
-  const SimTK::UntrackedContact prior(SimTK::ContactSurfaceIndex(0), SimTK::ContactSurfaceIndex(1));
-  const Transform X_half(SimTK::Rotation(SimTK::Pi / 2, SimTK::YAxis), Vec3(0, 0, height_m));
-  SimTK::Contact found;
-  tracker.trackContact(prior, X_half, half_space, X_a, surface.mesh(), 0.0, found);
-  if (found.isEmpty() || !SimTK::TriangleMeshContact::isInstance(found)) return out;
   const Vec3 up = ~X_a.R() * Vec3(0, 0, 1);
-  for (const int v : find_vertices(surface, SimTK::TriangleMeshContact::getAs(found).getSurface2Faces())) {
+  std::set<int> below;
+  surface.mesh().for_vertices_below(up, height_m - X_a.p()[2] + kRounding * surface.size_m(), [&](int v) { below.insert(v); });
+  for (const int v : below) {
     const Vec3 x = X_a * surface.vertex(v);
     if (x[2] >= height_m || !carries(surface, v, up)) continue;
     TouchPoint t;
@@ -251,7 +238,7 @@ std::vector<TouchPoint> find_touches(int a, const Surface& sa, const Transform& 
   const double moved = (X_ba * sa.middle_m() - near.X_ba * sa.middle_m()).norm() + turned * sa.radius_m();
   if (!near.known || moved > margin) {
     near = {true, X_ba, {}, {}};
-    find_near_faces(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), X_ba, margin, near.faces_a, near.faces_b);
+    find_near_faces(sa.mesh(), 0, sb.mesh(), 0, X_ba, margin, near.faces_a, near.faces_b);
   }
   const std::set<int>&faces_a = near.faces_a, &faces_b = near.faces_b;
   if (faces_a.empty()) return out;
@@ -268,21 +255,24 @@ std::vector<TouchPoint> find_touches(int a, const Surface& sa, const Transform& 
 bool may_be_near(const Surface& sa, const Transform& X_a, const Surface& sb, const Transform& X_b, double margin_m) {
   const double reach = sa.radius_m() + sb.radius_m() + margin_m;
   if ((X_a * sa.middle_m() - X_b * sb.middle_m()).normSqr() > reach * reach) return false;
-  return are_boxes_near(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), ~X_b * X_a, margin_m);
+  return are_boxes_near(sa.mesh().box(), sb.mesh().box(), ~X_b * X_a, margin_m);
 }
 
 double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, const Transform& X_b, Vec3& where) {
   if (far_apart(sa, X_a, sb, X_b)) return 0.0;
   double deepest = 0.0;
+  const auto find_depth = [](const Mesh& mesh, const Vec3& x, bool& inside) {
+    int face = 0;
+    SimTK::Vec2 uv;
+    return (mesh.find_nearest(x, inside, face, uv) - x).norm();
+  };
   const auto test_vertices = [&](const Surface& mine, const Transform& X_mine, const Surface& theirs, const Transform& X_theirs) {
     const Transform X = ~X_theirs * X_mine;
-    const SimTK::OrientedBoundingBox& box = theirs.mesh().getOBBTreeNode().getBounds();
-    for (int v = 0; v < mine.mesh().getNumVertices(); ++v) {
+    for (int v = 0; v < mine.mesh().vertex_count(); ++v) {
       const Vec3 x = X * mine.vertex(v);
-      if (!box.containsPoint(x)) continue;
+      if (!theirs.mesh().box().contains(x)) continue;
       bool inside = false;
-      UnitVec3 normal;
-      const double depth = (theirs.mesh().findNearestPoint(x, inside, normal) - x).norm();
+      const double depth = find_depth(theirs.mesh(), x, inside);
       if (inside && depth > deepest) {
         deepest = depth;
         where = X_theirs * x;
@@ -297,24 +287,24 @@ double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, 
     const Transform X = ~X_theirs * X_mine;
     for (const int f : faces) {
       for (int k = 0; k < 3; ++k) {
-        const Vec3 p = X * mine.vertex(mine.mesh().getFaceVertex(f, k));
-        const Vec3 d = X * mine.vertex(mine.mesh().getFaceVertex(f, (k + 1) % 3)) - p;
+        const Vec3 p = X * mine.vertex(mine.mesh().face(f)[k]);
+        const Vec3 d = X * mine.vertex(mine.mesh().face(f)[(k + 1) % 3]) - p;
         const double length = d.norm();
-        const UnitVec3 along(d);
+        const Vec3 along = d / length;
         double enter = SimTK::Infinity, leave = SimTK::Infinity;
-        UnitVec3 normal;
-        if (!theirs.mesh().intersectsRay(p, along, enter, normal) || enter > length) continue;
-        if (dot(Vec3(normal), d) > 0.0) {  // it began inside
+        Vec3 normal(0);
+        if (!theirs.mesh().find_crossing(p, along, enter, normal) || enter > length) continue;
+        if (dot(normal, d) > 0.0) {  // it began inside
           leave = enter;
           enter = 0.0;
         } else {
-          UnitVec3 other;
+          Vec3 other(0);
           const double past = enter + 1e-9 * length;
-          if (theirs.mesh().intersectsRay(p + past * Vec3(along), along, leave, other)) leave += past;
+          if (theirs.mesh().find_crossing(p + past * along, along, leave, other)) leave += past;
         }
-        const Vec3 middle = p + 0.5 * (enter + std::min(leave, length)) * Vec3(along);
+        const Vec3 middle = p + 0.5 * (enter + std::min(leave, length)) * along;
         bool inside = false;
-        const double depth = (theirs.mesh().findNearestPoint(middle, inside, normal) - middle).norm();
+        const double depth = find_depth(theirs.mesh(), middle, inside);
         if (inside && depth > deepest) {
           deepest = depth;
           where = X_theirs * middle;
@@ -323,7 +313,7 @@ double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, 
     }
   };
   std::set<int> faces_a, faces_b;
-  find_near_faces(sa.mesh().getOBBTreeNode(), sb.mesh().getOBBTreeNode(), ~X_b * X_a, 0.0, faces_a, faces_b);
+  find_near_faces(sa.mesh(), 0, sb.mesh(), 0, ~X_b * X_a, 0.0, faces_a, faces_b);
   test_edges(sa, X_a, sb, X_b, faces_a);
   test_edges(sb, X_b, sa, X_a, faces_b);
   // Two bodies whose faces coincide (the same body twice at the same place) have vertices and edges on, not in, each other. Their insides
@@ -334,15 +324,15 @@ double calc_overlap(const Surface& sa, const Transform& X_a, const Surface& sb, 
     std::size_t count = 0;
     for (const int f : faces) {
       if (count++ % stride != 0) continue;
-      const UnitVec3 inwards = -mine.mesh().getFaceNormal(f);
-      const Vec3 start = mine.mesh().findCentroid(f) + 1e-6 * mine.size_m() * Vec3(inwards);
+      const Vec3 inwards = -mine.mesh().normal(f);
+      const Vec3 start = mine.face_middle_m(f) + 1e-6 * mine.size_m() * inwards;
       double across = 0.0;
-      UnitVec3 normal;
-      if (!mine.mesh().intersectsRay(start, inwards, across, normal)) continue;
-      const Vec3 x = ~X_theirs * (X_mine * (start + 0.5 * across * Vec3(inwards)));
-      if (!theirs.mesh().getOBBTreeNode().getBounds().containsPoint(x)) continue;
+      Vec3 normal(0);
+      if (!mine.mesh().find_crossing(start, inwards, across, normal)) continue;
+      const Vec3 x = ~X_theirs * (X_mine * (start + 0.5 * across * inwards));
+      if (!theirs.mesh().box().contains(x)) continue;
       bool inside = false;
-      const double depth = std::min((theirs.mesh().findNearestPoint(x, inside, normal) - x).norm(), 0.5 * across);
+      const double depth = std::min(find_depth(theirs.mesh(), x, inside), 0.5 * across);
       if (inside && depth > deepest) {
         deepest = depth;
         where = X_theirs * x;

@@ -1,7 +1,7 @@
 // Which features of two surfaces are inside each other: vertices in faces and ridges across ridges.
 #pragma once
 
-#include <SimTKmath.h>
+#include <SimTKcommon.h>
 
 #include <array>
 #include <set>

@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   });
   app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
   auto* output =
-      app.add_option("-o,--output", options.wav, "WAV file to write: stereo, or a channel for each microphone; required without --plan")
+      app.add_option("-o,--output", options.wav, "WAV file to write: stereo, or a channel for each microphone; - is standard output; required without --plan")
           ->option_text("OUT.wav");
   app.add_option("--spectrogram", options.spectrogram, "Picture of the sound: level over time and frequency")->option_text("OUT.png");
   app.add_option("--trajectory", options.trajectory, "Paths of the bodies and their contacts")->option_text("OUT.json");
@@ -59,7 +59,7 @@ int main(int argc, char** argv) {
   } catch (const carillon::SolveError& error) {
     return fail(carillon::kExitSolve, error.what());
   } catch (const std::bad_alloc&) {
-    return fail(carillon::kExitSystem, "not enough memory; render a shorter scene or at a lower rate");
+    return fail(carillon::kExitSystem, "not enough memory; use smaller banks or fewer microphones");
   } catch (const std::exception& error) {
     return fail(carillon::kExitSystem, error.what());
   }

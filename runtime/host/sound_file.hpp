@@ -10,7 +10,7 @@
 
 namespace carillon::host {
 
-/// Bytes of the file for so many frames. Above 4 GiB it is an RF64 (EBU Tech 3306), which is what a WAV file is called that long.
+/// Bytes of the file for so many frames. Above 4 GiB it is an RF64 (EBU Tech 3306), which is the form of a WAV file of that length.
 std::uint64_t calc_wav_bytes(std::size_t channels, SampleFormat format, std::uint64_t frames);
 
 /// All that stands before the samples. Lengths are in it, so that the file can be written from front to back.

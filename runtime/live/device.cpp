@@ -9,9 +9,10 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <chrono>
+#include <cstdint>
 
 #include "runtime/config/error.hpp"
+#include "runtime/synth/cpu_ticks.hpp"
 
 namespace carillon::live {
 namespace {
@@ -73,10 +74,9 @@ struct Device::State {
     if ((flags & paOutputUnderflow) != 0) state.underflows.fetch_add(1, std::memory_order_relaxed);
     state.callbacks.fetch_add(1, std::memory_order_relaxed);
     state.frames.fetch_add(static_cast<std::int64_t>(frames), std::memory_order_relaxed);
-    const auto started = std::chrono::steady_clock::now();
+    const std::uint64_t started_ns = synth::get_cpu_ticks();
     state.synthesiser->process(static_cast<float* const*>(out), state.synthesiser->get_microphone_count(), static_cast<int>(frames));
-    const auto spent = std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - started);
-    state.busy_ns.fetch_add(spent.count(), std::memory_order_relaxed);
+    state.busy_ns.fetch_add(static_cast<std::int64_t>(synth::get_cpu_ticks() - started_ns), std::memory_order_relaxed);
     return paContinue;
   }
 };

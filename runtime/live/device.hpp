@@ -24,7 +24,7 @@ struct DeviceStatistics {
   std::int64_t frames = 0;
   std::int64_t underflows = 0;  // blocks that came too late, as the card says
   double latency_s = 0.0;       // of the output, as the card says
-  double busy_s = 0.0;          // that process() took, by the clock
+  double busy_s = 0.0;          // CPU time that process() took
 };
 
 /// Output devices by name, the default one first. Throws SystemError when there is no sound system. [main-thread]

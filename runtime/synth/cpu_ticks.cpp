@@ -20,7 +20,7 @@ struct Cost {
   std::uint64_t one_ns = 0;  // of a call
   std::uint64_t all_ns = 0;  // of all so far
   Cost() noexcept {
-    constexpr int kCalls = 100, kRounds = 10;
+    constexpr int kCalls = 20, kRounds = 5;
     std::uint64_t least = ~std::uint64_t{0};
     for (int round = 0; round < kRounds; ++round) {
       const std::uint64_t begin = read_clock();

@@ -76,7 +76,7 @@ class OneHit(unittest.TestCase):
         scene = {"duration_s": 0.45, "radiation": "osg02", "effects": ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"], "bodies": [
             {"name": "anvil", "bank": "anvil.h5", "fixed": True, **contact},
             {"name": "mute", "bank": "mute.h5", "position_m": FALL_FROM.tolist(), "rotation_deg": [*TURN_DEG, 0], **contact}],
-            "listener": {"position_m": LISTENER.tolist(), "facing": [0, 1, 0]}, "output": {"gain": GAIN, "format": "float"}}
+            "listener": {"position_m": LISTENER.tolist(), "facing": [0, 1, 0]}, "output": {"gain": GAIN, "format": "float", "fade_end": False}}
         (cls.root / "scene.json").write_text(json.dumps(scene))
         cls.bank = Bank(cls.root / "anvil.h5")
         cls.sounds = {}
