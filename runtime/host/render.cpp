@@ -182,16 +182,15 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                                   .ticks = options.measures ? &get_ticks : nullptr});
   for (std::size_t i = 0; i < fed.size(); ++i) {
     const double longest_m = std::min(courses[i].reach_m + ears_reach_m, kFarthestHeardM);
-    synthesiser.add_body(body_models[i],
-                         {.position_m = courses[i].first.position_m,
-                          .rotation = courses[i].first.rotation,
-                          .effects = changes.find_first(i),
-                          .silence_pa = find_silence_pa(scene, i, options.plan),
-                          .surface = {.roughness_m = scene.bodies[i].spec.roughness_m, .friction = scene.bodies[i].spec.friction},
-                          .longest_m = longest_m,
-                          .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs),
-                          .isa = scene.quality.instructions,
-                          .audits_energy = options.audits});
+    synthesiser.add_body(body_models[i], {.position_m = courses[i].first.position_m,
+                                          .rotation = courses[i].first.rotation,
+                                          .effects = changes.find_first(i),
+                                          .silence_pa = find_silence_pa(scene, i, options.plan),
+                                          .surface = make_surface(scene.bodies[i]),
+                                          .longest_m = longest_m,
+                                          .max_waypoints = feed.count_waypoints(static_cast<int>(i), longest_m / synth::kSoundSpeedMs),
+                                          .isa = scene.quality.instructions,
+                                          .audits_energy = options.audits});
   }
 
   constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
@@ -242,15 +241,6 @@ synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::Effec
   if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
   return effects;
-}
-
-synth::Surface make_ground(const Scene& scene) {
-  synth::Surface surface = synth::kGroundSurface;
-  if (!scene.ground) return surface;
-  surface.roughness_m = scene.ground->roughness_m;
-  surface.friction = scene.ground->friction;
-  surface.modulus_pa = scene.ground->young_modulus_pa / (1.0 - scene.ground->poisson_ratio * scene.ground->poisson_ratio);
-  return surface;
 }
 
 double calc_peak_pa(const Sound& sound) {

@@ -53,9 +53,6 @@ synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::Effec
 /// Mode-samples that a second of sound may take: quality.modes at all times, or as many as there are.
 double calc_budget(const Quality& quality, double rate_hz);
 
-/// The ground as those feel it who slide on it.
-synth::Surface make_ground(const Scene& scene);
-
 /// Largest absolute pressure of all channels [Pa].
 double calc_peak_pa(const Sound& sound);
 
