@@ -213,7 +213,8 @@ typedef enum carillon_contact_state {
 typedef struct carillon_contact {
   uint32_t size;
   int32_t state; /* carillon_contact_state */
-  uint64_t id;   /* of the touch, the same while it lasts */
+  uint64_t id;   /* of the touch, the same while it lasts; it chooses the profiles of both surfaces, so give a touch the same id whatever
+                    else there is, and it sounds the same */
   int32_t body;
   int32_t other;    /* the other body; -1: the ground, or unknown */
   int32_t triangle; /* of the bank */

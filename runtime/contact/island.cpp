@@ -41,13 +41,15 @@ double calc_approach(const Engine& engine, const Snapshot& now, const TouchPoint
 }  // namespace
 
 Island::Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces, double time_s, const std::vector<OldPoint>& recent,
-               const std::vector<RestedPoint>& rested, const std::vector<Spot>& spots, const WorldOptions& options)
+               const std::vector<RestedPoint>& rested, const std::vector<Spot>& spots, const TouchCounts& touches,
+               const WorldOptions& options)
     : world_(std::move(world)),
       members_(std::move(members)),
       engine_(world_, surfaces, time_s, options),
       state_(engine_.initial()),
       has_lasting_(options.lasting_contacts),
-      audits_(options.audits_energy) {
+      audits_(options.audits_energy),
+      lasting_(touches) {
   still_since_s_ = time_s;
   const auto find = [&](int body) {
     const auto it = std::lower_bound(members_.begin(), members_.end(), body);

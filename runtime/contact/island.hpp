@@ -24,9 +24,9 @@ class Island {
  public:
   /// `world`: the bodies that belong together and all that stand still, as they are at time_s. members[i]: the number in the scene of its
   /// body i, rising. `recent`, `rested`, `spots`: the points of the whole scene that were in contact within the last moments, those that
-  /// hold bodies up, and what touches. `options`: of the world.
+  /// hold bodies up, and what touches. `touches`: counted before the window; must outlive this. `options`: of the world.
   Island(WorldModel world, std::vector<int> members, SurfaceSet& surfaces, double time_s, const std::vector<OldPoint>& recent,
-         const std::vector<RestedPoint>& rested, const std::vector<Spot>& spots, const WorldOptions& options);
+         const std::vector<RestedPoint>& rested, const std::vector<Spot>& spots, const TouchCounts& touches, const WorldOptions& options);
 
   /// From now on events and moves are counted anew.
   void begin_window();
@@ -54,6 +54,7 @@ class Island {
   void add_recent(std::vector<OldPoint>& out) const;
   void add_rested(std::vector<RestedPoint>& out) const;
   void add_spots(std::vector<Spot>& out) const;
+  const TouchCounts& get_touches() const { return lasting_.get_touches(); }
 
  private:
   struct Step {

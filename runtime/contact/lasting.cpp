@@ -156,18 +156,39 @@ void record(const Engine& engine, const Snapshot& now, const Group& g, Spot& spo
   }
 }
 
-/// The pair, the instant in tenths of a millisecond and the place in the order of that instant: the same however islands are cut.
-std::uint64_t make_id(const std::vector<int>& members, const Group& g, double time_s, std::uint64_t place) {
-  const auto a = static_cast<std::uint64_t>(members[g.a]), b = g.b < 0 ? 0 : static_cast<std::uint64_t>(members[g.b] + 1);
-  return (a & 0xfff) << 51 | (b & 0xfff) << 39 | (static_cast<std::uint64_t>(std::max(0.0, time_s) * 1e4) & 0x7ffffff) << 12 |
-         (place & 0xfff);
+std::uint64_t scramble(std::uint64_t z) {  // splitmix64 (Steele, Lea and Flood 2014)
+  z += 0x9e3779b97f4a7c15U;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
+  return z ^ (z >> 31);
+}
+
+/// FNV-1a (Fowler, Noll and Vo 1991) of a body's name; 0 for the ground.
+std::uint64_t hash_name(const Engine& engine, int body) {
+  if (body < 0) return 0;
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : engine.world().bodies[body].name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return hash;
 }
 
 }  // namespace
 
+/// Of the names of the pair and the number of the touch among theirs: other bodies of the scene change nothing of it, nor does their order.
+std::uint64_t LastingContacts::make_id(const Engine& engine, const std::vector<int>& members, const Spot& spot) {
+  const std::pair<int, int> pair{members[spot.a], spot.b < 0 ? -1 : members[spot.b]};
+  const auto counted = before_->find(pair);
+  std::uint64_t& touch = touches_.try_emplace(pair, counted == before_->end() ? 0 : counted->second).first->second;
+  const std::uint64_t of_pair = scramble(hash_name(engine, spot.a)) + scramble(hash_name(engine, spot.b));
+  std::uint64_t id = scramble(of_pair + touch) >> 1;  // files hold signed numbers
+  ++touch;
+  // Bodies may have one name.
+  while (std::any_of(spots_.begin(), spots_.end(), [&](const Spot& other) { return other.begun_s >= 0.0 && other.id == id; }))
+    id = scramble(id) >> 1;
+  return id;
+}
+
 void LastingContacts::update(const Engine& engine, const std::vector<int>& members, const Snapshot& now,
                              std::vector<stream::Contact>& events) {
-  std::uint64_t place = 0;
   for (const Group& g : make_groups(engine, now)) {
     Spot* nearest = nullptr;
     double least = 2.0 * engine.spot_radius_m(g.a, g.b);
@@ -178,10 +199,8 @@ void LastingContacts::update(const Engine& engine, const std::vector<int>& membe
         least = distance;
       }
     }
-    ++place;
     if (nearest == nullptr) {
       Spot spot;
-      spot.id = make_id(members, g, now.time_s, place);
       spot.a = g.a;
       spot.b = g.b;
       spot.where = g.where;
@@ -200,7 +219,9 @@ void LastingContacts::update(const Engine& engine, const std::vector<int>& membe
     spot.features = g.features;
     spot.seen_s = now.time_s;
     const bool is_due = spot.begun_s < 0.0 ? now.time_s - spot.quiet_s > kPatience : now.time_s - spot.recorded_s >= kInterval;
-    if (is_due) record(engine, now, g, spot, events);
+    if (!is_due) continue;
+    if (spot.begun_s < 0.0) spot.id = make_id(engine, members, spot);
+    record(engine, now, g, spot, events);
   }
   for (Spot& spot : spots_) {
     if (now.time_s - spot.seen_s <= kGone || spot.begun_s < 0.0) continue;

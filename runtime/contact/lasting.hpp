@@ -5,6 +5,8 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "runtime/contact/engine.hpp"
@@ -14,7 +16,7 @@ namespace carillon::contact {
 
 /// A place where two bodies touch, followed while they do.
 struct Spot {
-  std::uint64_t id = 0;
+  std::uint64_t id = 0;  // of the contact, from its first record on
   int a = 0, b = -1;
   SimTK::Vec3 where{0};
   SimTK::Vec3 drift{0};                      // velocity of the place over the surface whose corners carry, smoothed
@@ -27,8 +29,14 @@ struct Spot {
   std::array<stream::Contact, 2> last;  // of both bodies
 };
 
+/// How many lasting contacts each pair of bodies has had, by their numbers in the scene; -1: the ground.
+using TouchCounts = std::map<std::pair<int, int>, std::uint64_t>;
+
 class LastingContacts {
  public:
+  /// `before`: what was counted by others, which must outlive this and not change while this one counts.
+  explicit LastingContacts(const TouchCounts& before) : before_(&before) {}
+
   /// After a step: what touches now, from the resting points of the engine at the state reached. Appends events with the engine's own
   /// numbers of bodies; `members`: their numbers in the scene.
   void update(const Engine& engine, const std::vector<int>& members, const Snapshot& now, std::vector<stream::Contact>& events);
@@ -37,8 +45,14 @@ class LastingContacts {
 
   std::vector<Spot>& spots() { return spots_; }
   const std::vector<Spot>& spots() const { return spots_; }
+  /// Of the pairs that began a contact here, with what was before.
+  const TouchCounts& get_touches() const { return touches_; }
 
  private:
+  std::uint64_t make_id(const Engine& engine, const std::vector<int>& members, const Spot& spot);
+
+  const TouchCounts* before_;
+  TouchCounts touches_;
   std::vector<Spot> spots_;
 };
 

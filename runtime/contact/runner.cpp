@@ -104,6 +104,7 @@ class Runner::Parts {
   std::vector<OldPoint> recent_;     // of all islands, at the start of the window
   std::vector<RestedPoint> rested_;  // the same
   std::vector<Spot> spots_;          // the same
+  TouchCounts touches_;              // the same
   std::vector<std::unique_ptr<Island>> islands_;
   std::vector<int> group_;   // of each body, in the window before: the lowest number in its island
   std::size_t current_ = 0;  // the island that is on its way through the window
@@ -164,7 +165,7 @@ void Runner::Parts::add_island(const std::vector<int>& moving) {
     part.bodies.push_back(world_.bodies[i]);
   }
   islands_.push_back(
-      std::make_unique<Island>(std::move(part), std::move(members), surfaces_, reached_s_, recent_, rested_, spots_, options_));
+      std::make_unique<Island>(std::move(part), std::move(members), surfaces_, reached_s_, recent_, rested_, spots_, touches_, options_));
   ++made_;
 }
 
@@ -309,6 +310,7 @@ void Runner::Parts::close_window(const Sink& sink) {
     island->add_recent(recent_);
     island->add_rested(rested_);
     island->add_spots(spots_);
+    for (const auto& [pair, count] : island->get_touches()) touches_[pair] = count;
     events.insert(events.end(), island->get_events().begin(), island->get_events().end());
   }
   if (options_.audits_energy) audit();

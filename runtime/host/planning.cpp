@@ -9,6 +9,22 @@
 
 namespace carillon::host {
 
+synth::Surface make_surface(const SceneBody& body) {
+  // FNV-1a (Fowler, Noll and Vo 1991).
+  std::uint64_t seed = 0xcbf29ce484222325U;
+  for (const char c : body.name) seed = (seed ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = seed};
+}
+
+synth::Surface make_ground(const Scene& scene) {
+  synth::Surface surface = synth::kGroundSurface;
+  if (!scene.ground) return surface;
+  surface.roughness_m = scene.ground->roughness_m;
+  surface.friction = scene.ground->friction;
+  surface.modulus_pa = scene.ground->young_modulus_pa / (1.0 - scene.ground->poisson_ratio * scene.ground->poisson_ratio);
+  return surface;
+}
+
 plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves) {
   plan::SceneFacts facts;
   facts.rate_hz = scene.sample_rate_hz;
@@ -16,6 +32,7 @@ plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, 
   facts.microphones_m = microphones.offset_m;
   facts.moves = moves;
   facts.strictness = scene.quality.planner;
+  facts.ground = make_ground(scene);
   if (scene.microphones_m.empty()) {
     facts.listener = scene.listener.path;
     if (facts.listener.empty()) facts.listener.push_back({0.0, scene.listener.position_m});
@@ -29,7 +46,8 @@ plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, 
                             .fixed = body.spec.fixed,
                             .struck = struck,
                             .position_m = calc_world_point(body.spec.initial, body.spec.bank->rigid.centre_m),
-                            .wish = body.wish});
+                            .wish = body.wish,
+                            .surface = make_surface(body)});
   }
   return facts;
 }

@@ -13,6 +13,11 @@
 
 namespace carillon::host {
 
+/// A body and the ground as those feel them who slide on them. The seed of a body's surface comes from its name: other bodies of the scene
+/// change nothing of it.
+synth::Surface make_surface(const SceneBody& body);
+synth::Surface make_ground(const Scene& scene);
+
 /// What is known before anything moves. Every body's spec has its bank, and the scene outlives the result. `moves`: bodies that are not
 /// fixed may move.
 plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves);

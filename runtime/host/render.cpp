@@ -236,7 +236,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                           .rotation = courses[i].first.rotation,
                           .effects = changes.find_first(i),
                           .silence_pa = find_silence_pa(scene, i, options.plan),
-                          .surface = {.roughness_m = scene.bodies[i].spec.roughness_m, .friction = scene.bodies[i].spec.friction},
+                          .surface = make_surface(scene.bodies[i]),
                           .longest_m = longest_m[i],
                           .max_waypoints = waypoints[i],
                           .isa = scene.quality.instructions,
@@ -291,15 +291,6 @@ synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::Effec
   if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
   return effects;
-}
-
-synth::Surface make_ground(const Scene& scene) {
-  synth::Surface surface = synth::kGroundSurface;
-  if (!scene.ground) return surface;
-  surface.roughness_m = scene.ground->roughness_m;
-  surface.friction = scene.ground->friction;
-  surface.modulus_pa = scene.ground->young_modulus_pa / (1.0 - scene.ground->poisson_ratio * scene.ground->poisson_ratio);
-  return surface;
 }
 
 Meter::Meter(int rate_hz, std::size_t channels) : channels_(channels), window_(static_cast<std::size_t>(std::max(1.0, kFastS * rate_hz))) {}

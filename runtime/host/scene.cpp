@@ -136,7 +136,7 @@ plan::Wish read_effects(config::Object& object) {
 /// Exactly what a wish says where nobody plans.
 synth::EffectSet find_usual(const plan::Wish& wish) { return wish.automatic ? kDefaultEffects.with(wish.on).without(wish.off) : wish.on; }
 
-SceneBody parse_body(config::Object& object, const plan::Wish& wish) {
+SceneBody parse_body(config::Object& object, const plan::Wish& wish, double variation) {
   SceneBody body;
   body.name = object.string("name");
   if (body.name.size() > kLongestName ||
@@ -145,6 +145,7 @@ SceneBody parse_body(config::Object& object, const plan::Wish& wish) {
                 fmt::format("is no name: at most {} bytes, and none of them a line feed or another control character", kLongestName));
   }
   body.bank = object.path("bank");
+  body.variation = read_within(object, "variation", variation, 0.0, 1.0);
   contact::BodySpec& spec = body.spec;
   spec.name = body.name;
   spec.fixed = object.boolean_or("fixed", false);
@@ -339,7 +340,8 @@ Scene parse_scene(const config::Document& document) {
 
   std::vector<config::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
-    for (const char* later : {"strikes", "listener", "microphones", "effects", "radiation", "output", "quality"}) root.has(later);
+    for (const char* later : {"strikes", "listener", "microphones", "effects", "variation", "radiation", "output", "quality"})
+      root.has(later);
     root.finish();  // a mistyped key is the likeliest reason
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
   }
@@ -348,9 +350,10 @@ Scene parse_scene(const config::Document& document) {
                                     kMostBodies));
   if (root.has("effects")) scene.wish = read_effects(root);
   scene.effects = find_usual(scene.wish);
+  const double variation = read_within(root, "variation", 0.0, 0.0, 1.0);
   Names names;
   for (config::Object& object : bodies) {
-    scene.bodies.push_back(parse_body(object, scene.wish));
+    scene.bodies.push_back(parse_body(object, scene.wish, variation));
     const std::string& name = scene.bodies.back().name;
     if (!names.emplace(name, names.size()).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));

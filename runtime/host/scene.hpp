@@ -37,6 +37,7 @@ struct SceneBody {
   std::filesystem::path bank;  // absolute
   contact::BodySpec spec;      // spec.bank is filled when the banks are read
   plan::Wish wish;             // its own key "effects", or the scene's
+  double variation = 0.0;      // its own key "variation", or the scene's: how much equal strikes differ, 0..1
 };
 
 /// A blow that the scene gives without physics. Point and impulse are in the frame of the body's mesh.

@@ -145,7 +145,7 @@ void play(const PlayerOptions& options) {
                                  .rotation = spec.initial.rotation,
                                  .effects = host::find_effects(scene, i, effects),
                                  .silence_pa = scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa),
-                                 .surface = {.roughness_m = spec.roughness_m, .friction = spec.friction},
+                                 .surface = host::make_surface(scene.bodies[i]),
                                  .isa = scene.quality.instructions});
   }
   Course course(scene, body_banks, planner);

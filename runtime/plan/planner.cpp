@@ -26,6 +26,7 @@ namespace {
 
 using std::numbers::pi;
 using Rule = Reason::Rule;
+constexpr double kRingS = 0.05;
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kAlways = std::numeric_limits<double>::infinity();
 using synth::kContactEffects;
@@ -65,6 +66,16 @@ struct Planner::State {
       double share = 0.0;  // of its damping, were all modes sounding
     };
     std::vector<Lasting> lasting;  // contacts that have not ended; of those that lie still no records come
+    struct Driving {
+      std::uint64_t id = 0;
+      double since_s = 0.0;  // up to where the ring knows of it
+      double size = 0.0;
+      stream::Contact strongest;  // of the records since
+      stream::Contact last;       // that holds until another comes
+    };
+    std::vector<Driving> driving;    // contacts that slide or roll
+    std::vector<double> ring_m2_s2;  // per mode: mean square of q' [kg m^2 / s^2] that contacts have driven, at ring_at_s
+    double ring_at_s = 0.0;
     EffectSet now;
     bool decided = false;
     BodyPlan plan;
@@ -84,10 +95,10 @@ struct Planner::State {
   std::vector<Body> bodies;
   std::priority_queue<Pending> pending;
   std::int64_t order = 0, tick = 0;
-  double loudest_pa2_s = 0.0;                           // of all strikes so far
-  Vec3 middle{};                                        // of the microphones
-  double middle_m = 0.0;                                // way to it
-  std::vector<double> projection, amplitude_pa, way_m;  // working space
+  double loudest_pa2_s = 0.0;                                  // of all strikes so far
+  Vec3 middle{};                                               // of the microphones
+  double middle_m = 0.0;                                       // way to it
+  std::vector<double> projection, amplitude_pa, way_m, power;  // working space
 
   double calc_inaudible_db() const { return std::min(kInaudibleDb, calc_level_db(loudest_pa2_s) - facts.strictness.below_loudest_db); }
   void find_possible(std::size_t body);
@@ -106,6 +117,9 @@ struct Planner::State {
   void apply(const stream::Impulse& impulse);
   void apply(const stream::Contact& contact);
   void damp(Body& body, double share, double time_s);
+  void find_power(const Body& body, const stream::Contact& contact, std::vector<double>& power);
+  double ring(Body& body, const stream::Contact& contact);
+  bool offer(Body& body, const stream::Contact& contact, double time_s);
   EffectSet decide(const BodyFacts& of, Body& body, double time_s) const;
   void add_costs(Body& body);
 };
@@ -306,28 +320,120 @@ void Planner::State::apply(const stream::Impulse& impulse) {
   look(body, impulse.time_s);
 }
 
-void Planner::State::apply(const stream::Contact& contact) {
-  Body& body = bodies[static_cast<std::size_t>(contact.body)];
-  std::erase_if(body.lasting, [&](const Body::Lasting& one) { return one.id == contact.id; });
-  if (contact.state == stream::ContactState::kEnd) return;
+/// What a lasting contact adds to the mean square of each mode's velocity a second: a quarter of the density of its force.
+void Planner::State::find_power(const Body& body, const stream::Contact& contact, std::vector<double>& power) {
+  const BodyFacts& of = facts.bodies[static_cast<std::size_t>(contact.body)];
+  const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
+  power.assign(modes.size(), 0.0);
+  const bool has_other = contact.other >= 0 && static_cast<std::size_t>(contact.other) < facts.bodies.size();
+  const auto complete = [](synth::Surface surface, const bank::Bank& bank) {
+    const double nu = bank.material.poisson_ratio;
+    if (surface.modulus_pa == 0.0) surface.modulus_pa = bank.material.young_modulus_pa / (1.0 - nu * nu);
+    return surface;
+  };
+  const synth::Surface own = complete(of.surface, *of.bank);
+  synth::Surface other = facts.ground;
+  if (has_other) {
+    const BodyFacts& there = facts.bodies[static_cast<std::size_t>(contact.other)];
+    other = complete(there.surface, *there.bank);
+  }
+  const synth::ContactNoise noise = synth::calc_contact_noise(contact, own, other, facts.rate_hz);
+  if (!(noise.give_m > 0.0)) return;
+  const double drag = noise.sliding * std::sqrt(own.friction * other.friction), slip = calc_norm(contact.slip_m_s);
+  Vec3 along = contact.normal;
+  for (std::size_t k = 0; k < 3 && slip > 0.0; ++k) along[k] -= drag / slip * contact.slip_m_s[k];
+  if (!body.bank->calc_projections(contact.triangle, contact.barycentric, along, projection)) return;
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    power[m] = 0.25 * synth::calc_density(noise, contact.force_n, modes[m].freq_hz) * projection[m] * projection[m];
+}
+
+/// The ring of the modes that a contact drives, up to this record, and then until it is not heard any more: when that is, at the body. It
+/// is looked at every kRingS only and where the contact rests or ends.
+double Planner::State::ring(Body& body, const stream::Contact& contact) {
+  const double speed_m_s = std::max({contact.sweep_m_s, contact.other_sweep_m_s, calc_norm(contact.slip_m_s)});
+  const double size = contact.force_n * speed_m_s;
+  const bool drives = contact.state != stream::ContactState::kEnd && contact.force_n > 0.0 && speed_m_s > kCreepMs;
+  auto driving = std::find_if(body.driving.begin(), body.driving.end(), [&](const auto& one) { return one.id == contact.id; });
+  if (driving == body.driving.end()) {
+    if (drives) body.driving.push_back({contact.id, contact.time_s, size, contact, contact});
+    return kNever;
+  }
+  if (drives && size > driving->size) {
+    driving->size = size;
+    driving->strongest = contact;
+  }
+  driving->last = contact;
+  const double gap_s = contact.time_s - driving->since_s;
+  if (drives && gap_s < kRingS) return kNever;
+  find_power(body, driving->strongest, power);
+  if (drives)
+    *driving = {contact.id, contact.time_s, size, contact, contact};
+  else
+    body.driving.erase(driving);
+
+  const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
+  const double distance = find_ways(body, contact.time_s), passed_s = std::max(0.0, contact.time_s - body.ring_at_s);
+  body.ring_at_s = std::max(body.ring_at_s, contact.time_s);
+  body.ring_m2_s2.resize(modes.size());
+  double steady_pa2 = 0.0;
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    const double d = modes[m].decay_per_s;
+    double& ring = body.ring_m2_s2[m];
+    ring = ring * std::exp(-2.0 * d * passed_s) - power[m] * std::expm1(-2.0 * d * gap_s) / (2.0 * d);
+    steady_pa2 += ring * std::pow(modes[m].gain_pa * modes[m].weight / distance, 2.0);
+  }
+  loudest_pa2_s = std::max(loudest_pa2_s, steady_pa2 * kEarS);
+  if (!(loudest_pa2_s > 0.0)) return kNever;
+  const double quiet_pa =
+      kReferencePa * std::pow(10.0, calc_inaudible_db() / 20.0) * distance / std::sqrt(std::max(1.0, static_cast<double>(modes.size())));
+  double end_s = kNever, rung_s = 0.0;
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    const double level = kChance * std::sqrt(2.0 * body.ring_m2_s2[m]) * modes[m].gain_pa * modes[m].weight / quiet_pa;
+    if (!(level > 1.0)) continue;
+    const double quiet_s = contact.time_s + std::log(level) / modes[m].decay_per_s;
+    end_s = std::max(end_s, quiet_s);
+    if (!(quiet_s > body.quiet_s[m])) continue;
+    rung_s += std::max(0.0, std::min(quiet_s, facts.duration_s) - std::max(contact.time_s, body.quiet_s[m]));
+    body.quiet_s[m] = quiet_s;
+  }
+  body.plan.effects[Effect::kModal].cost_us += 1e-3 * rung_s * facts.rate_hz * costs.mode_sample_ns;
+  return end_s;
+}
+
+/// What a contact that moves calls for until then. Whether it does.
+bool Planner::State::offer(Body& body, const stream::Contact& contact, double time_s) {
   const double slip = calc_norm(contact.slip_m_s);
   const double sweep = std::max(contact.sweep_m_s, contact.other_sweep_m_s);
   const bool presses = contact.force_n > 0.0;
   const auto offer = [&](Effect effect, double speed) {
     const bool goes = presses && speed > kCreepMs;
-    call(body, effect, goes ? 1.0 + speed : 0.0, contact.time_s,
-         {.rule = goes ? Rule::kSlip : Rule::kNoSlip, .value = speed, .limit = kCreepMs});
+    call(body, effect, goes ? 1.0 + speed : 0.0, time_s, {.rule = goes ? Rule::kSlip : Rule::kNoSlip, .value = speed, .limit = kCreepMs});
     return goes;
   };
   // Of the movement over the surfaces so much is slip (docs/decisions/contact-sound.md); the rest is rolling.
   const double sliding = sweep > slip ? slip / sweep : 1.0;
   const bool slides = offer(Effect::kRoughness, std::min(slip, sweep)), rolls = offer(Effect::kRolling, sweep * (1.0 - sliding));
   if (slides || rolls) {
-    call(body, Effect::kModal, 1.0, contact.time_s, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
-    body.sounds_until_s = std::max(body.sounds_until_s, contact.time_s + kHoldS);
+    call(body, Effect::kModal, 1.0, time_s, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
+    body.sounds_until_s = std::max(body.sounds_until_s, time_s + kHoldS);
     if (body.mean_hz == 0.0) body.mean_hz = 4000.0;  // where a mean frequency is not known the ear is at its best
+    look(body, time_s);
+  }
+  return slides || rolls;
+}
+
+void Planner::State::apply(const stream::Contact& contact) {
+  Body& body = bodies[static_cast<std::size_t>(contact.body)];
+  std::erase_if(body.lasting, [&](const Body::Lasting& one) { return one.id == contact.id; });
+  // Without a strike nothing else says how loud the modes are when the contact lets them go.
+  if (const double end_s = ring(body, contact); end_s > contact.time_s) {
+    call(body, Effect::kModal, 1.0, end_s + find_ways(body, contact.time_s) / bank::kSoundSpeedMs,
+         {.rule = Rule::kSlip, .value = calc_norm(contact.slip_m_s), .limit = kCreepMs});
+    body.sounds_until_s = std::max(body.sounds_until_s, end_s);
     look(body, contact.time_s);
   }
+  if (contact.state == stream::ContactState::kEnd) return;
+  const bool moves = offer(body, contact, contact.time_s);
   if (!(contact.impedance_n_s_m > 0.0) || !body.possible.has(Effect::kContactDamping)) return;
   // A dashpot z at the point adds z (phi . n)^2 / 2 to a decay; a decay that is wrong by the part e changes an exposure by e^2 / 2.
   if (!body.bank->calc_projections(contact.triangle, contact.barycentric, contact.normal, projection)) return;
@@ -336,7 +442,7 @@ void Planner::State::apply(const stream::Contact& contact) {
   for (std::size_t m = 0; m < modes.size(); ++m) {
     const double part = 0.5 * contact.impedance_n_s_m * projection[m] * projection[m] / modes[m].decay_per_s;
     most = std::max(most, part);
-    if (slides || rolls || body.quiet_s[m] >= contact.time_s) sounding = std::max(sounding, part);
+    if (moves || body.quiet_s[m] >= contact.time_s) sounding = std::max(sounding, part);
   }
   const auto calc_share = [](double part) { return std::min(1.0, 0.5 * part * part); };
   body.lasting.push_back({contact.id, calc_share(most)});
@@ -457,6 +563,7 @@ std::vector<Change> Planner::advance(double known_s) {
     for (std::size_t i = 0; i < s.bodies.size(); ++i) {
       State::Body& body = s.bodies[i];
       if (!s.listener.is_still()) s.look(body, seen_s);
+      for (const State::Body::Driving& one : body.driving) s.offer(body, one.last, seen_s);
       if (seen_s <= body.sounds_until_s) {
         for (const State::Body::Lasting& one : body.lasting) s.damp(body, one.share, seen_s);
       }

@@ -17,6 +17,7 @@
 #include "runtime/plan/costs.hpp"
 #include "runtime/plan/levels.hpp"
 #include "runtime/stream/events.hpp"
+#include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/track.hpp"
 
@@ -40,6 +41,8 @@ inline constexpr double kInaudibleDb = 0.0;
 inline constexpr double kBelowLoudestDb = 70.0;
 /// Slower than this nothing slides or rolls: synth::ContactForces gives no force then.
 inline constexpr double kCreepMs = 2e-4;
+/// A ring that a lasting contact drives is random: its amplitude is this much above its root mean square at times.
+inline constexpr double kChance = 4.0;
 /// An effect is on this long before it is needed, so that a change that is still on its way to the ears is over; and stays on for so long
 /// after.
 inline constexpr double kLeadS = 0.05;
@@ -67,6 +70,7 @@ struct BodyFacts {
   bool struck = false;  // by the scene itself
   Vec3 position_m{};    // of the centre of mass, at the beginning
   Wish wish{};
+  synth::Surface surface{};
 };
 
 struct SceneFacts {
@@ -77,6 +81,7 @@ struct SceneFacts {
   std::vector<Vec3> microphones_m;         // from the listener, a channel each
   std::vector<synth::Place> listener{{}};  // its way, as far as it is known; at least one place
   Strictness strictness{};
+  synth::Surface ground = synth::kGroundSurface;
 };
 
 /// The numbers that decided, and what they mean.

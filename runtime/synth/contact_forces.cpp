@@ -3,9 +3,12 @@
 //             both borders, blended, so that nothing steps when the place or the direction changes.
 // Source:     K. Johnson, Contact Mechanics (1985), 4.2: k = dF/d delta = 2 E* a. Rough surfaces: B. Persson, Phys. Rev. Lett. 99 (2007)
 //             125502: load ~ exp(-separation / u0). Coulomb 1785.
-// Deviations: Persson's u0 is 0.4 h_rms or more for bodies that cannot give way; here it is h_rms, so that peaks stay within some tens of
-//             loads. The weight is taken for what presses: of what something else presses the ride is too slow. The other body's and this
-//             body's modes do not give way to the heights.
+//             Rough bodies that slide: the level grows evenly with the logarithms of roughness and speed, the sound is that of shocks
+//             between asperities, and what gives way is small against the roughness: H. Ben Abdelounis, A. Le Bot, J. Perret-Liaudet and
+//             H. Zahouani, Wear 268 (2010) 335.
+// Deviations: Persson's u0 is 0.4 h_rms or more for bodies that cannot give way; here it is h_rms for what rolls, and one length for what
+//             slides, by which the level keeps to that law. The weight is taken for what presses: of what something else presses the
+//             ride is too slow. The other body's and this body's modes do not give way to the heights.
 #include "runtime/synth/contact_forces.hpp"
 
 #include <algorithm>
@@ -23,6 +26,7 @@ constexpr double kLongestS = 50e-3;
 constexpr double kAtRest = 0.2e-3, kMoving = 2e-3;  // m/s
 constexpr double kGravity = 9.81;                   // m/s^2
 constexpr double kSticking = 1e-3;                  // m/s; below, the direction of friction fades
+constexpr double kSkinM = 10e-6;                    // over which the load of rough bodies that slide grows by its own size
 constexpr double kStronger = 2.0;                   // a new contact takes the place of one that presses less than half as much
 
 double calc_smooth_step(double x) noexcept {
@@ -34,16 +38,98 @@ double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m
 
 double calc_norm(const stream::Vec3& v) noexcept { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-/// Of the surface of a body along the path of a contact: the same for whoever looks at it.
-std::uint64_t make_seed(std::uint64_t contact, std::int32_t body) noexcept {
-  return contact * 0x9e3779b97f4a7c15U ^ (static_cast<std::uint64_t>(static_cast<std::uint32_t>(body)) + 1U) * 0xc2b2ae3d27d4eb4fU;
+/// Of the surface of one of the two bodies along the path of a contact: the same for whoever looks at it. `first`: two surfaces of the same
+/// seed are still two.
+std::uint64_t make_seed(std::uint64_t contact, std::uint64_t surface, bool first) noexcept {
+  return contact * 0x9e3779b97f4a7c15U ^ (2U * surface + (first ? 1U : 2U)) * 0xc2b2ae3d27d4eb4fU;
 }
 
 double blend(double a, double b, double share) noexcept { return a + share * (b - a); }
 
 bool is_amount(double x) noexcept { return std::isfinite(x) && x >= 0.0; }
 
+/// E* of a pair; nothing touches what has no stiffness.
+double calc_pair_modulus(double own_pa, double other_pa) noexcept {
+  return own_pa > 0.0 && other_pa > 0.0 ? 1.0 / (1.0 / own_pa + 1.0 / other_pa) : 0.0;
+}
+
+/// Of the movement over the surfaces so much is slip.
+double calc_sliding(double slip_m_s, double sweep_m_s, double other_sweep_m_s) noexcept {
+  return slip_m_s <= 0.0 ? 0.0 : std::min(1.0, slip_m_s / std::max({sweep_m_s, other_sweep_m_s, slip_m_s}));
+}
+
+/// Root mean square of the heights that are felt.
+double calc_moved(const ContactNoise& noise) noexcept {
+  return std::hypot(noise.motion * noise.gains.rms_m, noise.other_motion * noise.other_gains.rms_m);
+}
+
+struct Press {
+  double sweep_m_s, other_sweep_m_s, slip_m_s, force_n, patch_m, modulus_pa, rate_hz;
+};
+
+ContactNoise calc_noise(const Press& press, const Texture& texture, const Texture& other_texture) noexcept {
+  ContactNoise noise;
+  noise.sliding = calc_sliding(press.slip_m_s, press.sweep_m_s, press.other_sweep_m_s);
+  // The asperities of each surface run over the other one at the slip, whichever of them the contact stays on.
+  noise.speed_m_s = std::max(press.sweep_m_s, press.slip_m_s);
+  noise.other_speed_m_s = std::max(press.other_sweep_m_s, press.slip_m_s);
+  noise.motion = calc_motion(noise.speed_m_s);
+  noise.other_motion = calc_motion(noise.other_speed_m_s);
+  // The heights of a surface that is not swept do not count, and count in full before they are heard.
+  const double own = calc_smooth_step(noise.speed_m_s / kAtRest), other = calc_smooth_step(noise.other_speed_m_s / kAtRest);
+  const double stiffness = 2.0 * press.modulus_pa * press.patch_m;
+  const double spring_m = stiffness > 0.0 ? press.force_n / stiffness : 0.0;
+  const auto calc_give = [&](double own_m, double other_m) {
+    return spring_m + blend(std::hypot(own * own_m, other * other_m), kSkinM, noise.sliding);
+  };
+  const double at_first_m = calc_give(texture.get_roughness_m(), other_texture.get_roughness_m());
+  const double ride_rad_s = at_first_m > 0.0 ? std::sqrt(kGravity / at_first_m) : 0.0;
+  // What rolls is blunted by the patch; what slides is touched by asperities much smaller than it.
+  const double blunt_m = (1.0 - noise.sliding) * press.patch_m;
+  noise.gains = texture.calc_gains(noise.speed_m_s, blunt_m, ride_rad_s, press.rate_hz);
+  noise.other_gains = other_texture.calc_gains(noise.other_speed_m_s, blunt_m, ride_rad_s, press.rate_hz);
+  noise.give_m = stiffness > 0.0 ? calc_give(noise.gains.rms_m, noise.other_gains.rms_m) : 0.0;
+  // exp(s x - s^2 / 2) of a normal x has the mean 1 and the rms sqrt(exp(s^2) - 1) about it: that of the linear spring, up to one load.
+  if (noise.give_m > 0.0) noise.spread = 0.5 * std::log1p(std::pow(std::min(1.0, calc_moved(noise) / noise.give_m), 2.0));
+  return noise;
+}
+
+/// f = load (exp(h / over_m - spread) - 1).
+struct Shocks {
+  double load_n = 0.0, over_m = 0.0;
+};
+
+Shocks calc_shocks(const ContactNoise& noise, double force_n) noexcept {
+  const double moved_m = calc_moved(noise);
+  if (!(noise.spread > 0.0)) return {force_n, noise.give_m};
+  return {force_n * std::max(1.0, moved_m / noise.give_m), moved_m / std::sqrt(2.0 * noise.spread)};
+}
+
 }  // namespace
+
+ContactNoise calc_contact_noise(const stream::Contact& contact, const Surface& own, const Surface& other, double rate_hz) noexcept {
+  Texture texture, other_texture;
+  texture.start(own.roughness_m, 0);
+  other_texture.start(other.roughness_m, 0);
+  return calc_noise({.sweep_m_s = contact.sweep_m_s,
+                     .other_sweep_m_s = contact.other_sweep_m_s,
+                     .slip_m_s = calc_norm(contact.slip_m_s),
+                     .force_n = contact.force_n,
+                     .patch_m = contact.patch_radius_m,
+                     .modulus_pa = calc_pair_modulus(own.modulus_pa, other.modulus_pa),
+                     .rate_hz = rate_hz},
+                    texture, other_texture);
+}
+
+double calc_density(const ContactNoise& noise, double force_n, double freq_hz) noexcept {
+  if (!(noise.give_m > 0.0)) return 0.0;
+  const double own_m2 = Texture::calc_density(noise.gains, noise.speed_m_s, freq_hz),
+               other_m2 = Texture::calc_density(noise.other_gains, noise.other_speed_m_s, freq_hz);
+  const double moved_m2 = noise.motion * noise.motion * own_m2 + noise.other_motion * noise.other_motion * other_m2;
+  const Shocks shocks = calc_shocks(noise, force_n);
+  const double stiffness = shocks.load_n / shocks.over_m;
+  return std::exp(2.0 * noise.spread) * stiffness * stiffness * moved_m2;
+}
 
 const char* find_fault(const Surface& surface) noexcept {
   if (!is_amount(surface.roughness_m)) return "the roughness is negative or not finite";
@@ -138,8 +224,9 @@ bool ContactForces::take(const stream::Contact& contact, const Surface& other) n
     slot->friction = std::sqrt(surface_.friction * other.friction);
     slot->other_modulus_pa = other.modulus_pa;
     find_modulus(*slot);
-    slot->texture.start(surface_.roughness_m, make_seed(contact.id, contact.body));
-    slot->other_texture.start(other.roughness_m, make_seed(contact.id, contact.other));
+    const bool first = surface_.seed != other.seed || contact.body < contact.other;
+    slot->texture.start(surface_.roughness_m, make_seed(contact.id, surface_.seed, first));
+    slot->other_texture.start(other.roughness_m, make_seed(contact.id, other.seed, surface_.seed != other.seed || !first));
     slot->used = true;
     ++live_;
   }
@@ -169,10 +256,8 @@ void ContactForces::reach(double time_s) noexcept {
   if (std::isfinite(time_s)) reached_ = std::max(reached_, time_s * rate_hz_);
 }
 
-/// E* of the pair; nothing touches what has no stiffness.
 void ContactForces::find_modulus(Slot& slot) const noexcept {
-  const double own = surface_.modulus_pa, other = slot.other_modulus_pa;
-  slot.modulus_pa = own > 0.0 && other > 0.0 ? 1.0 / (1.0 / own + 1.0 / other) : 0.0;
+  slot.modulus_pa = calc_pair_modulus(surface_.modulus_pa, slot.other_modulus_pa);
 }
 
 void ContactForces::find_rows(Node& node) const noexcept {
@@ -214,8 +299,8 @@ void ContactForces::release() noexcept {
 
 bool ContactForces::is_resting() const noexcept {
   for (const Slot& slot : slots_) {
-    if (slot.used && (!slot.acts || !slot.holds || slot.head >= 0 || slot.ended || slot.level < 1.0 || slot.node.motion > 0.0 ||
-                      slot.node.other_motion > 0.0))
+    if (slot.used && (!slot.acts || !slot.holds || slot.head >= 0 || slot.ended || slot.level < 1.0 || slot.node.noise.motion > 0.0 ||
+                      slot.node.noise.other_motion > 0.0))
       return false;
   }
   return true;
@@ -287,27 +372,21 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
   Node node;
   node.values = values;
   node.level = slot.level;
-  const double slip = calc_norm(values.slip_m_s), sweep = std::max(values.sweep_m_s, values.other_sweep_m_s);
-  const double sliding = slip <= 0.0 ? 0.0 : std::min(1.0, slip / std::max(sweep, slip));
+  const double slip = calc_norm(values.slip_m_s), sliding = calc_sliding(slip, values.sweep_m_s, values.other_sweep_m_s);
   const double rough = effects_.has(Effect::kRoughness) ? sliding : 0.0;
   const double along = rough + (effects_.has(Effect::kRolling) ? 1.0 - sliding : 0.0);
   if (along > 0.0) {
-    node.motion = calc_motion(values.sweep_m_s);
-    node.other_motion = calc_motion(values.other_sweep_m_s);
-    // The heights of a surface that is not swept do not count, and count in full before they are heard.
-    const double own = calc_smooth_step(values.sweep_m_s / kAtRest), other = calc_smooth_step(values.other_sweep_m_s / kAtRest);
-    const double stiffness = 2.0 * slot.modulus_pa * values.patch_m, own_m = slot.texture.get_roughness_m(),
-                 other_m = slot.other_texture.get_roughness_m();
-    const double spring_m = stiffness > 0.0 ? values.force_n / stiffness : 0.0;
-    const double at_first_m = spring_m + std::hypot(own * own_m, other * other_m);
-    const double ride_rad_s = at_first_m > 0.0 ? std::sqrt(kGravity / at_first_m) : 0.0;
-    node.gains = slot.texture.calc_gains(values.sweep_m_s, values.patch_m, ride_rad_s, rate_hz_);
-    node.other_gains = slot.other_texture.calc_gains(values.other_sweep_m_s, values.patch_m, ride_rad_s, rate_hz_);
-    node.give_m = stiffness > 0.0 ? spring_m + std::hypot(own * node.gains.rms_m, other * node.other_gains.rms_m) : 0.0;
-    if (node.give_m > 0.0) {
-      const double s = std::hypot(node.motion * node.gains.rms_m, node.other_motion * node.other_gains.rms_m) / node.give_m;
-      node.spread = 0.5 * s * s;
-    }
+    node.noise = calc_noise({.sweep_m_s = values.sweep_m_s,
+                             .other_sweep_m_s = values.other_sweep_m_s,
+                             .slip_m_s = slip,
+                             .force_n = values.force_n,
+                             .patch_m = values.patch_m,
+                             .modulus_pa = slot.modulus_pa,
+                             .rate_hz = rate_hz_},
+                            slot.texture, slot.other_texture);
+    const Shocks shocks = calc_shocks(node.noise, values.force_n);
+    node.values.force_n = shocks.load_n;
+    node.noise.give_m = shocks.over_m;
   }
   const double drag = rough * slot.friction / (slip + kSticking);
   const double brake = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
@@ -337,12 +416,13 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
   for (std::size_t i = 0; i < kStrikeRows; ++i) damps = damps || from.brake[i] != 0.0F || to.brake[i] != 0.0F;
   drive_.damps = drive_.damps || damps;
   push[0].forces = push[1].forces = false;
-  const bool moves = from.motion > 0.0 || to.motion > 0.0, other_moves = from.other_motion > 0.0 || to.other_motion > 0.0;
+  const bool moves = from.noise.motion > 0.0 || to.noise.motion > 0.0,
+             other_moves = from.noise.other_motion > 0.0 || to.noise.other_motion > 0.0;
   if (!(moves || other_moves) || !(from.values.force_n > 0.0 || to.values.force_n > 0.0)) return;
   std::array<float, kQuantum + 1> height{}, other_height{};
-  if (moves) slot.texture.render(from.values.sweep_m_s, to.values.sweep_m_s, rate_hz_, from.gains, to.gains, height);
+  if (moves) slot.texture.render(from.noise.speed_m_s, to.noise.speed_m_s, rate_hz_, from.noise.gains, to.noise.gains, height);
   if (other_moves) {
-    slot.other_texture.render(from.values.other_sweep_m_s, to.values.other_sweep_m_s, rate_hz_, from.other_gains, to.other_gains,
+    slot.other_texture.render(from.noise.other_speed_m_s, to.noise.other_speed_m_s, rate_hz_, from.noise.other_gains, to.noise.other_gains,
                               other_height);
   }
   counters_.samples += kQuantum;
@@ -350,9 +430,9 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
   for (std::size_t n = 0; n <= kQuantum; ++n) {
     const double share = static_cast<double>(n) / kQuantum;
     const double load = blend(from.values.force_n, to.values.force_n, share);
-    const double give = blend(from.give_m, to.give_m, share), spread = blend(from.spread, to.spread, share);
-    const double moved = blend(from.motion, to.motion, share) * static_cast<double>(height[n]) +
-                         blend(from.other_motion, to.other_motion, share) * static_cast<double>(other_height[n]);
+    const double give = blend(from.noise.give_m, to.noise.give_m, share), spread = blend(from.noise.spread, to.noise.spread, share);
+    const double moved = blend(from.noise.motion, to.noise.motion, share) * static_cast<double>(height[n]) +
+                         blend(from.noise.other_motion, to.noise.other_motion, share) * static_cast<double>(other_height[n]);
     const double force = give > 0.0 ? blend(from.level, to.level, share) * load * std::expm1(moved / give - spread) : 0.0;
     push[0].signal[n] = static_cast<float>(force * (1.0 - share));
     push[1].signal[n] = static_cast<float>(force * share);

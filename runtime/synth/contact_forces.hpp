@@ -25,6 +25,7 @@ struct Surface {
   double roughness_m = 2e-6;  // rms height: fine machined metal, N7 of ISO 1302 (Ra 1.6 um)
   double friction = 0.4;      // Coulomb; a contact of two takes the geometric mean
   double modulus_pa = 0.0;    // E / (1 - nu^2); 0: that of the model's bank
+  std::uint64_t seed = 0;     // of its profile, together with the id of a contact: bodies of different seeds have different profiles
 };
 
 /// What is wrong with a surface, as part of a sentence; nullptr: nothing.
@@ -32,6 +33,23 @@ const char* find_fault(const Surface& surface) noexcept;
 
 /// The ground of scenes: concrete, smoothly trowelled.
 inline constexpr Surface kGroundSurface{.roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2)};
+
+/// The noise of a lasting contact at one moment: f = a F (exp(s h / h_rms - s^2 / 2) - 1), a = max(1, R), of the heights h.
+struct ContactNoise {
+  double sliding = 0.0;                           // 0..1: share of the movement that is slip
+  double speed_m_s = 0.0, other_speed_m_s = 0.0;  // with which each surface passes
+  double motion = 0.0, other_motion = 0.0;        // 0..1: whether it does
+  double give_m = 0.0;                            // u; 0: no force
+  double spread = 0.0;                            // s^2 / 2
+  Texture::Gains gains, other_gains;
+};
+
+/// As ContactForces has it for a record that acts on a body of the surface `own`; both with their moduli. No throw; any thread.
+ContactNoise calc_contact_noise(const stream::Contact& contact, const Surface& own, const Surface& other, double rate_hz) noexcept;
+
+/// One-sided density [N^2 / Hz] of the noise under the load at a frequency, at least as large as it is: of heights whose density falls with
+/// a power of the frequency, as these do, the exponential's is e^(s^2) times that of the linear spring.
+double calc_density(const ContactNoise& noise, double force_n, double freq_hz) noexcept;
 
 struct ContactForcesOptions {
   Surface surface{};
@@ -53,13 +71,14 @@ struct ContactCounters {
 /// samples and go linearly between. A gap of more than 50 ms is held and changed in its last 50 ms. A contact rises and falls within 5 ms
 /// beside what its records say. When its last record, and the last mark (reach), are 20 ms old it falls as if it had ended: an underrun.
 ///
-/// Force: the heights h of both surfaces, read along the way of the contact over each, press two springs in series: the contact's,
-/// k = 2 E* a, and the one of the rough skin, load over height: with u = F / k + h_rms the force is F exp(h / u), which never pulls.
-/// Without its mean and the load F, which change slowly and are left out, that is f = F (exp(h / u - s^2 / 2) - 1), s = h_rms / u. What is
-/// slower than sqrt(g / u), where a body that its weight presses on u bounces, does not press: the body rides over it. While one surface
-/// slides on the other (its share is slip over the larger sweep) friction follows, -mu f along the slip. What moves at less than 0.2 mm/s
-/// is at rest and gives no force at all. Damping: the impedance Z of the other body at the point takes Z (phi.n)^2 / 2 [1/s] of each mode
-/// (docs/decisions/contact-sound.md).
+/// Force: the heights h of both surfaces, each read at the speed of the contact over it or at the slip, whichever is faster, press two
+/// springs in series: the contact's, k = 2 E* a, and the one of the rough skin. With u = F / k + skin the force has the rms of the linear
+/// spring, R = h_rms / u loads: without the load F, which changes slowly and is left out, f = a F (exp(s h / h_rms - s^2 / 2) - 1), s^2 =
+/// ln(1 + min(1, R)^2), a = max(1, R); up to R = 1 it never pulls. The skin is h_rms for what rolls, 10 um for what slides; it is blunted
+/// by the patch as it rolls. What is slower than sqrt(g / u), where a body that its weight presses on u bounces, does not press: the body
+/// rides over it. While one surface slides on the other (its share is slip over the larger sweep) friction follows, -mu f along the slip.
+/// What moves at less than 0.2 mm/s is at rest and gives no force at all. Damping: the impedance Z of the other body at the point takes Z
+/// (phi.n)^2 / 2 [1/s] of each mode (docs/decisions/contact-sound.md).
 ///
 /// Memory is taken in the constructor only. One thread at a time.
 class ContactForces {
@@ -68,7 +87,7 @@ class ContactForces {
   explicit ContactForces(std::shared_ptr<const Model> model, ContactForcesOptions options = {});
 
   /// A record, with what the other body's surface is like. Times are since the first sample of the voice; `body` is not looked at beyond
-  /// its part in the seed. False when it is not played (counted). [audio-thread]: no heap, no lock, no throw.
+  /// which of two surfaces of the same seed comes first. False when it is not played (counted). [audio-thread]: no heap, no lock, no throw.
   bool take(const stream::Contact& contact, const Surface& other = kGroundSurface) noexcept;
 
   /// Nothing earlier than this will come: contacts without newer records stay as they are until then. [audio-thread]
@@ -116,11 +135,8 @@ class ContactForces {
   /// A contact at the border of two quanta.
   struct Node {
     Record values;
-    double level = 0.0;                       // 0..1: its rise and its fall
-    double motion = 0.0, other_motion = 0.0;  // 0..1: whether it moves over each surface
-    double give_m = 0.0;                      // u: load over stiffness
-    double spread = 0.0;                      // s^2 / 2
-    Texture::Gains gains, other_gains;
+    double level = 0.0;  // 0..1: its rise and its fall
+    ContactNoise noise;
     std::array<float, kStrikeRows> force{}, brake{};
     std::array<const std::int16_t*, kStrikeRows> row{};
   };

@@ -2,10 +2,11 @@
 //             direction are cubic in the time of arrival, with their true slopes at both ends. The pressure at t' is read with a
 //             Kaiser-windowed sinc from a table of phases (kernels_ears.inl). Where nothing moves they stay what they are, and the 32
 //             samples of a quantum are one convolution. A delay that changes smoothly is a Doppler shift, nothing else is needed.
-// Source:     OCE01 section 4 (delay r / c and 1 / r); Kaiser 1974 (window); docs/equations.md.
+// Source:     OCE01 section 4 (delay r / c and 1 / r); Kaiser 1974 (window); Morse & Ingard 1968, 11.2: a source of the pressure p at 1 m
+//             that moves is heard with p / (r (1 - M)^2), M = v.r / r c when it sent that; docs/equations.md.
 // Deviations: OCE01 splats every sample into two neighbours with a Gaussian, which costs 2 to 9 dB at 10 kHz; this is flat to 0.4 of the
-//             rate. The source is at the centre of mass; the factor 1 / (1 - v/c) of a moving monopole's level (0.05 dB at 2 m/s) is left
-//             out, and of a dipole the near field.
+//             rate. The source is at the centre of mass; of a moving source and of a dipole the near field is left out, v / (2 pi f r) and
+//             c / (2 pi f r) of the level.
 #include "runtime/synth/ears.hpp"
 
 #include <algorithm>
@@ -134,11 +135,13 @@ Way calc_way(const Track& source, const Track& listener, const Vec3& offset_m, d
   Vec3 change{};
   for (std::size_t k = 0; k < 3; ++k) change[k] = here.velocity_m_s[k] - velocity[k] * pace;
   const double stretch = near ? 0.0 : calc_dot(way.direction, change);
+  way.convection = 1.0 / std::max(1.0 - approach, 0.05);
   way.delay_s = time_s - emission;
   way.delay_slope = near ? 0.0 : 1.0 - pace;
   way.spreading_1_m = 1.0 / distance;
   way.spreading_slope = -stretch / (distance * distance);
   for (std::size_t k = 0; k < 3; ++k) way.direction_slope[k] = near ? 0.0 : (change[k] - way.direction[k] * stretch) / distance;
+  way.convection_slope = way.convection * way.convection * calc_dot(way.direction_slope, velocity) / kSoundSpeedMs;
   return way;
 }
 
@@ -184,6 +187,15 @@ Way Ear::find_way(const Source& source, const Track& listener, std::int64_t bord
   if (!has(effects_, Effect::kDoppler)) {
     way.delay_s = first_delay_s_;
     way.delay_slope = 0.0;
+    return way;
+  }
+  // (1 - M)^-2 of the level; of a dipole, two sources side by side of which one is heard 1 / (1 - M) times as much later, (1 - M)^-3.
+  const double more = way.convection, more_slope = way.convection_slope;
+  way.spreading_slope = more * (more * way.spreading_slope + 2.0 * more_slope * way.spreading_1_m);
+  way.spreading_1_m *= more * more;
+  for (std::size_t k = 0; k < 3; ++k) {
+    way.direction_slope[k] = more * way.direction_slope[k] + more_slope * way.direction[k];
+    way.direction[k] *= more;
   }
   return way;
 }

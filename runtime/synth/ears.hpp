@@ -31,6 +31,8 @@ struct Way {
   double spreading_slope = 0.0;
   Vec3 direction{};  // from the source to the microphone, unit
   Vec3 direction_slope{};
+  double convection = 1.0;        // 1 / (1 - M), M: speed of the source towards the microphone over that of sound
+  double convection_slope = 0.0;  // of what the direction changes; the source's own acceleration is left out
 };
 
 /// The way of what arrives at `time_s` at the place `offset_m` from the listener: the source is where it was when it sent it, the

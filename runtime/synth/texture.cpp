@@ -6,10 +6,13 @@
 //             An octave that would reach beyond the Nyquist frequency fades out before.
 // Source:     B. Persson, O. Albohr, U. Tartaglino, A. Volokitin and E. Tosatti, J. Phys.: Condens. Matter 17 (2005) R1: most surfaces are
 //             self-affine with a Hurst exponent near 0.8 below a roll-off wavelength; the spectrum of a line over such a surface falls as
-//             q^-(1 + 2 H). The roll-off is the cut-off of ISO 4288:1996. A patch of radius a lets heights of wave number q through as
-//             1 / sqrt(1 + pi/4 (q a)^3): P. Remington, J. Sound Vib. 46 (1976) 419, for wheels on rails.
-// Deviations: between two cut-offs of the standard the roll-off jumps. Filters are taken at the middle of each octave, and without their
-//             phase.
+//             q^-(1 + 2 H). Roughness is measured with a cut-off of 0.8 mm (ISO 4288:1996, for Ra from 0.1 to 2 um). A patch of radius a
+//             lets heights of wave number q through as 1 / sqrt(1 + pi/4 (q a)^3): P. Remington, J. Sound Vib. 46 (1976) 419, for wheels on
+//             rails.
+// Deviations: the standard measures rougher surfaces with a longer cut-off and smoother ones with a shorter; a surface whose long waves
+// grow
+//             so would sound louder with the power 0.5 of its roughness only, where 0.8 to 1.2 is measured: here one cut-off is for all.
+//             Filters are taken at the middle of each octave, and without their phase.
 #include "runtime/synth/texture.hpp"
 
 #include <algorithm>
@@ -27,6 +30,7 @@ constexpr int kBits = 15;
 constexpr int kPoints = 1 << kBits;
 constexpr int kWaves = 2048;                      // of the longest wavelength in the table
 constexpr double kFadeFrom = 0.4, kFadeTo = 0.5;  // of the rate: where the shortest wavelength of an octave fades out
+constexpr double kHighestM = 1.0;                 // rms height; keeps what follows within floats
 constexpr float kLeast = 1e-4F;                   // of an octave: below, it is left out
 constexpr float kFraction = 1.0F / static_cast<float>(1U << 24);
 
@@ -97,25 +101,19 @@ std::uint64_t to_place(double turns) noexcept { return static_cast<std::uint64_t
 
 void Texture::make_tables() { get_tables(); }
 
-double Texture::calc_cutoff_m(double roughness_m) noexcept {
-  // The standard goes by the mean deviation, sqrt(2 / pi) of the rms height where heights are normally distributed.
-  const double mean_m = std::sqrt(2.0 / pi) * roughness_m;
-  return mean_m <= 0.02e-6 ? 0.08e-3 : mean_m <= 0.1e-6 ? 0.25e-3 : mean_m <= 2e-6 ? 0.8e-3 : mean_m <= 10e-6 ? 2.5e-3 : 8e-3;
-}
-
 void Texture::start(double roughness_m, std::uint64_t seed) noexcept {
-  roughness_m_ = std::max(0.0, roughness_m);
-  cutoff_m_ = calc_cutoff_m(roughness_m_);
+  roughness_m_ = std::clamp(roughness_m, 0.0, kHighestM);
   place_ = 0;
   for (std::uint64_t& offset : offset_) offset = scramble(seed);
 }
 
 Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, double give_rad_s, double rate_hz) const noexcept {
-  static const double kShare = std::sqrt(1.0 - std::pow(2.0, -2.0 * kHurst));  // so that the squares of all octaves sum to 1
+  // The squares of all octaves below the cut-off sum to 1.
+  static const double kShare = std::sqrt(1.0 - std::pow(2.0, -2.0 * kHurst)) * std::pow(2.0, kHurst * kWavy);
   static const double kStep = std::pow(2.0, -kHurst);
   Gains gains;
   if (!(roughness_m_ > 0.0)) return gains;
-  double amplitude = kShare, longest_m = cutoff_m_, square = 0.0;
+  double amplitude = kShare, longest_m = kLongestM, square = 0.0;
   for (float& height : gains.height_m) {
     const double highest = 2.0 * std::abs(speed_m_s) / (longest_m * rate_hz);  // frequency, of the rate
     if (highest >= kFadeTo) break;                                             // and so are all shorter ones
@@ -134,12 +132,28 @@ Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, doub
   return gains;
 }
 
+double Texture::calc_density(const Gains& gains, double speed_m_s, double freq_hz) noexcept {
+  const double lowest_hz = std::abs(speed_m_s) / kLongestM;
+  if (!(lowest_hz > 0.0)) return 0.0;
+  // Within an octave from f on the density falls as frequency^-(1 + 2 H) from so much over f: below the chord from its begin to its end.
+  static const double kSteep = 2.0 * kHurst / (1.0 - std::pow(2.0, -2.0 * kHurst)), kEnd = std::pow(2.0, -1.0 - 2.0 * kHurst);
+  int octave = 0;
+  double share = 2.0 * std::frexp(std::max(freq_hz / lowest_hz, 1.0), &octave) - 1.0;  // 0 at the begin, 1 at the end
+  if (--octave >= kOctaves) octave = kOctaves - 1, share = 1.0;
+  const auto calc_begin = [&](int i) {
+    const double height = static_cast<double>(gains.height_m[static_cast<std::size_t>(i)]);
+    return kSteep * height * height / std::ldexp(lowest_hz, i);
+  };
+  const double own = calc_begin(octave) * (1.0 - (1.0 - kEnd) * share);
+  return octave == 0 ? own : std::max(own, kEnd * calc_begin(octave - 1) * (1.0 - (1.0 - kEnd) * share));  // filters know no borders
+}
+
 void Texture::render(double from_m_s, double to_m_s, double rate_hz, const Gains& from, const Gains& to,
                      std::array<float, kQuantum + 1>& height_m) noexcept {
   const Tables& tables = get_tables();
   height_m.fill(0.0F);
   std::array<std::uint64_t, kQuantum + 1> place;
-  const double turns_per_m = 1.0 / (cutoff_m_ * kWaves);
+  const double turns_per_m = 1.0 / (kLongestM * kWaves);
   for (int n = 0; n <= kQuantum; ++n) {
     const double t = n, way_m = (from_m_s * t + (to_m_s - from_m_s) * t * t / (2.0 * kQuantum)) / rate_hz;
     place[static_cast<std::size_t>(n)] = place_ + to_place(way_m * turns_per_m);

@@ -208,5 +208,35 @@ TEST(LastingContacts, OfTwoBodiesComeInPairsOfOneId) {
   }
 }
 
+TEST(LastingContacts, AreNamedByTheirPairAndTouchAlone) {
+  const bank::Bank box = make_box({0.1, 0.08, 0.04});
+  WorldSpec alone = make_world(box, {0, 0, 0.0205}, 0.4);
+  alone.bodies[0].velocity_m_s = {0.5, 0, 0};
+  WorldSpec beside = alone;
+  BodySpec far = alone.bodies[0];
+  far.name = "far";
+  far.initial.position_m = {0.0, 3.0, 0.0215};
+  far.velocity_m_s = {-0.2, 0.3, 0.0};
+  beside.bodies.insert(beside.bodies.begin(), far);
+  const auto list = [](const Outcome& outcome, int body) {
+    std::vector<Contact> own;
+    for (Contact c : outcome.contacts) {
+      if (c.body == body) own.push_back(c);
+    }
+    return own;
+  };
+  const std::vector<Contact> x = list(run(alone, 0.4), 0), y = list(run(beside, 0.4), 1);
+  ASSERT_GT(x.size(), 50u);
+  ASSERT_EQ(x.size(), y.size());
+  std::set<std::uint64_t> ids;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    ASSERT_EQ(x[i].id, y[i].id);
+    ASSERT_EQ(x[i].time_s, y[i].time_s);
+    ASSERT_EQ(x[i].force_n, y[i].force_n);
+    ids.insert(x[i].id);
+  }
+  for (const Contact& c : list(run(beside, 0.4), 0)) EXPECT_EQ(ids.count(c.id), 0u) << "another pair";
+}
+
 }  // namespace
 }  // namespace carillon::contact::tests

@@ -239,5 +239,59 @@ TEST(time, one_step_contact) {
   }
 }
 
+TEST(time, sliding) {
+  // Modes from 400 Hz to 9 kHz; the level of 2 s, and whatever is no sound.
+  std::vector<std::pair<double, double>> modes;
+  for (int m = 0; m < 10; ++m) modes.emplace_back(to_lambda(400.0 * std::pow(2.0, 0.5 * m)), 60.0);
+  const auto model = Model::make(make_bank(modes), {.rate_hz = kRate});
+  const auto calc_level = [&](double floor_m, double speed_m_s, double load_n) {
+    Voice voice(model, {.silence_pa = 1e-30});
+    synth::ContactForces contacts(model, {.surface = {.roughness_m = 0.0, .modulus_pa = 70e9}});
+    voice.attach(&contacts);
+    const synth::Surface floor{.roughness_m = floor_m, .friction = 0.5, .modulus_pa = 70e9};
+    for (const double t : {0.0, 2.2}) {
+      contacts.take({.time_s = t,
+                     .id = 5,
+                     .normal = {0.0, 0.0, 1.0},
+                     .slip_m_s = {speed_m_s, 0.0, 0.0},
+                     .force_n = load_n,
+                     .other_sweep_m_s = speed_m_s,
+                     .patch_radius_m = 1e-4},
+                    floor);
+    }
+    contacts.reach(3.0);
+    play(voice, 9600);
+    double sum = 0.0;
+    std::int64_t bad = 0;
+    for (const float p : play(voice, 96000)) {
+      bad += !std::isfinite(p);
+      sum += static_cast<double>(p) * static_cast<double>(p);
+    }
+    hold("sliding", static_cast<double>(bad), 0.0, "samples that are no number");
+    return 10.0 * std::log10(std::max(sum, 1e-300));
+  };
+  const auto hold_exponent = [&](double from_db, double to_db, double ratio, double low, double high, const std::string& what) {
+    const double exponent = (to_db - from_db) / (20.0 * std::log10(ratio));
+    hold("sliding", std::abs(exponent - 0.5 * (low + high)), 0.5 * (high - low), what);
+  };
+  for (const double load : {1e-3, 5.0}) {
+    for (const double speed : {0.02, 1.0})
+      hold_exponent(calc_level(0.02e-6, speed, load), calc_level(50e-6, speed, load), 2500.0, 0.8, 1.16, "exponent of roughness from 0.98");
+    for (const double floor : {0.02e-6, 50e-6})
+      hold_exponent(calc_level(floor, 0.02, load), calc_level(floor, 1.0, load), 50.0, 0.7, 0.96, "exponent of speed from 0.83");
+    double last = -1e9;
+    for (const double floor : {1e-9, 1e-8, 1e-6, 1e-4, 5e-4, 1e-3}) {
+      const double level = calc_level(floor, 0.3, load);
+      hold("sliding", level > last ? 0.0 : 1.0, 0.0, "rougher and not louder");
+      last = level;
+    }
+  }
+  for (const double floor : {1e-30, 1.0, 1e300}) {
+    for (const double speed : {1e-3, 10.0, 1e9}) {
+      for (const double load : {1e-12, 1e9}) calc_level(floor, speed, load);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace carillon::hard

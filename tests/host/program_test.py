@@ -276,6 +276,29 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(path["bodies"][0]["poses"], [[0, 0, 0, 0, 1, 0, 0, 0]])
         self.assertEqual((path["impulses"][0]["other"], path["impulses"][0]["world_m"]), (-1, [-0.05, -0.05, -0.05]))
 
+    def test_equal_strikes_are_equal_unless_they_are_to_vary(self):
+        def hear(name, **changes):
+            strikes = [{"time_s": t, "body": "cube", "point_m": [0.01, 0.02, 0.05], "impulse_n_s": [0, 0, -0.01], "duration_s": 2e-4} for t in (0.1, 1.1, 2.1, 3.1)]
+            scene = self.scene(name, duration_s=4.1, effects=["modal", "hertz_pulse"], output={"gain": 1e-3, "format": "pcm32"}, strikes=strikes,
+                               **{"bodies": [{"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 0]}], **changes})
+            run = render(scene, "-o", self.root / f"{name}.wav")
+            self.assertEqual(run.returncode, 0, run.stderr)
+            return read_wav(self.root / f"{name}.wav")[2][4800:]
+
+        def compare(pressure):  # of each strike to the first, dB
+            first = pressure[:47000]
+            return [10 * np.log10(np.sum((pressure[n:n + 47000] - first) ** 2) / np.sum(first ** 2) + 1e-30) for n in (48000, 96000, 144000)]
+
+        self.assertLess(max(compare(hear("equal.json"))), -120)
+        varied = hear("varied.json", variation=1)
+        self.assertGreater(min(compare(varied)), -30)
+        self.assertLess(max(compare(varied)), 0)
+        np.testing.assert_array_equal(varied, hear("again.json", variation=1))
+        body = {"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 0], "variation": 0.1}
+        self.assertLess(max(compare(hear("less.json", bodies=[body]))), min(compare(varied)))
+        for wrong in (-0.1, 1.5, "much"):
+            self.assert_refused(render(self.scene("vary.json", variation=wrong), "-o", self.root / "vary.wav"), 2, "vary.json:", "variation")
+
     def test_a_strike_joins_the_contacts_of_the_physics_in_order_of_time(self):
         scene = self.scene("struck-drop.json", strikes=[{"time_s": t, "body": "cube", "triangle": 3, "impulse_n_s": [0, 0, 1e-3]} for t in (0.4, 0.01)])
         run = render(scene, "-o", self.root / "struck-drop.wav", "--trajectory", self.root / "struck-drop-path.json", "-q")

@@ -96,5 +96,52 @@ TEST_F(Strikes, ATriangleIsStruckInItsMiddleAndHasToExist) {
   }
 }
 
+TEST_F(Strikes, AreEqualUnlessTheyAreToVary) {
+  scene_.strikes.assign(4000, {.place = "scene.json:7",
+                               .body = 0,
+                               .time_s = 0.25,
+                               .point_m = Vec3{0.05, 0.01, -0.02},
+                               .triangle = {},
+                               .impulse_n_s = {-0.3, 0.4, 1.2},
+                               .duration_s = 1e-3});
+  const std::vector<contact::Impulse> equal = make_impulses(scene_, {&bank_});
+  for (const contact::Impulse& one : {equal[1], equal[3999]}) {
+    EXPECT_EQ(one.impulse_n_s, equal[0].impulse_n_s);
+    EXPECT_EQ(one.barycentric, equal[0].barycentric);
+    EXPECT_EQ(one.duration_s, equal[0].duration_s);
+  }
+  scene_.bodies[0].variation = 1.0;
+  const std::vector<contact::Impulse> varied = make_impulses(scene_, {&bank_});
+  double energy = 0.0, scatter = 0.0, length = 0.0, way = 0.0, farthest = 0.0, most_turned = 0.0;
+  for (const contact::Impulse& one : varied) {
+    const Vec3 &j = one.impulse_n_s, place = find_place(one);
+    const double square = (j[0] * j[0] + j[1] * j[1] + j[2] * j[2]) / 1.69;
+    energy += square, scatter += (square - 1.0) * (square - 1.0), length += one.duration_s;
+    const double along = (-0.3 * j[0] + 0.4 * j[1] + 1.2 * j[2]) / 1.3 / std::sqrt(square * 1.69);
+    most_turned = std::max(most_turned, std::acos(std::min(1.0, along)));
+    EXPECT_NEAR(place[0], 0.05, 1e-12) << "it stays on the face";
+    const double moved = std::hypot(place[1] - 0.01, place[2] + 0.02);
+    way += moved * moved, farthest = std::max(farthest, moved);
+    EXPECT_EQ(one.time_s, 0.25);
+  }
+  const double n = 4000.0;
+  EXPECT_NEAR(energy / n, 1.0, 3.0 * 0.18 / std::sqrt(n)) << "the mean energy stays";
+  EXPECT_NEAR(std::sqrt(scatter / n), 0.18, 0.01);
+  EXPECT_NEAR(length / n, 1e-3, 0.01e-3);
+  EXPECT_NEAR(std::sqrt(way / n), 2e-3 * std::sqrt(2.0), 0.1e-3);
+  EXPECT_LT(farthest, 10e-3);
+  EXPECT_LT(most_turned, 0.25);
+  EXPECT_NE(varied[0].impulse_n_s, varied[1].impulse_n_s);
+  // The same scene, the same strikes; another name, others.
+  EXPECT_EQ(make_impulses(scene_, {&bank_})[7].impulse_n_s, varied[7].impulse_n_s);
+  scene_.bodies[0].name = "box";
+  EXPECT_NE(make_impulses(scene_, {&bank_})[7].impulse_n_s, varied[7].impulse_n_s);
+  // A tenth of it is a tenth of the way.
+  scene_.bodies[0].name = "cube";
+  scene_.bodies[0].variation = 0.1;
+  const contact::Impulse small = make_impulses(scene_, {&bank_})[7];
+  EXPECT_NEAR(find_place(small)[1] - 0.01, 0.1 * (find_place(varied[7])[1] - 0.01), 1e-9);
+}
+
 }  // namespace
 }  // namespace carillon::host

@@ -174,17 +174,19 @@ TEST(ContactForces, NeverPullAndLeaveTheLoadItselfOut) {
         c.patch_radius_m = 1e-5 * (1.2 + std::sin(300.0 * t));
         return c;
       });
+      // Of the heights, up to waves of 6.4 mm, over the skin: beyond 1 the shocks are larger than the load.
+      const double most = std::max(1.0, std::sqrt(2.0) * 5.3 * roughness / 10e-6);
       double sum = 0.0, square = 0.0;
       const std::vector<double> force = trace(contacts, records, 1.0, {.roughness_m = roughness, .friction = 0.5, .modulus_pa = 200e9});
       for (std::size_t n = 0; n < force.size(); ++n) {
         const double t = static_cast<double>(n) / kRate;
         // Values at the border of two quanta are on the line between records 2 ms apart; in between, on the line between borders.
         const double slack = load * 0.9 * 170.0 * 170.0 * (2e-3 * 2e-3 + 1e-3 * 1e-3) / 8.0;
-        ASSERT_GT(force[n], -load * (1.0 + 0.9 * std::cos(170.0 * t)) - slack) << t;
+        ASSERT_GT(force[n], -most * load * (1.0 + 0.9 * std::cos(170.0 * t)) - slack) << t;
         sum += force[n], square += force[n] * force[n];
       }
-      EXPECT_LT(std::abs(sum) / static_cast<double>(force.size()), 0.15 * load) << "the mean is left out";
-      EXPECT_LT(square / static_cast<double>(force.size()), 10.0 * load * load);
+      EXPECT_LT(std::abs(sum) / static_cast<double>(force.size()), (roughness > 1e-5 ? 0.6 : 0.15) * most * load) << "the mean is left out";
+      EXPECT_LT(square / static_cast<double>(force.size()), 10.0 * most * most * load * load);
       EXPECT_GT(square, 0.0);
     }
   }
@@ -210,21 +212,6 @@ TEST(ContactForces, OfARestingBodyAreBitExactSilence) {
     EXPECT_TRUE(voice.is_idle());
     EXPECT_EQ(contacts.get_counters().samples, 0) << "no noise is worked out";
   }
-}
-
-TEST(ContactForces, OfABoxThatSlidesFlatAreTheFloorsTexture) {
-  const auto model = Model::make(make_cube_bank(make_modes()));
-  const std::vector<Contact> records = make_records(0.3, [](double t) { return make_sliding(t, 0.4); });
-  const auto hear = [&](double own_m, double other_m) {
-    ContactForces contacts(model, {.surface = {.roughness_m = own_m, .modulus_pa = 70e9}});
-    Voice voice(model);
-    return play(voice, contacts, records, 0.3, 480, {.roughness_m = other_m, .friction = 0.5, .modulus_pa = 70e9});
-  };
-  const std::vector<float> heard = hear(1e-6, 3e-6);
-  EXPECT_GT(calc_peak(heard), 0.0F);
-  EXPECT_EQ(hear(50e-6, 3e-6), heard) << "its own surface is not swept";
-  EXPECT_EQ(calc_peak(hear(1e-6, 0.0)), 0.0F) << "a smooth floor makes no sound";
-  EXPECT_NE(hear(1e-6, 4e-6), heard);
 }
 
 TEST(ContactForces, AreSwitchedByTheirEffects) {
@@ -263,14 +250,14 @@ TEST(ContactForces, SoundInABandThatFollowsTheSpeed) {
   // Many modes of equal shape; each hears the force's spectrum at its own frequency: power ~ S(f) gain^2 / (2 d) for a narrow mode.
   std::vector<InventedMode> modes;
   for (int m = 0; m < 12; ++m) modes.push_back({250.0 * std::pow(2.0, 0.5 * m), 60.0, 1.0});
-  const auto spectrum = [](double freq_hz, double speed_m_s) {  // of the heights, m^2 / Hz; cut-off 0.8 mm
+  const auto spectrum = [](double freq_hz, double speed_m_s) {  // of the heights, m^2 / Hz; cut-off 0.8 mm, waves up to 6.4 mm
     const double low = speed_m_s / 0.8e-3;
-    return freq_hz < low ? 0.0 : 1.6 / low * std::pow(freq_hz / low, -2.6);
+    return freq_hz < low / 8.0 ? 0.0 : 1.6 / low * std::pow(freq_hz / low, -2.6);
   };
   for (const double speed : {0.15, 0.3, 0.6}) {
     for (std::size_t m = 0; m < modes.size(); ++m) {
-      const double freq = modes[m].freq_hz, low = speed / 0.8e-3;
-      if (freq < 1.5 * low || freq > 0.19 * kRate) continue;
+      const double freq = modes[m].freq_hz, lowest = speed / 6.4e-3;
+      if (freq < 1.5 * lowest || freq > 0.19 * kRate) continue;
       const auto model = Model::make(make_cube_bank({modes[m]}));
       ContactForces contacts(model, {.effects = {Effect::kRolling}});
       Voice voice(model);
@@ -291,6 +278,99 @@ TEST(ContactForces, SoundInABandThatFollowsTheSpeed) {
       EXPECT_NEAR(20.0 * std::log10(calc_rms(heard, 0.2, 1.9) / expected), 0.0, 2.0) << freq << " Hz, " << speed << " m/s";
     }
   }
+}
+
+struct Slide {
+  double own_m = 0.0, floor_m = 2e-6, speed_m_s = 0.1, load_n = 2.0, patch_m = 0.2e-3, modulus_pa = 38e9;
+};
+
+/// A body with modes from 300 Hz to 9 kHz that slides flat for 3 s.
+std::vector<float> hear_slide(const Slide& of) {
+  std::vector<InventedMode> modes;
+  for (int m = 0; m < 11; ++m) modes.push_back({300.0 * std::pow(2.0, 0.49 * m), 40.0, 1.0 / (1.0 + m)});
+  const auto model = Model::make(make_cube_bank(modes));
+  ContactForces contacts(model, {.surface = {.roughness_m = of.own_m, .modulus_pa = of.modulus_pa}});
+  Voice voice(model);
+  const std::vector<Contact> records = make_records(3.0, [&](double t) {
+    Contact c = make_sliding(t, of.speed_m_s, of.load_n);
+    c.patch_radius_m = of.patch_m;
+    return c;
+  });
+  return play(voice, contacts, records, 3.0, 480, {.roughness_m = of.floor_m, .friction = 0.5, .modulus_pa = of.modulus_pa});
+}
+
+double calc_slide_db(const Slide& of) { return 20.0 * std::log10(calc_rms(hear_slide(of), 0.1, 2.9)); }
+
+// Measured: levels of flat bodies that slide grow evenly with the logarithms of roughness and speed, with exponents of 0.8 to 1.16 and 0.7
+// to 0.96 (Ben Abdelounis et al. 2010 and those that Dang et al. 2013 list).
+TEST(ContactForces, OfWhatSlidesGrowEvenlyWithRoughnessAndSpeed) {
+  const std::vector<double> floors{0.02e-6, 0.1e-6, 0.5e-6, 2e-6, 10e-6, 20e-6, 50e-6}, speeds{0.02, 0.05, 0.1, 0.2, 0.4, 1.0};
+  const auto calc_exponent = [](double from_db, double to_db, double from, double to) {
+    return (to_db - from_db) / (20.0 * std::log10(to / from));
+  };
+  for (const Slide& of : {Slide{}, Slide{.load_n = 0.02, .patch_m = 20e-6, .modulus_pa = 100e9},
+                          Slide{.load_n = 50.0, .patch_m = 0.5e-3, .modulus_pa = 5e9}}) {
+    std::vector<std::vector<double>> level;
+    for (const double speed : speeds) {
+      level.emplace_back();
+      for (const double floor : floors) {
+        Slide at = of;
+        at.speed_m_s = speed, at.floor_m = floor;
+        level.back().push_back(calc_slide_db(at));
+      }
+    }
+    for (std::size_t v = 0; v < speeds.size(); ++v) {
+      for (std::size_t h = 0; h < floors.size(); ++h) {
+        if (h > 0) {
+          const double step = calc_exponent(level[v][h - 1], level[v][h], floors[h - 1], floors[h]);
+          EXPECT_GT(step, 0.75) << floors[h] << " m, " << speeds[v] << " m/s";
+          EXPECT_LT(step, 1.4) << floors[h] << " m, " << speeds[v] << " m/s";
+        }
+        if (v > 0) {
+          const double step = calc_exponent(level[v - 1][h], level[v][h], speeds[v - 1], speeds[v]);
+          EXPECT_GT(step, 0.55) << floors[h] << " m, " << speeds[v] << " m/s";
+          EXPECT_LT(step, 1.1) << floors[h] << " m, " << speeds[v] << " m/s";
+        }
+      }
+      const double exponent = calc_exponent(level[v].front(), level[v].back(), floors.front(), floors.back());
+      EXPECT_GT(exponent, 0.8) << speeds[v];
+      EXPECT_LT(exponent, 1.16) << speeds[v];
+    }
+    for (std::size_t h = 0; h < floors.size(); ++h) {
+      const double exponent = calc_exponent(level.front()[h], level.back()[h], speeds.front(), speeds.back());
+      EXPECT_GT(exponent, 0.7) << floors[h];
+      EXPECT_LT(exponent, 0.96) << floors[h];
+    }
+  }
+}
+
+TEST(ContactForces, OfABoxThatSlidesFlatAreTheRoughnessOfBothSurfaces) {
+  const auto hear = [](double own_m, double floor_m) { return calc_slide_db({.own_m = own_m, .floor_m = floor_m}); };
+  const double floor = hear(0.0, 3e-6);
+  EXPECT_NEAR(hear(3e-6, 0.0), floor, 1.0) << "whichever of the two is rough";
+  EXPECT_NEAR(hear(4e-6, 3e-6), floor + 20.0 * std::log10(5.0 / 3.0), 1.0) << "the root of the sum of squares";
+  EXPECT_NEAR(hear(20e-6, 2e-6), hear(20e-6, 20e-6) - 10.0 * std::log10(2.0), 1.5);
+  EXPECT_EQ(calc_peak(hear_slide({.own_m = 0.0, .floor_m = 0.0})), 0.0F) << "two smooth surfaces make no sound";
+}
+
+TEST(ContactForces, OfWhatSlidesStayFiniteAndEvenAtTheExtremes) {
+  double last = -1e9;
+  for (const double floor : {1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 5e-4, 1.0, 1e300}) {
+    const std::vector<float> heard = hear_slide({.floor_m = floor, .speed_m_s = 1.0});
+    for (const float p : heard) ASSERT_TRUE(std::isfinite(p)) << floor;
+    const double level = 20.0 * std::log10(calc_rms(heard, 0.1, 2.9));
+    if (floor < 1e-3) {
+      EXPECT_GT(level, last) << "louder with roughness, " << floor;
+    }
+    last = level;
+  }
+  for (const double speed : {1e-3, 10.0, 300.0, 1e9}) {
+    for (const double load : {1e-12, 1e9}) {
+      for (const float p : hear_slide({.floor_m = 5e-4, .speed_m_s = speed, .load_n = load})) ASSERT_TRUE(std::isfinite(p)) << speed;
+    }
+  }
+  const double heavy = calc_slide_db({.load_n = 2.0}), light = calc_slide_db({.load_n = 2e-3});
+  EXPECT_NEAR(light, heavy - 60.0, 0.5) << "what hardly presses hardly sounds";
 }
 
 /// q'' + 2 D q' + Lambda q + Z(t) phi phi^T q' = 0, by Runge and Kutta's fourth order.
@@ -561,8 +641,9 @@ TEST(ContactForces, KeepTheStrongestWhenThereAreTooMany) {
 TEST(ContactForces, OfBothBodiesReadTheSameTwoSurfaces) {
   // Body 4 on body 6: each hears its own surface and the other's, and both are the same two.
   const auto model = Model::make(make_cube_bank(make_modes()));
-  const auto hear = [&](bool first) {
-    const Surface a{.roughness_m = 1e-6, .modulus_pa = 70e9}, b{.roughness_m = 3e-6, .modulus_pa = 200e9};
+  const auto hear = [&](bool first, const std::array<std::uint64_t, 2>& seeds) {
+    const Surface a{.roughness_m = 1e-6, .modulus_pa = 70e9, .seed = seeds[0]},
+        b{.roughness_m = 3e-6, .modulus_pa = 200e9, .seed = seeds[1]};
     ContactForces contacts(model, {.surface = first ? a : b, .effects = {Effect::kRolling}});
     return trace(contacts,
                  make_records(0.1,
@@ -576,9 +657,31 @@ TEST(ContactForces, OfBothBodiesReadTheSameTwoSurfaces) {
                               }),
                  0.1, first ? b : a);
   };
-  const std::vector<double> x = hear(true), y = hear(false);
-  ASSERT_EQ(x.size(), y.size());
-  for (std::size_t n = 0; n < x.size(); ++n) ASSERT_NEAR(x[n], y[n], 1e-6) << "action is reaction";
+  for (const std::array<std::uint64_t, 2>& seeds : {std::array<std::uint64_t, 2>{0, 0}, {5, 9}, {9, 5}}) {
+    const std::vector<double> x = hear(true, seeds), y = hear(false, seeds);
+    ASSERT_EQ(x.size(), y.size());
+    for (std::size_t n = 0; n < x.size(); ++n) ASSERT_NEAR(x[n], y[n], 1e-6) << "action is reaction";
+  }
+  EXPECT_NE(hear(true, {5, 9}), hear(true, {5, 8})) << "another body has another surface";
+}
+
+TEST(ContactForces, DoNotHangOnTheNumbersOfBodies) {
+  const auto model = Model::make(make_cube_bank(make_modes()));
+  const auto hear = [&](std::int32_t body, std::int32_t other, std::uint64_t id) {
+    ContactForces contacts(model, {.surface = {.seed = 11}});
+    return trace(contacts,
+                 make_records(0.1,
+                              [&](double t) {
+                                Contact c = make_sliding(t, 0.3);
+                                c.body = body, c.other = other, c.id = id;
+                                return c;
+                              }),
+                 0.1, {.modulus_pa = 70e9, .seed = 12});
+  };
+  const std::vector<double> alone = hear(0, 1, 77);
+  EXPECT_EQ(hear(5, 9, 77), alone);
+  EXPECT_EQ(hear(9, 5, 77), alone) << "in whatever order";
+  EXPECT_NE(hear(0, 1, 78), alone) << "another touch";
 }
 
 }  // namespace
