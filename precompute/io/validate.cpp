@@ -104,7 +104,7 @@ void Validation::look(const std::filesystem::path& job_file) {
     notes_.push_back("\"accuracy_cents\" chooses the mesh by trial: this is the first and coarsest trial, and those that follow need more");
   }
   Patience patience{.seconds = run_.options.patience_s};
-  say(fmt::format("reading {}", run_.job.body ? describe(*run_.job.body, {setting.nodes, setting.edge_m}) : run_.job.mesh.string()));
+  say(fmt::format("reading {}", run_.job.body ? io::describe(*run_.job.body, {setting.nodes, setting.edge_m}) : run_.job.mesh.string()));
   body_ = make_body(run_, setting, &patience);
   if (body_.estimate)
     look_from_afar(setting);

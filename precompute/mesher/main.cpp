@@ -150,13 +150,6 @@ Result make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.facets = order.facets;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
-  if (order.estimate) {
-    options.on_estimate = [](const mesher::SurfaceEstimate& estimate) {
-      fmt::print(stderr, "estimate {{\"volume_m3\": {:.12g}, \"area_m2\": {:.12g}, \"thickness_m\": {:.12g}, \"nodes\": {}}}\n",
-                 estimate.volume_m3, estimate.area_m2, estimate.thickness_m, estimate.nodes);
-      std::fflush(stderr);
-    };
-  }
   Result result;
   mesher::SurfaceReport report;
   result.mesh = mesher::mesh_surface(options, report, progress);
@@ -260,6 +253,10 @@ std::string format_report(const Order& order, const Result& result, const mesh::
 void make_mesh(const Order& order) {
   const auto start = Clock::now();
   const mesher::Progress progress = [&](std::string_view phase) {
+    if (order.estimate && phase.starts_with("estimate ")) {
+      fmt::print(stderr, "{}\n", phase);
+      std::fflush(stderr);
+    }
     if (order.quiet) return;
     fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), config::printable(phase));
     std::fflush(stderr);

@@ -49,6 +49,10 @@ class Phases {
     const Clock clock{report_, name};
     return work();
   }
+  /// A word on the way that is no phase.
+  void tell(const std::string& text) {
+    if (progress_) progress_(text);
+  }
 
  private:
   struct Clock {
@@ -340,9 +344,9 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   if (!options.edge_m && !options.nodes)
     report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
-  if (options.on_estimate)
-    options.on_estimate(
-        {body.model.volume_m3, body.model.area_m2, body.thickness_m, std::llround(std::max(body.model.calc_nodes(edge), least))});
+  phases.tell(fmt::format("estimate {{\"volume_m3\": {:.12g}, \"area_m2\": {:.12g}, \"thickness_m\": {:.12g}, \"nodes\": {}}}",
+                          body.model.volume_m3, body.model.area_m2, body.thickness_m,
+                          std::llround(std::max(body.model.calc_nodes(edge), least))));
 
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
   body.nearest.emplace(surface);

@@ -42,7 +42,6 @@ struct SurfaceOptions {
   bool straight = false;                             // order 2: all mid-side nodes in the middle, none on the true surface
   double sharp_angle_deg = 40;                       // an edge whose two faces turn by more than this, and not by noise, stays sharp
   Method method = Method::kAutomatic;
-  std::function<void(const SurfaceEstimate&)> on_estimate = {};  // called once, before any element is made
 };
 
 /// What came out, and what had to be done to the surface for it.
@@ -85,13 +84,6 @@ struct SurfaceReport {
 
   std::vector<std::pair<std::string, double>> seconds;  // per phase, in the order they ran
   std::vector<std::string> notes;                       // sentences for the user: what was mended, what fell short
-};
-
-/// What is known of a body before it is meshed.
-struct SurfaceEstimate {
-  double volume_m3 = 0, area_m2 = 0;  // of the body, and of all its skins
-  double thickness_m = 0;             // of its wall, or volume over half the area
-  std::int64_t nodes = 0;             // of the mesh, order 2 with those at the middle of its edges; to a factor of two
 };
 
 /// Called with a short sentence at the start of each phase.

@@ -9,15 +9,19 @@ and plays it; under the sanitizers a fault ends the target, and so do 20 s on on
 import argparse
 import collections
 import copy
+import io
 import json
+import math
 import os
 import pathlib
 import random
 import shutil
-import struct
 import subprocess
 import sys
 import tempfile
+
+import h5py
+import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BATCH = 250
@@ -121,9 +125,9 @@ def mutate_bytes(draw, data):
     return bytes(data)
 
 
-def write_json(draw, value):
+def write_json(draw, value, share=0.1):
     text = json.dumps(value)
-    if draw.random() < 0.1:  # a number written as JSON does not have it
+    if draw.random() < share:  # a number written as JSON does not have it
         words = [i for i, letter in enumerate(text) if letter.isdigit() and (i == 0 or not text[i - 1].isalnum() and text[i - 1] not in ".-_")]
         if words:
             at = draw.choice(words)
@@ -135,6 +139,35 @@ def make_text(draw, seeds):
     value = mutate_json(draw, draw.choice(seeds))
     data = write_json(draw, value)
     return mutate_bytes(draw, data) if draw.random() < 0.15 else data
+
+
+def tune_event(draw, line):
+    """An amount, a time, an id or a state of an event, within what is played."""
+    event = next(iter(line.values())) if isinstance(line, dict) and len(line) == 1 else None
+    if not isinstance(event, dict) or not event:
+        return
+    key = draw.choice(list(event))
+    value = event[key]
+    if key == "time_s" and isinstance(value, (int, float)):
+        event[key] = value + draw.choice([-0.4, -0.01, -1e-9, 0.0, 1e-9, 0.003, 0.02, 3.0])
+    elif key in ("force_n", "sweep_m_s", "other_sweep_m_s", "spin_rad_s", "impedance_n_s_m", "patch_radius_m", "duration_s"):
+        event[key] = draw.choice([0, 1e-300, 1e-12, 1e-6, 1e-3, 1, 10, 1e3, 1e6, 1e9])
+    elif key in ("slip_m_s", "impulse_n_s", "velocity_m_s", "position_m"):
+        event[key] = [draw.choice([0, 0, 1, -1]) * 10 ** draw.uniform(-9, 9) for _ in range(3)]
+    elif key == "state":
+        event[key] = draw.choice(["begin", "hold", "end"])
+    elif key == "id":
+        event[key] = draw.choice([0, 7, 9, 10, 2**63 - 1])
+    elif key == "triangle":
+        event[key] = draw.randrange(12)
+    elif key in ("body", "other"):
+        event[key] = draw.choice([0, 1])
+    elif key == "barycentric":
+        a, b = sorted((draw.random(), draw.random()))
+        event[key] = draw.choice([[a, b - a, 1 - b], [0, 0, 1], [1 + 1e-7, -1e-7, 0]])
+    elif key in ("normal", "rotation"):
+        numbers = [draw.gauss(0, 1) for _ in value]
+        event[key] = [x / sum(y * y for y in numbers) ** 0.5 for x in numbers]
 
 
 def make_lines(draw, seeds):
@@ -150,36 +183,56 @@ def make_lines(draw, seeds):
         elif kind == 2:
             other = draw.randrange(len(lines))
             lines[at], lines[other] = lines[other], lines[at]
+        elif kind < 6:
+            tune_event(draw, lines[at])
         else:
             lines[at] = mutate_json(draw, lines[at])
-    if draw.random() < 0.7 and isinstance(lines[0], dict) and "events" in lines[0]:
+    if draw.random() < 0.9 and isinstance(lines[0], dict) and "events" in lines[0]:
         lines[0]["events"] = len(lines) - 1
-    data = b"\n".join(write_json(draw, line) for line in lines) + b"\n"
+    data = b"\n".join(write_json(draw, line, 0.05 / len(lines)) for line in lines) + b"\n"
     return mutate_bytes(draw, data) if draw.random() < 0.1 else data
 
 
 def make_bank(draw, seeds):
-    """A bank of which some bytes changed, most of them numbers; the target seals it again."""
+    """A bank of which numbers or, now and then, bytes changed; the target seals it again."""
     data = bytearray(draw.choice(seeds))
-    for _ in range(draw.choice([1, 1, 2, 4, 8])):
-        kind = draw.randrange(5)
-        at = draw.randrange(4096, len(data)) if len(data) > 4200 else draw.randrange(len(data))
-        if kind == 0:
-            data[at] ^= 1 << draw.randrange(8)
-        elif kind == 1:
-            data[at: at + 8] = draw.randbytes(min(8, len(data) - at))
-        elif kind == 2:
-            place = at - at % 8
-            data[place: place + 8] = struct.pack("<d", draw.choice([*NUMBERS, float("nan"), float("inf"), draw.gauss(0, 1), 10 ** draw.uniform(-30, 30)]))[: len(data) - place]
-        elif kind == 3:
-            to = draw.randrange(4096, len(data)) if len(data) > 4200 else at
-            length = draw.randint(1, 64)
-            data[to: to + length] = data[at: at + length][: len(data) - to]
+    if draw.random() < 0.2:
+        for _ in range(draw.choice([1, 1, 2, 4])):
+            at = draw.randrange(4096, len(data))
+            data[at] = data[at] ^ 1 << draw.randrange(8) if draw.random() < 0.5 else draw.choice([0, 1, 127, 128, 255])
+        return bytes(data[: draw.randrange(len(data))] if draw.random() < 0.1 else data)
+    image = io.BytesIO(bytes(data))
+    with h5py.File(image, "r+") as bank:
+        arrays = []
+        bank.visititems(lambda name, item: arrays.append(item) if isinstance(item, h5py.Dataset) else None)
+        for _ in range(draw.choice([1, 1, 1, 2, 4])):
+            change_array(draw, draw.choice(arrays))
+    return image.getvalue()
+
+
+def change_array(draw, array):
+    values = numpy.array(array[()])
+    if values.dtype.kind in "SO":
+        return
+    flat = values.reshape(-1)
+    if not flat.size:
+        return
+    kind = draw.randrange(4)
+    at = draw.randrange(flat.size)
+    with numpy.errstate(all="ignore"):
+        if values.dtype.kind == "f":
+            if kind == 0:
+                flat[at] = draw.choice([*NUMBERS, math.nan, math.inf])
+            elif kind == 1:
+                flat[at] *= 10 ** draw.uniform(-3, 3)
+            elif kind == 2:
+                flat *= draw.choice([0.0, -1.0, 1e-300, 1e-12, 1e-3, 1.0001, 2.0, 1e3, 1e12, 1e300])
+            else:
+                flat[at] = flat[draw.randrange(flat.size)]
         else:
-            data[at] = draw.choice([0, 1, 127, 128, 255])
-    if draw.random() < 0.03:
-        del data[draw.randrange(len(data)):]
-    return bytes(data)
+            limits = numpy.iinfo(values.dtype)
+            flat[at] = draw.choice([0, 1, limits.max, limits.min, min(max(int(flat[at]) + draw.randint(-3, 3), limits.min), limits.max), int(flat[draw.randrange(flat.size)])])
+    array[()] = values
 
 
 def read_seeds(kind):
