@@ -110,7 +110,7 @@ const std::vector<Case> kCases{{"a slide that stops and lies",
                                {"rare records of a slow scrape", [] {
                                   std::vector<stream::Event> events;
                                   for (int i = 0; i <= 4; ++i) events.emplace_back(make_contact(0.1 + 0.3 * i, 1, 0.05, 5.0));
-                                  for (const double t : {1.301, 1.6}) events.emplace_back(make_contact(t, 1, 0.0, 5.0));
+                                  for (const double t : {1.34, 1.6}) events.emplace_back(make_contact(t, 1, 0.0, 5.0));
                                   return events;
                                 }}};
 

@@ -289,7 +289,7 @@ class RenderProgram(unittest.TestCase):
             first = pressure[:47000]
             return [10 * np.log10(np.sum((pressure[n:n + 47000] - first) ** 2) / np.sum(first ** 2) + 1e-30) for n in (48000, 96000, 144000)]
 
-        self.assertLess(max(compare(hear("equal.json"))), -120)
+        self.assertLess(max(compare(hear("equal.json"))), -90)  # what is left of the strikes before
         varied = hear("varied.json", variation=1)
         self.assertGreater(min(compare(varied)), -30)
         self.assertLess(max(compare(varied)), 0)
