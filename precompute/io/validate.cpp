@@ -126,7 +126,7 @@ double Validation::get_pace() const {
   return (outlook_.factor_seconds + kTrustSeconds / speed_) / (foreseen + kTrustSeconds);
 }
 
-/// Progress on standard error, so that nobody waits before an empty screen.
+/// Progress on standard error.
 void Validation::say(const std::string& what) const {
   if (run_.rank == 0 && tells_) fmt::print(stderr, "carillon-precompute: {}\n", config::printable(what));
 }

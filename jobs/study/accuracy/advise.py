@@ -359,7 +359,7 @@ def describe_estimate(adviser, found, options):
               f"estimate:  so thin a body takes long to mesh. Its coarsest mesh has about {found['mesh']['nodes']:,} nodes (T10), about {found['modes']['count']} modes in the band, "
               f"{found['cpu_seconds']:.0f} CPU s and {memory:.1f} GB, by its size alone and to a factor of two"]
     if options.dry_run:
-        lines.append("           cents are not foreseen without a trial: leave --dry-run away for the trials")
+        lines.append("           cents are not predicted without a trial: leave --dry-run away for the trials")
     return lines
 
 
