@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -27,6 +28,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
+
+constexpr double kMostAudibleHz = 20000.0;
 
 double get_seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -57,9 +60,18 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
   return fs::weakly_canonical(fs::absolute(a), error) == fs::weakly_canonical(fs::absolute(b), error);
 }
 
+/// WAV is what is written, so that is what the name says.
+void check_sound_name(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (file == "-" || extension == ".wav" || extension == ".wave") return;
+  throw InputError(fmt::format("{}: the sound is written as WAV; give the output a name that ends in .wav", file.string()));
+}
+
 /// Every output: can be written, is none of the inputs, and is not named twice.
 void check_outputs(const ProgramOptions& options, const Scene& scene) {
   std::vector<std::pair<fs::path, std::string>> outputs;
+  if (!options.plan) check_sound_name(options.wav);
   if (!options.plan) outputs.emplace_back(options.wav, "WAV file");
   if (options.spectrogram) outputs.emplace_back(*options.spectrogram, "spectrogram");
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
@@ -79,12 +91,23 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
   }
 }
 
+/// A line for each body whose bank leaves out some of what is heard.
+void print_bands(const Scene& scene, double rate_hz) {
+  for (const SceneBody& body : scene.bodies) {
+    const double end_hz = body.spec.bank->band_hz[1];
+    if (end_hz < std::min(kMostAudibleHz, 0.5 * rate_hz))
+      fmt::print("  {:<16} nothing above {:.5g} Hz, where its bank ends; compute one with a higher \"band_hz\" to hear more\n", body.name,
+                 end_hz);
+  }
+}
+
 void print_summary(const Scene& scene, const Sound& sound, const Figures& figures) {
   fmt::print("bodies             {}\n", figures.bodies);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     fmt::print("  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", scene.bodies[i].name, sound.body_modes[i],
                scene.bodies[i].spec.fixed ? "fixed, " : "", sound.body_peak_pa[i]);
   }
+  print_bands(scene, sound.rate_hz);
   fmt::print("modes sounding     {}\n", figures.modes);
   fmt::print("contacts           {}\n", figures.contacts);
   fmt::print("physics            {:.2f} s\n", figures.physics_s);
@@ -116,9 +139,9 @@ void print_warnings(const Scene& scene, const Sound& sound, const Figures& figur
   if (sound.resets > 0) fmt::print(stderr, "warning: {} times a body's state was no number and was cleared\n", sound.resets);
 }
 
-void write_output(const fs::path& file, const std::string& bytes, const char* what) {
+void write_output(const fs::path& file, const std::string& bytes, const char* what, bool quiet) {
   config::write_file(file, bytes);
-  fmt::print("{:<18} {}\n", what, file.string());
+  if (!quiet) fmt::print("{:<18} {}\n", what, file.string());
 }
 
 }  // namespace
@@ -191,13 +214,13 @@ void run(const ProgramOptions& options) {
   const std::string trajectory = options.trajectory ? make_trajectory_json(scene, body_banks, simulation) : "";
   const std::string recording = options.record ? stream::format_recording(course.recording) : "";
   const std::string report = options.report ? make_report_json(scene, simulation, sound, plan, figures) : "";
-  print_summary(scene, sound, figures);
+  if (!options.quiet) print_summary(scene, sound, figures);
   print_warnings(scene, sound, figures);
-  if (options.spectrogram) write_output(*options.spectrogram, png, "spectrogram");
-  if (options.trajectory) write_output(*options.trajectory, trajectory, "trajectory");
-  if (options.report) write_output(*options.report, report, "report");
-  if (options.record) write_output(*options.record, recording, "contacts file");
-  write_output(options.wav, wav, "sound");
+  if (options.spectrogram) write_output(*options.spectrogram, png, "spectrogram", options.quiet);
+  if (options.trajectory) write_output(*options.trajectory, trajectory, "trajectory", options.quiet);
+  if (options.report) write_output(*options.report, report, "report", options.quiet);
+  if (options.record) write_output(*options.record, recording, "contacts file", options.quiet);
+  write_output(options.wav, wav, "sound", options.quiet);
 }
 
 }  // namespace carillon::host
