@@ -17,9 +17,11 @@
 #include "precompute/io/run_job.hpp"
 #include "precompute/io/run_record.hpp"
 #include "precompute/io/validate.hpp"
+#include "precompute/petsc/blas_kernels.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/config/printable.hpp"
+#include "runtime/version/version.hpp"
 
 namespace {
 
@@ -44,14 +46,14 @@ int fail(MPI_Comm comm, int rank, int code, const std::string& message) {
 
 void print_start(const petsc::Session& session, bool quiet) {
   if (session.rank() != 0) return;
-  if (!quiet)
-    fmt::print("carillon-precompute {} on {} rank{}, BLAS: {}\n", CARILLON_VERSION, session.size(), session.size() == 1 ? "" : "s",
-               petsc::blas_name());
+  if (!quiet) fmt::print("carillon-precompute {} on {} rank{}\n", version::get_number(), session.size(), session.size() == 1 ? "" : "s");
   std::fflush(stdout);
   if (petsc::blas_is_reference())
     fmt::print(stderr,
                "carillon-precompute: warning: this is the reference BLAS, about 14 times slower than OpenBLAS; "
                "apt-get install libopenblas0-serial\n");
+  if (const std::string slow = petsc::describe_slow_kernels(); !slow.empty())
+    fmt::print(stderr, "carillon-precompute: warning: {} (BLAS: {})\n", slow, petsc::blas_name());
 }
 
 /// What the command line asks for.
@@ -70,7 +72,7 @@ struct CommandLine {
     app.failure_message(
         [](const CLI::App* asked, const CLI::Error& error) { return config::printable_lines(CLI::FailureMessage::simple(asked, error)); });
     app.add_option("JOB", job, "job file (JSON with // comments)")->required();
-    app.add_flag("-q,--quiet", options.quiet, "no progress on standard output");
+    app.add_flag("-q,--quiet", options.quiet, "nothing on standard output; warnings and errors are on standard error");
     app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
     app.add_option("--checkpoint", options.checkpoint,
                    "go on from this file if there is one, and save to it; SIGUSR1 and SIGTERM then save and end with 85")
@@ -89,7 +91,7 @@ struct CommandLine {
         ->capture_default_str()
         ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
-    app.set_version_flag("--version", fmt::format("carillon-precompute {} ({})", CARILLON_VERSION, io::git_id()));
+    app.set_version_flag("--version", version::describe("carillon-precompute"));
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
     options.solver_options.assign(argv + std::min(own + 1, argc), argv + argc);
@@ -126,8 +128,10 @@ int carry_out(const petsc::Session& session, const CommandLine& words) {
     if (speaks) fmt::print(stderr, "carillon-precompute: {}\n", config::printable(summary.result));
     return kExitCheckpointed;
   }
-  if (speaks && !words.options.quiet)
+  if (speaks && !words.options.quiet) {
+    if (!summary.warning.empty()) fmt::print("warning: {}\n", config::printable(summary.warning));
     fmt::print("{}\n{}\n", config::printable(summary.bank.string()), config::printable_lines(summary.result));
+  }
   return 0;
 }
 

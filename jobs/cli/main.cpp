@@ -12,6 +12,7 @@
 #include "jobs/cli/shared.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/error.hpp"
+#include "runtime/version/version.hpp"
 
 namespace carillon::cli {
 
@@ -88,7 +89,7 @@ int run(int argc, char** argv) {
   app.add_option("--store", shared.store_option, "Folder of the store; made when there is none");
   app.add_option("--profile", shared.profile_option, "Profile file");
   app.add_flag("--json", shared.json, "One JSON document (of commands that go on: one object a line)");
-  app.set_version_flag("--version", fmt::format("carillon {}", CARILLON_VERSION));
+  app.set_version_flag("--version", version::describe("carillon"));
   for (const auto add :
        {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_validate, add_study, add_report})
     add(app, shared, command);

@@ -64,7 +64,11 @@ const std::vector<ShapeKeys>& get_shape_keys() {
                                            {"sphere", {"radius", "wall"}},
                                            {"bowl", {"outer-radius", "wall", "opening-angle"}},
                                            {"box", {"length", "width", "height"}},
-                                           {"hollow-box", {"length", "width", "height", "wall"}}};
+                                           {"hollow-box", {"length", "width", "height", "wall"}},
+                                           {"cylinder", {"length", "radius"}},
+                                           {"disc", {"radius", "thickness"}},
+                                           {"ring", {"radius", "thickness"}},
+                                           {"cone", {"radius", "top-radius", "height"}}};
   return keys;
 }
 

@@ -20,6 +20,8 @@ import work
 from accuracy import advise, study
 from errors import InputError, RunError, printable
 
+VERSION = "unknown"  # what the build writes here
+
 
 def read_numbers(name, least):
     def read(text):
@@ -47,6 +49,7 @@ class Parser(argparse.ArgumentParser):
 
 def make_parser():
     parser = Parser(prog="carillon-study", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--version", action="version", version=f"carillon-study {VERSION}")
     commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
     one = commands.add_parser("scaling", help="strong and weak scaling, growth with the mesh, and what limits each phase",
                               description="Solves a job on several numbers of ranks and, where the job has a \"body\", on meshes of several sizes; writes a report "

@@ -27,6 +27,8 @@ import unicodedata
 import h5py
 import numpy
 
+VERSION = "unknown"  # what the build writes here
+STANDARD_OUTPUT = pathlib.Path("-")
 SUPERSAMPLING = 2  # pixels drawn per pixel written, along each side
 TEXT = (0.16, 0.17, 0.20)
 BACKGROUND = ((1.0, 1.0, 1.0), (0.90, 0.92, 0.95))  # top, bottom
@@ -355,7 +357,7 @@ def draw(renderers, width, height):
 
 
 def write_png(image, path):
-    """Writes the picture beside `path` first and renames it, so that there is a whole picture or none."""
+    """Writes the picture beside `path` first and renames it, so that there is a whole picture or none; "-" is standard output."""
     height, width, _ = image.shape
     data = vtk.vtkImageData()
     data.SetDimensions(width, height, 1)
@@ -365,6 +367,10 @@ def write_png(image, path):
     writer.SetInputData(data)
     writer.WriteToMemoryOn()
     writer.Write()
+    if path == STANDARD_OUTPUT:
+        sys.stdout.buffer.write(bytes(to_numpy(writer.GetResult())))
+        sys.stdout.buffer.flush()
+        return
     try:
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".", suffix=".png", delete=False) as file:
             file.write(bytes(to_numpy(writer.GetResult())))
@@ -735,8 +741,12 @@ def parse_modes(text, bank):
 
 
 def check_output(path):
+    if path == STANDARD_OUTPUT:
+        if sys.stdout.isatty():
+            raise InputError("-: a picture is no text for a terminal; send standard output to a file or another program")
+        return
     if path.suffix.lower() != ".png":
-        raise InputError(f"{path}: pictures are PNG; give the output a name that ends in .png")
+        raise InputError(f"{path}: pictures are PNG; give the output a name that ends in .png, or - for standard output")
     if path.is_dir():
         raise InputError(f"{path}: this is a folder; give the name of a file")
     if not path.parent.is_dir():
@@ -750,6 +760,7 @@ class Parser(argparse.ArgumentParser):
 
 def run():
     parser = Parser(prog="carillon-draw", description="Draws mode banks and simulated scenes.")
+    parser.add_argument("--version", action="version", version=f"carillon-draw {VERSION}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="modes|scene", parser_class=Parser)
     modes = commands.add_parser("modes", help="modes of a bank as deformed bodies", allow_abbrev=False)
     modes.add_argument("bank", metavar="BANK")
@@ -771,7 +782,8 @@ def run():
     load_vtk()
     image = draw_modes(bank, numbers, "xyz".index(arguments.up)) if arguments.command == "modes" else draw_scene(trajectory)
     write_png(image, arguments.output)
-    print(f"{printable(arguments.output)}: {image.shape[1]} x {image.shape[0]} pixels")
+    piped = arguments.output == STANDARD_OUTPUT
+    print(f"{'standard output' if piped else printable(arguments.output)}: {image.shape[1]} x {image.shape[0]} pixels", file=sys.stderr if piped else sys.stdout)
 
 
 def main():

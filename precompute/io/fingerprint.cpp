@@ -13,6 +13,7 @@
 #include "precompute/io/run_record.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "runtime/config/error.hpp"
+#include "runtime/version/version.hpp"
 
 namespace carillon::io {
 
@@ -26,7 +27,7 @@ Fingerprint calc_sha256(std::string_view bytes) {
   return digest;
 }
 
-std::string find_program_version() { return std::string(CARILLON_VERSION) + " (" + git_id() + ")"; }
+std::string find_program_version() { return std::string(version::get_number()) + " (" + version::get_git_id() + ")"; }
 
 void write_setting(eigen::NumberWriter& to, const Setting& setting) {
   to.add(static_cast<std::int64_t>(setting.element));

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <json/json.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <system_error>
@@ -72,6 +73,24 @@ bank::Bank collect_bank(Run& run, AccurateBody& found) {
   return bank;
 }
 
+constexpr double kAudibleCents = 50.0;
+
+/// What to say of error bars against the body that are wide, with the correction; empty when they are not. `is_asked`: the job has
+/// accuracy_cents, and got what it asked for.
+std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, bool is_asked) {
+  const std::vector<double>& cents = bank.discretisation_error_cents;
+  if (cents.empty() || is_asked) return {};
+  const auto worst = std::max_element(cents.begin(), cents.end());
+  if (!(*worst > kAudibleCents)) return {};
+  const auto wide = std::count_if(cents.begin(), cents.end(), [](double c) { return c > kAudibleCents; });
+  return fmt::format(
+      "frequencies can be wrong by {:.0f} cent (estimate, mode {}; {} of {} modes by more than {:g}): {}a finer mesh, or "
+      "\"accuracy_cents\" "
+      "in the job, makes them better",
+      *worst, worst - cents.begin() + 1, wide, cents.size(), kAudibleCents,
+      setting.element == spec::Element::T4 ? "\"element\": \"T10\" (--order 2), " : "");
+}
+
 std::string describe_result(const bank::Bank& bank) {
   std::string text = fmt::format("{}\n{}", bank::describe_completeness(bank), bank::describe_accuracy(bank));
   if (bank.mode_count() > 0) text += fmt::format("\n{:.2f} Hz to {:.2f} Hz", bank.freq_hz(0), bank.freq_hz(bank.mode_count() - 1));
@@ -83,10 +102,12 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   RunSummary summary;
   summary.bank = run.job.bank;
   summary.resolved = spec::find_resolved_path(run.job.bank);
+  if (run.rank == 0) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const Measured& measured) {
     Json::Value record = describe_run(run, found.setting, found.body, found.solved, measured);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
+    if (!summary.warning.empty()) record["warnings"].append(summary.warning);
     return spec::resolved_json(run.job, folder, write_json(record));
   };
   run.stations.begin("write", summary.bank.string());

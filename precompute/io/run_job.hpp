@@ -15,6 +15,7 @@ struct RunSummary {
   std::filesystem::path bank;
   std::filesystem::path resolved;
   std::string result;       // "227 modes in 20 .. 20000 Hz ...": how many, why no more, how wrong
+  std::string warning;      // of error bars that can be heard, with the correction; empty when there is none
   bool is_stopped = false;  // a signal ended the run, and there is a checkpoint; result says so
 };
 

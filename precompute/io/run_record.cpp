@@ -13,10 +13,10 @@
 #include <utility>
 
 #include "partition/partition.hpp"
-#include "precompute/io/git_id.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
 #include "runtime/config/printable.hpp"
+#include "runtime/version/version.hpp"
 
 namespace carillon::io {
 namespace {
@@ -121,7 +121,7 @@ Measured measure(MPI_Comm comm) {
   return measured;
 }
 
-std::string git_id() { return kGitId; }
+std::string git_id() { return version::get_git_id(); }
 
 std::vector<std::pair<std::string, std::string>> find_versions() {
   std::array<unsigned, 3> hdf5{};

@@ -53,7 +53,7 @@ std::string clean_name(std::string name) {
 
 }  // namespace
 
-void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEncoding encoding) {
+std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
   const bool binary = encoding == GmshEncoding::kBinary;
   std::vector<std::int32_t> region_of(mesh.regions);
   region_of.resize(static_cast<std::size_t>(mesh.tet_count()), 0);
@@ -154,7 +154,11 @@ void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEnco
     }
   }
   out.text(binary ? "\n$EndElements\n" : "$EndElements\n");
-  config::write_file(file, out.take());
+  return out.take();
+}
+
+void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEncoding encoding) {
+  config::write_file(file, make_gmsh(mesh, encoding));
 }
 
 }  // namespace carillon::mesh

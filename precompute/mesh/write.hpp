@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "precompute/mesh/tet_mesh.hpp"
 
@@ -13,5 +14,8 @@ enum class GmshEncoding { kBinary, kText };
 /// each region other than 0 a physical group of dimension 3, so that read_mesh gives the same mesh back. The set `physical:N` of a region N
 /// is not written as points: the volume group stands for it. Throws SystemError when the disk refuses. Not collective.
 void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEncoding encoding = GmshEncoding::kBinary);
+
+/// The bytes of that file.
+std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding = GmshEncoding::kBinary);
 
 }  // namespace carillon::mesh

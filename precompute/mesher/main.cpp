@@ -22,6 +22,8 @@
 #include "runtime/config/document.hpp"
 #include "runtime/config/file.hpp"
 #include "runtime/config/printable.hpp"
+#include "runtime/config/standard_output.hpp"
+#include "runtime/version/version.hpp"
 
 namespace {
 
@@ -58,6 +60,12 @@ std::vector<std::string> list_dimensions() {
       if (std::find(names.begin(), names.end(), dimension.name) == names.end()) names.push_back(dimension.name);
     }
   }
+  return names;
+}
+
+std::vector<std::string> list_shapes() {
+  std::vector<std::string> names;
+  for (const shapes::Shape& shape : shapes::get_shapes()) names.push_back(shape.name);
   return names;
 }
 
@@ -99,8 +107,12 @@ void check_options(const Order& order) {
   }
   if (order.nodes && order.edge) throw InputError("--nodes and --edge exclude each other; give one of them");
   if (order.straight && order.order != 2) throw InputError("--straight is for tetrahedra of ten nodes; add --order 2");
-  if (std::filesystem::path(order.out).extension() != ".msh") {
-    throw InputError(fmt::format("{}: the mesh is written in Gmsh's format; give the output a name that ends in .msh", order.out));
+  if (!config::is_standard_output(order.out) && std::filesystem::path(order.out).extension() != ".msh") {
+    throw InputError(
+        fmt::format("{}: the mesh is written in Gmsh's format (.vtu, .mesh and .node are read but not written); give the output a name "
+                    "that ends in .msh, "
+                    "or - for standard output",
+                    order.out));
   }
   if (!order.shape.empty()) {
     const shapes::Shape& shape = shapes::find_shape(order.shape);
@@ -233,8 +245,8 @@ std::string format_report(const Order& order, const Result& result, const mesh::
   std::string text;
   if (result.surface) text += mesher::describe(*result.surface);
   if (!text.empty() && text.back() != '\n') text += '\n';
-  text += fmt::format("{}: {} nodes, {} tetrahedra of {} nodes\n", order.out, result.mesh.nodes.size(), result.mesh.tet_count(),
-                      result.mesh.nodes_per_tet());
+  text += fmt::format("{}: {} nodes, {} tetrahedra of {} nodes\n", config::is_standard_output(order.out) ? "standard output" : order.out,
+                      result.mesh.nodes.size(), result.mesh.tet_count(), result.mesh.nodes_per_tet());
   text += fmt::format("  size      {:.6g} x {:.6g} x {:.6g} m, volume {:.6g} m3\n", check.box_high[0] - check.box_low[0],
                       check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2], check.volume_m3);
   text += fmt::format("  quality   dihedral angles {:.1f} to {:.1f} degrees, mean ratio {:.3f} on average, {:.3f} at worst\n",
@@ -262,7 +274,11 @@ void make_mesh(const Order& order) {
     std::fflush(stderr);
   };
   check_options(order);
-  config::check_writable(order.out, "mesh");
+  const bool is_piped = config::is_standard_output(order.out);
+  if (is_piped)
+    config::check_standard_output("mesh");
+  else
+    config::check_writable(order.out, "mesh");
   if (!order.json.empty()) config::check_writable(order.json, "report");
   std::error_code none;
   if (!order.json.empty() && (std::filesystem::path(order.json).lexically_normal() == std::filesystem::path(order.out).lexically_normal() ||
@@ -274,22 +290,26 @@ void make_mesh(const Order& order) {
   note_count(order, result);
   progress("checking the mesh");
   auto phase = Clock::now();
-  const mesh::CheckReport check = mesh::check_mesh(result.mesh, order.out);
+  const mesh::CheckReport check = mesh::check_mesh(result.mesh, is_piped ? "the mesh" : order.out);
   result.notes.insert(result.notes.end(), check.warnings.begin(), check.warnings.end());
   result.seconds.emplace_back("check", calc_seconds(phase));
   progress(fmt::format("writing {}", order.out));
   phase = Clock::now();
-  mesh::write_gmsh(result.mesh, order.out);
+  if (is_piped)
+    config::write_standard_output(mesh::make_gmsh(result.mesh));
+  else
+    mesh::write_gmsh(result.mesh, order.out);
   result.seconds.emplace_back("write", calc_seconds(phase));
 
   const double total_s = calc_seconds(start);
   if (!order.json.empty()) config::write_file(order.json, format_json(order, result, check, total_s));
-  fmt::print("{}", config::printable_lines(format_report(order, result, check, total_s)));
+  std::FILE* const to = is_piped || order.quiet ? stderr : stdout;
+  if (!order.quiet) fmt::print(to, "{}", config::printable_lines(format_report(order, result, check, total_s)));
   std::set<std::string> told;
   for (const std::string& note : result.notes) {
-    if (told.insert(note).second) fmt::print("  note      {}\n", config::printable(note));
+    if (told.insert(note).second) fmt::print(to, "{}{}\n", order.quiet ? "carillon-mesh: note: " : "  note      ", config::printable(note));
   }
-  if (std::fflush(stdout) != 0) throw SystemError("the report cannot be written");
+  if (std::fflush(to) != 0) throw SystemError("the report cannot be written");
 }
 
 /// Adds the nearest known option to CLI11's complaint about an unknown one.
@@ -315,8 +335,8 @@ int run(int argc, char** argv) {
   app.name("carillon-mesh");
   app.footer(describe_shapes());
   app.add_option("SURFACE", order.surface, "Closed surface: OBJ, STL, PLY or OFF");
-  app.add_option("--shape", order.shape, "A parametric body in place of a surface: bar, tube, plate, sphere, bowl, box or hollow-box");
-  app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh)")->required();
+  app.add_option("--shape", order.shape, fmt::format("A parametric body in place of a surface: {}", fmt::join(list_shapes(), ", ")));
+  app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh); - is standard output")->required();
   app.add_option("--scale", order.scale, "Surface: metres per unit of the file");
   app.add_option("--up", order.up, "Surface: the axis along which --height is measured [y]")->check(CLI::IsMember({"x", "y", "z"}));
   app.add_option("--method", order.method, "Surface: delaunay (keeps sharp edges) or stuffing (fast, takes raw scans, rounds edges) [auto]")
@@ -329,11 +349,12 @@ int run(int argc, char** argv) {
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
   app.add_flag("--estimate", order.estimate,
                "Surface: says on standard error, before meshing, volume, area, thickness and about how many nodes there will be");
-  app.add_flag("--quiet", order.quiet, "No progress on the way");
+  app.add_flag("-q,--quiet", order.quiet, "Print nothing but notes on the mesh and errors, on standard error");
+  app.set_version_flag("--version", version::describe("carillon-mesh"));
   std::map<std::string, std::string> help{
       {"wall", "Surface: thickness of the hollow shell in metres, inward; solid without it. Also of tube, sphere, bowl and hollow-box"},
-      {"height", "Surface: scales it to this extent in metres along --up. Also an edge of box and hollow-box"},
-      {"radius", "Radius of a sphere in metres; for tube and bowl the same as --outer-radius"},
+      {"height", "Surface: scales it to this extent in metres along --up. Also a dimension of box, hollow-box and cone"},
+      {"radius", "Radius of sphere, cylinder, disc, ring and cone in metres, see below; for tube and bowl the same as --outer-radius"},
       {"opening-angle", "Of a bowl, in degrees; see below"}};
   for (const std::string& name : list_dimensions()) {
     const std::string text = help.contains(name) ? help[name] : "Dimension of shapes in metres; see below";

@@ -102,4 +102,13 @@ std::string describe_kernels() {
   return fmt::format(", kernels {}, which fit this processor (OpenBLAS alone took {})", kernels, kernels_before);
 }
 
+std::string describe_slow_kernels() {
+  const std::string kernels = find_kernels();
+  const std::string fitting = find_fitting_kernels();
+  if (kernels.empty() || !are_old(kernels, fitting) || find_instructions(kernels) != Instructions::older) return {};
+  return fmt::format("OpenBLAS runs its kernels {}, which are for older processors and slow on this one; {}", kernels,
+                     is_chosen_by_user() ? fmt::format("unset {}, or set it to {}", kChosenByUser, fitting)
+                                         : fmt::format("set {} to {}", kChosenByUser, fitting));
+}
+
 }  // namespace carillon::petsc

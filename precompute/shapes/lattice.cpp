@@ -9,6 +9,7 @@
 #include "precompute/shapes/lattice.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <unordered_map>
 #include <utility>
 
@@ -17,6 +18,39 @@ namespace {
 
 // The six orders in which a monotone path takes the three axes, and whether the order is an odd permutation.
 constexpr std::array<std::array<int, 4>, 6> kPaths{{{0, 1, 2, 0}, {1, 2, 0, 0}, {2, 0, 1, 0}, {0, 2, 1, 1}, {2, 1, 0, 1}, {1, 0, 2, 1}}};
+
+double calc_distance(const Vec3& a, const Vec3& b) {
+  return std::sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+void append_tet(mesh::TetMesh& mesh, std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t d) {
+  const auto from_a = [&](std::int32_t n) {
+    return Vec3{mesh.nodes[n][0] - mesh.nodes[a][0], mesh.nodes[n][1] - mesh.nodes[a][1], mesh.nodes[n][2] - mesh.nodes[a][2]};
+  };
+  if (calc_det(from_a(b), from_a(c), from_a(d)) < 0.0) std::swap(c, d);
+  mesh.tets.insert(mesh.tets.end(), {a, b, c, d});
+  mesh.regions.push_back(0);
+}
+
+// Four tetrahedra around the shortest diagonal of the octahedron whose opposite corners are o[i] and o[i + 3].
+void append_octahedron(mesh::TetMesh& mesh, const std::array<std::int32_t, 6>& o) {
+  int best = 0;
+  double best_length = HUGE_VAL;
+  for (int i = 0; i < 3; ++i) {
+    const double length = calc_distance(mesh.nodes[o[i]], mesh.nodes[o[i + 3]]);
+    if (length < best_length * (1.0 - 1e-9)) {
+      best_length = length;
+      best = i;
+    }
+  }
+  const int p = (best + 1) % 3, q = (best + 2) % 3;
+  const std::array<std::int32_t, 4> belt{o[p], o[q], o[p + 3], o[q + 3]};
+  for (int i = 0; i < 4; ++i) append_tet(mesh, o[best], o[best + 3], belt[i], belt[(i + 1) % 4]);
+}
 
 }  // namespace
 
@@ -90,6 +124,28 @@ void append_prism(mesh::TetMesh& mesh, std::array<std::int32_t, 3> bottom, std::
     if (odd) std::swap(tet[1], tet[2]);
     mesh.tets.insert(mesh.tets.end(), tet.begin(), tet.end());
     mesh.regions.push_back(0);
+  }
+}
+
+void append_refined(mesh::TetMesh& mesh, int frequency, const std::function<std::int32_t(int, int, int)>& node,
+                    std::vector<std::array<std::int32_t, 3>>* skin) {
+  const auto add_to_skin = [&](std::int32_t a, std::int32_t b, std::int32_t c) {
+    if (skin != nullptr) skin->push_back({a, b, c});
+  };
+  for (int a = 0; a < frequency; ++a) {
+    for (int b = 0; a + b < frequency; ++b) {
+      for (int c = 0; a + b + c < frequency; ++c) {
+        const int below = frequency - (a + b + c);  // levels between this cell's first corner and the base
+        const std::int32_t n100 = node(a + 1, b, c), n010 = node(a, b + 1, c), n001 = node(a, b, c + 1);
+        append_tet(mesh, node(a, b, c), n100, n010, n001);
+        if (below == 1) add_to_skin(n100, n010, n001);
+        if (below < 2) continue;
+        const std::int32_t n110 = node(a + 1, b + 1, c), n101 = node(a + 1, b, c + 1), n011 = node(a, b + 1, c + 1);
+        append_octahedron(mesh, {n100, n010, n001, n011, n101, n110});
+        if (below == 2) add_to_skin(n110, n011, n101);
+        if (below >= 3) append_tet(mesh, node(a + 1, b + 1, c + 1), n110, n101, n011);
+      }
+    }
   }
 }
 

@@ -28,6 +28,12 @@ mesh::TetMesh make_lattice(const Lattice& lattice, const std::function<Vec3(int,
 /// `bottom`. The quadrilaterals are cut by the order of bottom's indices, so neighbouring prisms agree.
 void append_prism(mesh::TetMesh& mesh, std::array<std::int32_t, 3> bottom, std::array<std::int32_t, 3> top);
 
+/// Appends the refinement of a tetrahedron into frequency^3 ones, octahedra cut along their shortest diagonal; the mesh has its nodes
+/// already. `node` gives the node of the weights (a, b, c) of the corners of its base, the apex having what is left of the frequency.
+/// `skin`, if given, receives the triangles of the base, in the base's orientation.
+void append_refined(mesh::TetMesh& mesh, int frequency, const std::function<std::int32_t(int, int, int)>& node,
+                    std::vector<std::array<std::int32_t, 3>>* skin = nullptr);
+
 /// Turns a linear mesh into a quadratic one. `place(a, b)` gives the mid-side node of the edge between the corners a < b. A mid-side node
 /// joins every named set that holds both ends of its edge.
 void raise_order(mesh::TetMesh& mesh, const std::function<Vec3(std::int32_t, std::int32_t)>& place);

@@ -44,6 +44,11 @@ Body plan_hollow_box(const std::array<double, 3>& edges_m, double wall_m, int or
 Body plan_tube(double length_m, double outer_radius_m, double wall_m, int order);
 /// Constructions on several polyhedra, the icosahedron first: its symmetry keeps the five-fold modes of a ball together.
 std::vector<Body> plan_ball(double radius_m, int order);
+/// Along x; a disc in the x-y plane; a cone along z whose top has the radius top_radius_m, 0 for a point; a ring of round section about z.
+std::vector<Body> plan_cylinder(double length_m, double radius_m, int order);
+std::vector<Body> plan_disc(double radius_m, double thickness_m, int order);
+std::vector<Body> plan_cone(double radius_m, double top_radius_m, double height_m, int order);
+std::vector<Body> plan_ring(double radius_m, double thickness_m, int order);
 /// The part of a spherical shell within `half_angle_rad` of the lower pole; pi makes it closed.
 Body plan_shell(double outer_radius_m, double wall_m, double half_angle_rad, int order);
 

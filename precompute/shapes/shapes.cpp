@@ -17,6 +17,8 @@ namespace {
 
 constexpr double kLeastLength = 1e-6;                         // [m]
 constexpr double kMostLength = 1e4;                           // [m]
+constexpr double kLeastConeRatio = 1e-3;                      // of the radii of a cone that is cut off
+constexpr double kMostRingThickness = 0.9;                    // of a ring, over the diameter of its centre line
 constexpr double kLeastOpening = 20.0, kMostOpening = 340.0;  // [degrees]
 
 std::vector<std::string> list_names(const Shape& shape) {
@@ -73,10 +75,10 @@ class Dimensions {
   std::map<std::string, double> values_;
 };
 
-void check_wall(const Dimensions& dimensions, double room, const std::string& of_what) {
+void check_wall(const Dimensions& dimensions, double room, const std::string& of_what, const std::string& solid) {
   // A cavity thinner than a ten-thousandth of the body has no mesh that anybody wants.
   if (dimensions["wall"] > (1.0 - 1e-4) * room) {
-    dimensions.fail("wall", fmt::format("it has to be less than {} ({:g} m); give a thinner wall or the solid shape", of_what, room));
+    dimensions.fail("wall", fmt::format("it has to be less than {} ({:g} m); give a thinner wall{}", of_what, room, solid));
   }
 }
 
@@ -84,19 +86,34 @@ std::vector<Body> plan_shape(const Shape& shape, const Dimensions& d, int order)
   if (shape.name == "bar" || shape.name == "plate") return {plan_box({d["length"], d["width"], d["thickness"]}, order)};
   if (shape.name == "box") return {plan_box({d["length"], d["width"], d["height"]}, order)};
   if (shape.name == "hollow-box") {
-    check_wall(d, 0.5 * std::min({d["length"], d["width"], d["height"]}), "half of the shortest edge");
+    check_wall(d, 0.5 * std::min({d["length"], d["width"], d["height"]}), "half of the shortest edge", ", or shape box for a solid one");
     return {plan_hollow_box({d["length"], d["width"], d["height"]}, d["wall"], order)};
   }
   if (shape.name == "tube") {
-    check_wall(d, d["outer-radius"], "the outer radius");
+    check_wall(d, d["outer-radius"], "the outer radius", ", or shape cylinder for a solid one");
     return {plan_tube(d["length"], d["outer-radius"], d["wall"], order)};
   }
   if (shape.name == "bowl") {
-    check_wall(d, d["outer-radius"], "the outer radius");
+    check_wall(d, d["outer-radius"], "the outer radius", "");
     return {plan_shell(d["outer-radius"], d["wall"], d["opening-angle"] * std::numbers::pi / 360.0, order)};
   }
+  if (shape.name == "cylinder") return plan_cylinder(d["length"], d["radius"], order);
+  if (shape.name == "disc") return plan_disc(d["radius"], d["thickness"], order);
+  if (shape.name == "ring") {
+    if (d["thickness"] > kMostRingThickness * 2.0 * d["radius"])
+      d.fail("thickness", fmt::format("it has to be less than {:g} times the diameter of the centre line ({:g} m), or the hole closes",
+                                      kMostRingThickness, 2.0 * d["radius"]));
+    return plan_ring(d["radius"], d["thickness"], order);
+  }
+  if (shape.name == "cone") {
+    const double top = d["top-radius"];
+    if (top > 0.0 && (top < kLeastConeRatio * d["radius"] || d["radius"] < kLeastConeRatio * top))
+      d.fail("top-radius",
+             fmt::format("the two radii have to be within a factor of {:g}; give no top-radius for a point", 1.0 / kLeastConeRatio));
+    return plan_cone(d["radius"], top, d["height"], order);
+  }
   if (d["wall"] == 0.0) return plan_ball(d["radius"], order);
-  check_wall(d, d["radius"], "the radius");
+  check_wall(d, d["radius"], "the radius", ", or none for a solid sphere");
   return {plan_shell(d["radius"], d["wall"], std::numbers::pi, order)};
 }
 
@@ -137,7 +154,22 @@ const std::vector<Shape>& get_shapes() {
         {"width", 0.15, "along y, outside"},
         {"height", 0.1, "along z, outside"},
         {"wall", 0.005, "thickness of the walls"}},
-       faces}};
+       faces},
+      {"cylinder", "a solid round rod along x", {{"length", 0.3, "along x"}, {"radius", 0.01, "radius"}}, {"end-min", "end-max", "side"}},
+      {"disc",
+       "a flat round plate in the x-y plane: a coin, a lid",
+       {{"radius", 0.05, "radius"}, {"thickness", 0.003, "along z"}},
+       {"z-min", "z-max", "edge"}},
+      {"ring",
+       "a round wire bent to a circle in the x-y plane",
+       {{"radius", 0.03, "radius of the circle in the middle of the wire"}, {"thickness", 0.006, "diameter of the wire"}},
+       {"surface"}},
+      {"cone",
+       "a solid cone along z, pointed or cut off",
+       {{"radius", 0.03, "radius of the base"},
+        {"top-radius", 0.0, "radius of the top of a cone that is cut off; pointed without it"},
+        {"height", 0.08, "along z"}},
+       {"base", "top", "side"}}};
   return shapes;
 }
 

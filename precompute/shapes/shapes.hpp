@@ -44,7 +44,7 @@ struct ShapeOptions {
   std::optional<double> edge_m = {};              // wanted length of an edge
 };
 
-/// All shapes: bar, tube, plate, sphere, bowl, box, hollow-box.
+/// All shapes: bar, tube, plate, sphere, bowl, box, hollow-box, cylinder, disc, ring, cone.
 const std::vector<Shape>& get_shapes();
 
 /// The shape called `name`. Throws InputError that names the nearest one.

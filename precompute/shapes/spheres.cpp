@@ -23,7 +23,6 @@ namespace {
 
 double norm(const Vec3& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
 Vec3 scale(const Vec3& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-double calc_distance(const Vec3& a, const Vec3& b) { return norm({a[0] - b[0], a[1] - b[1], a[2] - b[2]}); }
 double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) {
   return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
@@ -95,48 +94,13 @@ class Core {
     return entry->second;
   }
 
-  void add_tet(std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t d) {
-    const auto from_a = [&](std::int32_t n) {
-      return Vec3{mesh.nodes[n][0] - mesh.nodes[a][0], mesh.nodes[n][1] - mesh.nodes[a][1], mesh.nodes[n][2] - mesh.nodes[a][2]};
-    };
-    if (calc_det(from_a(b), from_a(c), from_a(d)) < 0.0) std::swap(c, d);
-    mesh.tets.insert(mesh.tets.end(), {a, b, c, d});
-    mesh.regions.push_back(0);
-  }
-
-  // Four tetrahedra around the shortest diagonal of the octahedron whose opposite corners are o[i] and o[i + 3].
-  void add_octahedron(const std::array<std::int32_t, 6>& o) {
-    int best = 0;
-    double best_length = HUGE_VAL;
-    for (int i = 0; i < 3; ++i) {
-      const double length = calc_distance(mesh.nodes[o[i]], mesh.nodes[o[i + 3]]);
-      if (length < best_length * (1.0 - 1e-9)) {
-        best_length = length;
-        best = i;
-      }
-    }
-    const int p = (best + 1) % 3, q = (best + 2) % 3;
-    const std::array<std::int32_t, 4> belt{o[p], o[q], o[p + 3], o[q + 3]};
-    for (int i = 0; i < 4; ++i) add_tet(o[best], o[best + 3], belt[i], belt[(i + 1) % 4]);
-  }
-
   void refine(const std::array<int, 3>& face) {
-    for (int a = 0; a < frequency_; ++a) {
-      for (int b = 0; a + b < frequency_; ++b) {
-        for (int c = 0; a + b + c < frequency_; ++c) {
-          const auto node = [&](int da, int db, int dc) { return find_node(face, {a + da, b + db, c + dc}); };
-          const int below = frequency_ - (a + b + c);  // levels between this cell's first corner and the skin
-          const std::int32_t n100 = node(1, 0, 0), n010 = node(0, 1, 0), n001 = node(0, 0, 1);
-          add_tet(node(0, 0, 0), n100, n010, n001);
-          if (below == 1) skin.push_back({n100, n010, n001});
-          if (below < 2) continue;
-          const std::int32_t n110 = node(1, 1, 0), n101 = node(1, 0, 1), n011 = node(0, 1, 1);
-          add_octahedron({n100, n010, n001, n011, n101, n110});
-          if (below == 2) skin.push_back({n110, n011, n101});
-          if (below >= 3) add_tet(node(1, 1, 1), n110, n101, n011);
-        }
-      }
-    }
+    append_refined(
+        mesh, frequency_,
+        [&](int a, int b, int c) {
+          return find_node(face, {a, b, c});
+        },
+        &skin);
   }
 
   int frequency_;

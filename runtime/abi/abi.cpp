@@ -3,10 +3,12 @@
 // Source:     none.
 // Deviations: none.
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <optional>
 #include <span>
@@ -17,6 +19,7 @@
 #include "runtime/abi/carillon.h"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/nearest.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/stream/events.hpp"
@@ -25,7 +28,23 @@
 #include "runtime/synth/synthesiser.hpp"
 
 struct carillon_bank {
+  explicit carillon_bank(carillon::bank::Bank given) : bank(std::move(given)) {}
   carillon::bank::Bank bank;
+
+  /// Made when it is asked for first. Throws std::bad_alloc.
+  const carillon::bank::SurfaceTree& get_tree() const {
+    const carillon::bank::SurfaceTree* made = ready.load(std::memory_order_acquire);
+    if (made != nullptr) return *made;
+    const std::lock_guard lock(making);
+    if (!tree) tree.emplace(bank);
+    ready.store(&*tree, std::memory_order_release);
+    return *tree;
+  }
+
+ private:
+  mutable std::mutex making;
+  mutable std::optional<carillon::bank::SurfaceTree> tree;
+  mutable std::atomic<const carillon::bank::SurfaceTree*> ready{nullptr};
 };
 struct carillon_model {
   std::shared_ptr<const carillon::synth::Model> model;
@@ -219,13 +238,13 @@ uint32_t carillon_abi_version(void) { return CARILLON_ABI_VERSION; }
 carillon_status carillon_bank_open(const char* file, carillon_bank** bank, char* message, size_t message_size) {
   if (bank != nullptr) *bank = nullptr;
   if (file == nullptr || bank == nullptr) return refuse("carillon_bank_open: file and bank must not be NULL", message, message_size);
-  return run(message, message_size, [&] { *bank = new carillon_bank{bank::read_bank(file)}; });
+  return run(message, message_size, [&] { *bank = new carillon_bank(bank::read_bank(file)); });
 }
 
 carillon_status carillon_bank_parse(const void* bytes, size_t size, carillon_bank** bank, char* message, size_t message_size) {
   if (bank != nullptr) *bank = nullptr;
   if (bytes == nullptr || bank == nullptr) return refuse("carillon_bank_parse: bytes and bank must not be NULL", message, message_size);
-  return run(message, message_size, [&] { *bank = new carillon_bank{bank::parse_bank({static_cast<const std::byte*>(bytes), size})}; });
+  return run(message, message_size, [&] { *bank = new carillon_bank(bank::parse_bank({static_cast<const std::byte*>(bytes), size})); });
 }
 
 void carillon_bank_close(carillon_bank* bank) { delete bank; }
@@ -256,6 +275,40 @@ const char* carillon_status_text(carillon_status status) {
   return "unknown status";
 }
 
+int32_t carillon_bank_vertex_count(const carillon_bank* bank) {
+  return bank == nullptr ? 0 : static_cast<int32_t>(bank->bank.vertices_m.size());
+}
+
+const double* carillon_bank_vertices_m(const carillon_bank* bank) {
+  static_assert(sizeof(bank::Vec3) == 3 * sizeof(double));
+  return bank == nullptr || bank->bank.vertices_m.empty() ? nullptr : bank->bank.vertices_m.front().data();
+}
+
+const int32_t* carillon_bank_triangles(const carillon_bank* bank) {
+  static_assert(sizeof(bank->bank.triangles[0]) == 3 * sizeof(int32_t));
+  return bank == nullptr || bank->bank.triangles.empty() ? nullptr : bank->bank.triangles.front().data();
+}
+
+void carillon_bank_centre_m(const carillon_bank* bank, double centre_m[3]) {
+  if (centre_m == nullptr) return;
+  const bank::Vec3 centre = bank == nullptr ? bank::Vec3{} : bank->bank.rigid.centre_m;
+  std::copy(centre.begin(), centre.end(), centre_m);
+}
+
+carillon_status carillon_bank_nearest_point(const carillon_bank* bank, const double point_m[3], int32_t* triangle, double barycentric[3],
+                                            double closest_m[3], double* distance_m) {
+  if (triangle != nullptr) *triangle = -1;
+  if (bank == nullptr || point_m == nullptr || triangle == nullptr || barycentric == nullptr) return CARILLON_BAD_ARGUMENT;
+  return run(nullptr, 0, [&] {
+    const bank::NearestPlace place = bank->get_tree().find(to_vector(point_m));
+    if (place.triangle < 0) throw InputError("no place");
+    *triangle = place.triangle;
+    std::copy(place.barycentric.begin(), place.barycentric.end(), barycentric);
+    if (closest_m != nullptr) std::copy(place.point_m.begin(), place.point_m.end(), closest_m);
+    if (distance_m != nullptr) *distance_m = place.distance_m;
+  });
+}
+
 void carillon_edits_init_sized(carillon_edits* edits, size_t size) { init(edits, size); }
 
 carillon_status carillon_bank_edit(const carillon_bank* bank, const carillon_edits* edits, carillon_bank** edited, char* message,
@@ -267,7 +320,7 @@ carillon_status carillon_bank_edit(const carillon_bank* bank, const carillon_edi
   return run(message, message_size, [&] {
     bank::Edits wanted{.density_scale = ours->density_scale, .stiffness_scale = ours->stiffness_scale, .size_scale = ours->size_scale};
     if (ours->sets_damping != 0) wanted.alphas = {ours->alpha1_s, ours->alpha2_per_s};
-    *edited = new carillon_bank{bank::calc_edited(bank->bank, wanted)};
+    *edited = new carillon_bank(bank::calc_edited(bank->bank, wanted));
   });
 }
 

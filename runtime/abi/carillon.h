@@ -24,7 +24,9 @@
 extern "C" {
 #endif
 
-#define CARILLON_ABI_VERSION 2
+/* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
+ * programs would have to be compiled again. */
+#define CARILLON_ABI_VERSION 3
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -56,6 +58,24 @@ CARILLON_API int32_t carillon_bank_mode_count(const carillon_bank* bank);
 CARILLON_API int32_t carillon_bank_triangle_count(const carillon_bank* bank);
 /* The undamped frequency [Hz] of a mode, 0 when there is no such mode. */
 CARILLON_API double carillon_bank_frequency_hz(const carillon_bank* bank, int32_t mode);
+
+/* The surface, in the frame of the body's mesh, in which blows are given. It belongs to the bank and stays until it is closed. NULL for a
+ * NULL bank. */
+CARILLON_API int32_t carillon_bank_vertex_count(const carillon_bank* bank);
+/* x y z [m] of one vertex after the other: 3 * carillon_bank_vertex_count numbers. */
+CARILLON_API const double* carillon_bank_vertices_m(const carillon_bank* bank);
+/* The corners of one triangle after the other, counter-clockwise from outside: 3 * carillon_bank_triangle_count indices of vertices, the
+ * first of which is 0. */
+CARILLON_API const int32_t* carillon_bank_triangles(const carillon_bank* bank);
+/* The centre of mass in that frame, which carillon_motion moves about the world. Zeros for a NULL bank. */
+CARILLON_API void carillon_bank_centre_m(const carillon_bank* bank, double centre_m[3]);
+/* The place on the surface that is nearest to a point [m], as carillon_impulse and carillon_contact want it: the triangle and the
+ * barycentric coordinates of its corners. closest_m, the place itself, and distance_m may be NULL. O(log triangles). [any], several at
+ * once; the first call of a bank makes a tree, which takes memory and a millisecond for about 4,000 triangles, and others wait for it:
+ * call it once before an audio thread does, and from then on it never waits and takes no memory. CARILLON_BAD_INPUT for a point that is
+ * not finite or further than 1e100 m: triangle is then -1. */
+CARILLON_API carillon_status carillon_bank_nearest_point(const carillon_bank* bank, const double point_m[3], int32_t* triangle,
+                                                         double barycentric[3], double closest_m[3], double* distance_m);
 
 /* Another density, stiffness, size or damping of a body, without a solve. */
 typedef struct carillon_edits {

@@ -10,12 +10,45 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "runtime/bank/surface.hpp"
 
 namespace carillon::bank {
 namespace {
+
+constexpr double kMostPower = 8.0;
+constexpr double kMostLossFactor = 2.0;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
+
+void check_loss(double loss) {
+  if (!(loss >= 0.0 && loss < kMostLossFactor))
+    throw InputError(
+        fmt::format("a loss factor is 0 or more and below {:g}, and this one is {:g}; steel has 1e-4, wood 0.01, soft rubber up to 1",
+                    kMostLossFactor, loss));
+}
+
+/// Throws InputError unless the law is one that says how a mode of any frequency decays.
+void check_law(const Damping& law) {
+  if (law.law == "internal_friction" && law.coefficient.size() == 1) return check_loss(law.coefficient[0]);
+  if (law.law == "caughey" && !law.coefficient.empty() && law.coefficient.size() == law.power.size()) {
+    for (std::size_t j = 0; j < law.power.size(); ++j) {
+      if (!std::isfinite(law.coefficient[j]) || !(std::abs(law.power[j]) <= kMostPower))
+        throw InputError(fmt::format("a term of the damping is {:g} lambda^{:g}; powers lie within +-{:g}", law.coefficient[j],
+                                     law.power[j], kMostPower));
+    }
+    return;
+  }
+  if (law.law == "loss_table" && !law.freq_hz.empty() && law.freq_hz.size() == law.loss_factor.size()) {
+    for (std::size_t i = 0; i < law.freq_hz.size(); ++i) {
+      check_loss(law.loss_factor[i]);
+      if (!(law.freq_hz[i] > (i == 0 ? 0.0 : law.freq_hz[i - 1])) || !std::isfinite(law.freq_hz[i]))
+        throw InputError(fmt::format("the frequencies of a loss table are above 0 and ascend, and {:g} Hz is not", law.freq_hz[i]));
+    }
+    return;
+  }
+  throw InputError(fmt::format("\"{}\" with these numbers is no damping law", law.law));
+}
 
 void check(const Bank& bank, const Edits& edits) {
   for (const auto& [name, scale] :
@@ -29,8 +62,15 @@ void check(const Bank& bank, const Edits& edits) {
         throw InputError(fmt::format("a damping of alpha {} is none; alphas are not negative", alpha));
     }
   }
+  if (edits.damping) {
+    if (edits.alphas) throw InputError("a body has one damping law; give alphas or another law, not both");
+    check_law(*edits.damping);
+  }
   if (!bank.regions.empty() || bank.damping.law == "mixed") {
-    throw InputError("the bank is of a body of several materials, which cannot be edited as one; compute the bank again");
+    throw InputError(
+        "the bank is of a body of several materials, which one density, stiffness, size or damping does not describe; change the materials "
+        "of "
+        "its job and compute the bank again");
   }
 }
 
@@ -50,6 +90,18 @@ double calc_frequency_factor(double omega_rad_s, double radius_m) {
   return omega_rad_s / std::sqrt(1.0 + ka * ka);
 }
 
+std::string format_list(const char* name, const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) fmt::format_to(std::back_inserter(text), "{}{}", text.empty() ? "" : ", ", value);
+  return values.empty() ? text : fmt::format(R"(, "{}": [{}])", name, text);
+}
+
+/// A law for the provenance, as JSON.
+std::string format_law(const Damping& law) {
+  return fmt::format(R"(, "damping": {{"law": "{}"{}{}{}{}}})", law.law, format_list("coefficient", law.coefficient),
+                     format_list("power", law.power), format_list("freq_hz", law.freq_hz), format_list("loss_factor", law.loss_factor));
+}
+
 }  // namespace
 
 Bank calc_edited(const Bank& bank, const Edits& edits) {
@@ -67,9 +119,16 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     edited.material.alpha1_s = (*edits.alphas)[0];
     edited.material.alpha2_per_s = (*edits.alphas)[1];
   }
+  if (edits.damping) {
+    edited.damping = *edits.damping;
+    edited.material.alpha1_s = edited.material.alpha2_per_s = 0.0;
+  }
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     edited.eigenvalue_rad2_s2[m] *= eigenvalue_scale;
     edited.decay_per_s[m] = calc_decay(edited.damping, edited.material, edited.eigenvalue_rad2_s2[m]);
+    if (!(edited.decay_per_s[m] >= 0.0) || !std::isfinite(edited.decay_per_s[m]))
+      throw InputError(fmt::format("the damping makes mode {} ({:.5g} Hz) decay by {:.3g} 1/s, which is none; check its numbers", m + 1,
+                                   edited.freq_hz(m), edited.decay_per_s[m]));
     edited.shape_scale[m] *= shape_scale;
     edited.radiation_gain[m] *= shape_scale * g * g * calc_frequency_factor(std::sqrt(edited.eigenvalue_rad2_s2[m]), radius * g) /
                                 calc_frequency_factor(std::sqrt(bank.eigenvalue_rad2_s2[m]), radius);
@@ -87,6 +146,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   }
   edited.provenance = fmt::format(R"({{"edits": {{"density_scale": {}, "stiffness_scale": {}, "size_scale": {})", s, k, g);
   if (edits.alphas) edited.provenance += fmt::format(R"(, "alpha1_s": {}, "alpha2_per_s": {})", (*edits.alphas)[0], (*edits.alphas)[1]);
+  if (edits.damping) edited.provenance += format_law(*edits.damping);
   edited.provenance += bank.provenance.empty() ? "}}" : fmt::format(R"(}}, "of": {}}})", bank.provenance);
   return edited;
 }

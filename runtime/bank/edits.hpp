@@ -10,16 +10,19 @@ namespace carillon::bank {
 
 struct Edits {
   double density_scale = 1.0;
-  double stiffness_scale = 1.0;                   // of both Lame constants: Poisson's ratio stays
-  double size_scale = 1.0;                        // of all lengths
-  std::optional<std::array<double, 2>> alphas{};  // Rayleigh damping in place of the bank's law: alpha1 [s], alpha2 [1/s]
+  double stiffness_scale = 1.0;  // of both Lame constants: Poisson's ratio stays
+  double size_scale = 1.0;       // of all lengths
+  // Damping in place of the bank's law; one of the two at most.
+  std::optional<std::array<double, 2>> alphas{};  // Rayleigh: alpha1 [s], alpha2 [1/s]
+  std::optional<Damping> damping{};               // "internal_friction", "caughey" or "loss_table", with its numbers
 };
 
 /// The bank of the edited body: what a solve of it gives, on the same mesh. Modes, decays, shapes, surface, rigid-body data, material,
 /// band, proof and radiation gains all follow, and the provenance says what was done to what. Decays follow the damping law with its
 /// numbers as they are, at the new frequencies. `radiation_gain` is OSG02's, as in every bank. Throws InputError when a scale is not within
-/// 1e-6 to 1e6, when an alpha is negative or not finite, and for a body of several materials: one scale means nothing there. Not for an
-/// audio thread.
+/// 1e-6 to 1e6, when an alpha is negative or not finite, when a
+/// damping law is not one of those, has numbers out of range or makes a mode swell, and for a body of several materials: one scale means
+/// nothing there. Not for an audio thread.
 Bank calc_edited(const Bank& bank, const Edits& edits);
 
 }  // namespace carillon::bank

@@ -2,18 +2,28 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/report.hpp"
+#include "runtime/bank/write.hpp"
 #include "runtime/config/printable.hpp"
 #include "runtime/config/solids.hpp"
+#include "runtime/config/standard_output.hpp"
+#include "runtime/version/version.hpp"
 
 namespace {
 
@@ -41,6 +51,8 @@ void check(const std::string& file) {
 struct Wishes {
   bank::Edits edits;
   std::vector<double> alphas;
+  std::optional<double> tan_phi;
+  std::vector<std::string> loss, caughey;  // "HZ:FACTOR", "POWER:COEFFICIENT"
   bank::Reduction reduction;
   std::string keep = "loudest";
 };
@@ -50,6 +62,18 @@ void add_options(CLI::App& editing, Wishes& wishes) {
   editing.add_option("--stiffness", wishes.edits.stiffness_scale, "Times this much; Poisson's ratio stays")->capture_default_str();
   editing.add_option("--size", wishes.edits.size_scale, "All lengths times this much")->capture_default_str();
   editing.add_option("--alphas", wishes.alphas, "Rayleigh damping in place of the bank's law: alpha1 [s] and alpha2 [1/s]")->expected(2);
+  editing.add_option("--tan-phi", wishes.tan_phi,
+                     "The same loss factor at all frequencies, in place of the bank's law (internal friction)");
+  editing
+      .add_option(
+          "--loss", wishes.loss,
+          "Loss factors by frequency, in place of the bank's law: HZ:FACTOR, as many as there are, ascending in frequency; linear in "
+          "log f between them, constant beyond")
+      ->option_text("HZ:FACTOR ...");
+  editing
+      .add_option("--caughey", wishes.caughey,
+                  "Damping as a series of powers of lambda = omega^2, in place of the bank's law: POWER:COEFFICIENT, as many as there are")
+      ->option_text("POWER:COEFFICIENT ...");
   CLI::Option* modes = editing.add_option("--modes", wishes.reduction.modes, "Keep so many modes; the bank is no longer complete")
                            ->check(CLI::PositiveNumber);
   editing
@@ -65,18 +89,90 @@ void add_options(CLI::App& editing, Wishes& wishes) {
       ->capture_default_str();
 }
 
-void edit(const std::string& file, const std::string& out, Wishes& wishes) {
+/// The two numbers of "100:0.01". Throws InputError that names the option.
+std::pair<double, double> read_pair(const std::string& word, const char* option, const char* form) {
+  std::pair<double, double> pair;
+  const char* const end = word.data() + word.size();
+  const auto first = std::from_chars(word.data(), end, pair.first);
+  const bool has_second = first.ec == std::errc() && first.ptr != end && *first.ptr == ':';
+  const auto second = has_second ? std::from_chars(first.ptr + 1, end, pair.second) : first;
+  if (!has_second || second.ec != std::errc() || second.ptr != end)
+    throw InputError(fmt::format("{} {}: give {}, two numbers with a colon between them", option, word, form));
+  return pair;
+}
+
+/// The damping that is asked for in place of the bank's.
+void read_damping(Wishes& wishes) {
+  const int laws = !wishes.alphas.empty() + wishes.tan_phi.has_value() + !wishes.loss.empty() + !wishes.caughey.empty();
+  if (laws > 1) throw InputError("a body has one damping law; give one of --alphas, --tan-phi, --loss and --caughey");
   if (wishes.alphas.size() == 2) wishes.edits.alphas = {wishes.alphas[0], wishes.alphas[1]};
+  const auto begin_law = [&](const char* name) -> bank::Damping& {
+    wishes.edits.damping.emplace();
+    wishes.edits.damping->law = name;
+    return *wishes.edits.damping;
+  };
+  if (wishes.tan_phi) begin_law("internal_friction").coefficient = {*wishes.tan_phi};
+  if (!wishes.loss.empty()) {
+    bank::Damping& law = begin_law("loss_table");
+    for (const std::string& word : wishes.loss) {
+      const auto [freq_hz, factor] = read_pair(word, "--loss", "HZ:FACTOR");
+      law.freq_hz.push_back(freq_hz);
+      law.loss_factor.push_back(factor);
+    }
+  }
+  if (!wishes.caughey.empty()) {
+    bank::Damping& law = begin_law("caughey");
+    for (const std::string& word : wishes.caughey) {
+      const auto [power, coefficient] = read_pair(word, "--caughey", "POWER:COEFFICIENT");
+      law.power.push_back(power);
+      law.coefficient.push_back(coefficient);
+    }
+  }
+}
+
+/// A name that says something else than a bank would be believed by other programs.
+void check_bank_name(const std::filesystem::path& out) {
+  constexpr std::array<std::string_view, 6> kExtensions{"", ".hdf", ".h5", ".hdf5", ".vtkhdf", ".bank"};
+  std::string extension = out.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  const bool is_bank = std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
+  const bool is_number =
+      extension.size() > 1 && std::all_of(extension.begin() + 1, extension.end(), [](unsigned char c) { return std::isdigit(c); });
+  if (!is_bank && !is_number)  // bell.1, bell.2
+    throw InputError(
+        fmt::format("{}: a bank is an HDF5 file; give it a name that ends in .hdf, .h5, .hdf5, .vtkhdf or .bank, or - for standard output",
+                    out.string()));
+}
+
+constexpr double kMostAudibleHz = 20000.0;
+
+void edit(const std::string& file, const std::string& out, Wishes& wishes) {
+  const bool is_piped = config::is_standard_output(out);
+  if (is_piped)
+    config::check_standard_output("bank");
+  else
+    check_bank_name(out);
+  read_damping(wishes);
   wishes.reduction.keep = wishes.keep == "lowest" ? bank::Keep::kLowest : bank::Keep::kLoudest;
   const bank::Edits& e = wishes.edits;
   const bool is_reduced = wishes.reduction.modes || wishes.reduction.shape_bits < bank::kMostShapeBits;
-  const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas;
+  const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas || e.damping;
   bank::Bank bank = bank::read_bank(file);
+  const double old_end_hz = bank.band_hz[1];
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
   if (const auto question = config::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
     fmt::print(stderr, "carillon-bank: warning: {}\n", config::printable(*question));
   if (is_reduced) bank = bank::calc_reduced(bank, wishes.reduction);
-  bank::write_bank(bank, out);
+  if (is_piped)
+    config::write_standard_output(bank::make_bank_bytes(bank));
+  else
+    bank::write_bank(bank, out);
+  if (bank.band_hz[1] < std::min(old_end_hz, kMostAudibleHz))
+    fmt::print(is_piped ? stderr : stdout,
+               "band      now {:.5g} to {:.5g} Hz: nothing above is in the bank; for more, compute the job again with a \"band_hz\" up to "
+               "{:.5g} Hz and "
+               "edit that\n",
+               bank.band_hz[0], bank.band_hz[1], kMostAudibleHz * old_end_hz / bank.band_hz[1]);
 }
 
 int run(int argc, char** argv) {
@@ -85,12 +181,14 @@ int run(int argc, char** argv) {
   app.failure_message(
       [](const CLI::App* asked, const CLI::Error& error) { return config::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
+  app.set_version_flag("--version", version::describe("carillon-bank"));
   std::string file;
-  bool json = false;
+  bool json = false, all = false;
   std::size_t modes = 20;
-  CLI::App* info = app.add_subcommand("info", "What is in a bank: frequencies, damping, residuals, counts, provenance");
+  CLI::App* info = app.add_subcommand("info", "What is in a bank: frequencies, damping, residuals, counts");
   info->add_option("BANK", file, "The bank file")->required();
   info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
+  info->add_flag("--all", all, "The record of the run that made it too: versions, seconds, memory, partition, solver");
   info->add_option("--modes", modes, "Rows of the table of modes")->capture_default_str();
   CLI::App* checking = app.add_subcommand("check", "Is it whole and sane: one line per property; exit code 0 when it is, 2 otherwise");
   checking->add_option("BANK", file, "The bank file")->required();
@@ -100,7 +198,7 @@ int run(int argc, char** argv) {
       "edit",
       "The bank of the same body with another density, stiffness, size or damping, with fewer modes or coarser shapes, without a solve");
   editing->add_option("BANK", file, "The bank file")->required();
-  editing->add_option("OUT", edited, "The new bank file")->required();
+  editing->add_option("OUT", edited, "The new bank file; - is standard output")->required();
   add_options(*editing, wishes);
   try {
     app.parse(argc, argv);
@@ -113,7 +211,7 @@ int run(int argc, char** argv) {
     edit(file, edited, wishes);
   } else {
     const bank::Bank bank = bank::read_bank(file);
-    fmt::print("{}", json ? bank::format_info_json(bank, file) : config::printable_lines(bank::format_info(bank, file, modes)));
+    fmt::print("{}", json ? bank::format_info_json(bank, file) : config::printable_lines(bank::format_info(bank, file, modes, all)));
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;

@@ -188,7 +188,7 @@ Json::Value make_proof(const Proof& proof) {
 
 }  // namespace
 
-std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit) {
+std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit, bool has_record) {
   const auto [major, minor] = read_version(file);
   const RigidBody& rigid = bank.rigid;
   const Material& m = bank.material;
@@ -215,7 +215,9 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, mode_limit);
   const std::optional<Json::Value> provenance = parse_json(bank.provenance);
   // The record of the run; the job around it is left to --json.
-  if (provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject()) {
+  const bool is_recorded = provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject();
+  if (is_recorded && !has_record) text += "the record of its run: --all; the whole job too: --json\n";
+  if (is_recorded && has_record) {
     text += "\nprovenance (the whole job: --json)\n";
     append_tree((*provenance)["run"], 1, text);
   }

@@ -8,8 +8,8 @@
 
 namespace carillon::bank {
 
-/// A page for people; at most `mode_limit` rows of modes.
-std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit);
+/// A page for people; at most `mode_limit` rows of modes. `has_record`: the record of the run that made the bank too.
+std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit, bool has_record);
 
 /// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
 std::string format_info_json(const Bank& bank, const std::filesystem::path& file);

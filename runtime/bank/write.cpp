@@ -1,5 +1,7 @@
 // Writing banks so that at every moment the name holds either the old bank or the new one, whole.
 // Method: the bytes are made and sealed in memory; config::write_file gives them the name in one step.
+#include "runtime/bank/write.hpp"
+
 #include <fmt/format.h>
 
 #include <cstring>
@@ -35,16 +37,17 @@ fs::path resolve_target(const fs::path& file) {
 /// A text of the file has at least one byte.
 std::string pad_text(const std::string& text) { return text.empty() ? std::string(1, '\0') : text; }
 
-}  // namespace
-
-void write_bank(const Bank& bank, const fs::path& file) {
+/// Throws InputError for a bank that is not sane; `name` stands for it in the message.
+void check_faults(const Bank& bank, const std::string& name) {
   const auto faults = find_faults(bank);
-  if (!faults.empty()) {
-    throw InputError(fmt::format("{}: this bank is not sane and is not written: {}{}", file.string(), faults[0],
-                                 faults.size() > 1 ? fmt::format(" (and {} more)", faults.size() - 1) : ""));
-  }
-  const fs::path target = resolve_target(file);
+  if (faults.empty()) return;
+  throw InputError(fmt::format("{}: this bank is not sane and is not written: {}{}", name, faults[0],
+                               faults.size() > 1 ? fmt::format(" (and {} more)", faults.size() - 1) : ""));
+}
 
+/// Makes the sealed bytes of a bank without faults and hands them on.
+template <typename Use>
+void use_bytes(const Bank& bank, Use&& use) {
   FileForm form;
   for (std::size_t i = 0; i < bank.mode_count(); ++i) form.freq_hz.push_back(bank.freq_hz(i));
   form.complete = bank.complete ? 1 : 0;
@@ -65,7 +68,22 @@ void write_bank(const Bank& bank, const fs::path& file) {
   digest.update(bytes.subspan(kSealBytes));
   std::memcpy(bytes.data() + kTextBytes, digest.finish().data(), kDigestBytes);
 
-  config::write_file(target, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  use(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+}  // namespace
+
+void write_bank(const Bank& bank, const fs::path& file) {
+  check_faults(bank, file.string());
+  const fs::path target = resolve_target(file);
+  use_bytes(bank, [&](std::string_view bytes) { config::write_file(target, bytes); });
+}
+
+std::string make_bank_bytes(const Bank& bank) {
+  check_faults(bank, "the bank");
+  std::string made;
+  use_bytes(bank, [&](std::string_view bytes) { made = bytes; });
+  return made;
 }
 
 }  // namespace carillon::bank

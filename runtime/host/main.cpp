@@ -10,6 +10,7 @@
 #include "runtime/config/printable.hpp"
 #include "runtime/host/program.hpp"
 #include "runtime/host/scene.hpp"
+#include "runtime/version/version.hpp"
 
 namespace {
 
@@ -45,7 +46,8 @@ int main(int argc, char** argv) {
   app.add_flag("--audit", options.audit,
                "Keep the books of energy: how much bodies gain other than by hits, and modes while nothing acts on them");
   app.add_flag("--plan", options.plan, "Say for each body which effects are on, why, and what they will cost; no sound is made");
-  app.add_flag("-q,--quiet", options.quiet, "No progress");
+  app.add_flag("-q,--quiet", options.quiet, "Print nothing but warnings and errors");
+  app.set_version_flag("--version", carillon::version::describe("carillon-render"));
   try {
     app.parse(argc, argv);
     if (!options.plan && output->empty()) throw CLI::RequiredError("--output");

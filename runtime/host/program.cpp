@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -15,6 +16,7 @@
 
 #include "runtime/config/file.hpp"
 #include "runtime/config/printable.hpp"
+#include "runtime/config/standard_output.hpp"
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
@@ -32,6 +34,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
+
+constexpr double kMostAudibleHz = 20000.0;
 
 double get_seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -56,7 +60,7 @@ class Progress {
   int next_ = 0;
 };
 
-bool is_standard_output(const fs::path& wav) { return wav == "-"; }
+using config::is_standard_output;
 
 /// Where what the sound is made of waits until it is written.
 fs::path find_spool_folder(const fs::path& wav) {
@@ -97,10 +101,11 @@ class Outputs {
     files_.push_back({std::make_unique<config::WholeFile>(file), what, file});
     return *files_.back().file;
   }
+  /// `notes`: where each is named; may be null.
   void commit(std::FILE* notes) {
     for (const Output& output : files_) {
       output.file->commit();
-      fmt::print(notes, "{:<18} {}\n", output.what, config::printable(output.path.string()));
+      if (notes != nullptr) fmt::print(notes, "{:<18} {}\n", output.what, config::printable(output.path.string()));
     }
   }
 
@@ -119,9 +124,18 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
   return fs::weakly_canonical(fs::absolute(a), error) == fs::weakly_canonical(fs::absolute(b), error);
 }
 
+/// WAV is what is written, so that is what the name says.
+void check_sound_name(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (file == "-" || extension == ".wav" || extension == ".wave") return;
+  throw InputError(fmt::format("{}: the sound is written as WAV; give the output a name that ends in .wav", file.string()));
+}
+
 /// Every output: can be written, is none of the inputs, and is not named twice.
 void check_outputs(const ProgramOptions& options, const Scene& scene) {
   std::vector<std::pair<fs::path, std::string>> outputs;
+  if (!options.plan) check_sound_name(options.wav);
   if (!options.plan && !is_standard_output(options.wav)) outputs.emplace_back(options.wav, "WAV file");
   if (options.spectrogram) outputs.emplace_back(*options.spectrogram, "spectrogram");
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
@@ -141,12 +155,23 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
   }
 }
 
+/// A line for each body whose bank leaves out some of what is heard.
+void print_bands(std::FILE* notes, const Scene& scene, double rate_hz) {
+  for (const SceneBody& body : scene.bodies) {
+    const double end_hz = body.spec.bank->band_hz[1];
+    if (end_hz < std::min(kMostAudibleHz, 0.5 * rate_hz))
+      fmt::print(notes, "  {:<16} nothing above {:.5g} Hz, where its bank ends; compute one with a higher \"band_hz\" to hear more\n", config::printable(body.name),
+                 end_hz);
+  }
+}
+
 void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, const Figures& figures) {
   fmt::print(notes, "bodies             {}\n", figures.bodies);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     fmt::print(notes, "  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", config::printable(scene.bodies[i].name), sound.body_modes[i],
                scene.bodies[i].spec.fixed ? "fixed, " : "", sound.body_peak_pa[i]);
   }
+  print_bands(notes, scene, sound.rate_hz);
   fmt::print(notes, "modes sounding     {}\n", figures.modes);
   fmt::print(notes, "contacts           {}\n", figures.tally.contacts);
   fmt::print(notes, "physics            {:.2f} s\n", figures.physics_s);
@@ -258,13 +283,13 @@ void run(const ProgramOptions& options) {
   if (options.report) outputs.add(*options.report, "report").append(make_report_json(scene, sound, plan, figures));
   if (options.record) write_recording(course, append_to(outputs.add(*options.record, "contacts file")));
   if (!to_standard_output) write_wav(store, figures.gain.per_pa, scene.output.format, append_to(outputs.add(options.wav, "sound")));
-  print_summary(notes, scene, sound, figures);
+  if (!options.quiet) print_summary(notes, scene, sound, figures);
   print_warnings(scene, sound, figures);
   if (to_standard_output) {
     std::signal(SIGPIPE, SIG_IGN);  // a reader that goes is an error with a name
     write_wav(store, figures.gain.per_pa, scene.output.format, write_standard_output);
   }
-  outputs.commit(notes);
+  outputs.commit(options.quiet ? nullptr : notes);
 }
 
 }  // namespace carillon::host

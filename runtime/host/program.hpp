@@ -17,7 +17,7 @@ struct ProgramOptions {
   std::optional<std::string> format;  // instead of the scene's
   bool audit = false;                 // books of energy
   bool plan = false;                  // say which effects are called for and why, instead of everything else
-  bool quiet = false;                 // no progress
+  bool quiet = false;                 // print nothing but warnings
 };
 
 /// Reads everything, simulates, renders, writes everything; prints what it does on stdout (on stderr where the sound goes to stdout),

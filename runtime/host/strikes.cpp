@@ -1,8 +1,7 @@
-// Method:     the nearest point of a triangle by its Voronoi regions (corners, edges, face), over all triangles. Variation: numbers near
-// the
-//             normal distribution, sums of four even ones, by the body's name and the number of the strike among its own.
-// Source:     Ericson, Real-Time Collision Detection (2005), section 5.1.5. That a hand's strikes scatter, less with practice: "Expertise-
-//             and tempo-related performance differences in unimanual drumming", Motor Control 25 (2021) 644.
+// Method:     the nearest place of the surface by runtime/bank/nearest.hpp. Variation: numbers near the normal distribution, sums of four
+//             even ones, by the body's name and the number of the strike among its own.
+// Source:     that a hand's strikes scatter, less with practice: "Expertise- and tempo-related performance differences in unimanual
+//             drumming", Motor Control 25 (2021) 644.
 // Deviations: how much they scatter is chosen, not measured; strikes do not depend on those before.
 #include "runtime/host/strikes.hpp"
 
@@ -10,8 +9,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <map>
+#include <optional>
 
+#include "runtime/bank/nearest.hpp"
 #include "runtime/host/planning.hpp"
 
 namespace carillon::host {
@@ -29,27 +30,6 @@ double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[
 Vec3 cross(const Vec3& a, const Vec3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 Vec3 subtract(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
-/// Barycentric coordinates of the point of the triangle (a, b, c) that is nearest to p.
-Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = subtract(b, a), ac = subtract(c, a);
-  const Vec3 ap = subtract(p, a), bp = subtract(p, b), cp = subtract(p, c);
-  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d1 <= 0.0 && d2 <= 0.0) return {1.0, 0.0, 0.0};
-  if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0};
-  const double over_ab = d1 * d4 - d3 * d2;
-  if (over_ab <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return {1.0 - d1 / (d1 - d3), d1 / (d1 - d3), 0.0};
-  if (d6 >= 0.0 && d5 <= d6) return {0.0, 0.0, 1.0};
-  const double over_ac = d5 * d2 - d1 * d6;
-  if (over_ac <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return {1.0 - d2 / (d2 - d6), 0.0, d2 / (d2 - d6)};
-  const double over_bc = d3 * d6 - d5 * d4;
-  if (over_bc <= 0.0 && d4 >= d3 && d5 >= d6) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0.0, 1.0 - w, w};
-  }
-  const double sum = over_ab + over_ac + over_bc;
-  return {over_bc / sum, over_ac / sum, over_ab / sum};
-}
-
 Vec3 calc_extent(const bank::Bank& bank) {
   Vec3 low = bank.vertices_m.front(), high = low;
   for (const Vec3& vertex : bank.vertices_m) {
@@ -61,35 +41,40 @@ Vec3 calc_extent(const bank::Bank& bank) {
   return subtract(high, low);
 }
 
-/// Puts the impulse on the place of the surface that is nearest to a point; which it returns.
-Vec3 find_nearest(const bank::Bank& bank, const Vec3& p, contact::Impulse& impulse) {
-  double least = std::numeric_limits<double>::infinity();
-  Vec3 nearest{};
-  for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
-    const auto& corner = bank.triangles[t];
-    const Vec3 &a = bank.vertices_m[corner[0]], &b = bank.vertices_m[corner[1]], &c = bank.vertices_m[corner[2]];
-    const Vec3 weight = find_nearest_barycentric(p, a, b, c);
-    Vec3 place{};
-    for (std::size_t k = 0; k < 3; ++k) place[k] = weight[0] * a[k] + weight[1] * b[k] + weight[2] * c[k];
-    const Vec3 way = subtract(place, p);
-    if (!(dot(way, way) < least)) continue;
-    least = dot(way, way);
-    nearest = place;
-    impulse.triangle = static_cast<std::int32_t>(t);
-    impulse.barycentric = weight;
+/// The nearest places of a bank's surface: by its tree when there are many strikes, which is then worth making.
+class Finder {
+ public:
+  Finder(const bank::Bank& bank, std::size_t strikes) : bank_(&bank) {
+    if (strikes >= kStrikesForTree) tree_.emplace(bank);
+    low_ = high_ = bank.vertices_m.front();
+    for (const Vec3& vertex : bank.vertices_m) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        low_[k] = std::min(low_[k], vertex[k]);
+        high_[k] = std::max(high_[k], vertex[k]);
+      }
+    }
   }
-  return nearest;
-}
+  bank::NearestPlace find(const Vec3& point_m) const { return tree_ ? tree_->find(point_m) : bank::find_nearest(*bank_, point_m); }
+  double get_extent_m() const { return std::hypot(high_[0] - low_[0], high_[1] - low_[1], high_[2] - low_[2]); }
+
+ private:
+  static constexpr std::size_t kStrikesForTree = 30;
+  const bank::Bank* bank_;
+  std::optional<bank::SurfaceTree> tree_;
+  Vec3 low_{}, high_{};
+};
 
 /// The triangle and the place on it that are nearest to the strike's point.
-void find_nearest_place(const bank::Bank& bank, const SceneStrike& strike, const std::string& name, contact::Impulse& impulse) {
-  const Vec3 nearest = find_nearest(bank, *strike.point_m, impulse), way = subtract(nearest, *strike.point_m), extent = calc_extent(bank);
-  const double least = dot(way, way);
-  if (!(least <= kFarthestShare * kFarthestShare * dot(extent, extent))) {
+void find_nearest_place(const Finder& finder, const SceneStrike& strike, const std::string& name, contact::Impulse& impulse) {
+  const bank::NearestPlace nearest = finder.find(*strike.point_m);
+  if (nearest.triangle < 0) throw InputError(fmt::format("{}: \"point_m\" is no place; its numbers are too large", strike.place));
+  if (!(nearest.distance_m <= kFarthestShare * finder.get_extent_m())) {
     throw InputError(
         fmt::format("{}: \"point_m\" is {:.4g} m away from \"{}\"; its nearest point is [{:.6g}, {:.6g}, {:.6g}] in metres of the mesh",
-                    strike.place, std::sqrt(least), name, nearest[0], nearest[1], nearest[2]));
+                    strike.place, nearest.distance_m, name, nearest.point_m[0], nearest.point_m[1], nearest.point_m[2]));
   }
+  impulse.triangle = nearest.triangle;
+  impulse.barycentric = nearest.barycentric;
 }
 
 /// Numbers of mean 0 and variance 1 within 3.5: the same for the same body and strike.
@@ -151,12 +136,21 @@ void vary(const bank::Bank& bank, double variation, Chance chance, contact::Impu
   for (std::size_t k = 0; k < 3; ++k) {
     place[k] = impulse.barycentric[0] * p[k] + impulse.barycentric[1] * q[k] + impulse.barycentric[2] * r[k] + a * u[k] + b * v[k];
   }
-  find_nearest(bank, place, impulse);
+  const bank::NearestPlace nearest = bank::find_nearest(bank, place);
+  if (nearest.triangle < 0) return;
+  impulse.triangle = nearest.triangle;
+  impulse.barycentric = nearest.barycentric;
 }
 
 }  // namespace
 
 std::vector<contact::Impulse> make_impulses(const Scene& scene, const std::vector<const bank::Bank*>& banks) {
+  std::map<const bank::Bank*, std::size_t> wanted;  // strikes whose place is to be found
+  for (const SceneStrike& strike : scene.strikes) {
+    if (!strike.triangle) ++wanted[banks[strike.body]];
+  }
+  std::map<const bank::Bank*, Finder> finders;
+  for (const auto& [bank, strikes] : wanted) finders.try_emplace(bank, *bank, strikes);
   std::vector<contact::Impulse> impulses;
   std::vector<std::uint64_t> strikes(scene.bodies.size());  // of each body so far
   for (const SceneStrike& strike : scene.strikes) {
@@ -174,7 +168,7 @@ std::vector<contact::Impulse> make_impulses(const Scene& scene, const std::vecto
                                      bank.triangles.size()));
       }
     } else {
-      find_nearest_place(bank, strike, name, impulse);
+      find_nearest_place(finders.at(&bank), strike, name, impulse);
     }
     const double variation = scene.bodies[strike.body].variation;
     const std::uint64_t number = strikes[strike.body]++;

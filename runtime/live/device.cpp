@@ -1,4 +1,5 @@
-// Method:     PortAudio's callback with separate channels, which is what process() fills.
+// Method:     PortAudio's callback with separate channels, which is what process() fills. The null device is a thread that sleeps until
+//             the next block is due; when it is a block or more late, the time is lost, as a card would lose it.
 // Source:     PortAudio V19 reference, portaudio.h.
 // Deviations: none.
 #include "runtime/live/device.hpp"
@@ -10,6 +11,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <chrono>
+#include <optional>
+#include <stop_token>
+#include <thread>
 
 #include "runtime/config/error.hpp"
 #include "runtime/synth/cpu_ticks.hpp"
@@ -50,7 +55,7 @@ std::vector<PaDeviceIndex> find_outputs() {
 
 PaDeviceIndex find_device(const std::string& name) {
   const std::vector<PaDeviceIndex> outputs = find_outputs();
-  if (outputs.empty()) throw SystemError("there is no sound card, and no sound server runs");
+  if (outputs.empty()) throw SystemError(kNoCardText);
   if (name.empty()) return outputs.front();
   std::string names;
   for (const PaDeviceIndex i : outputs) {
@@ -63,11 +68,32 @@ PaDeviceIndex find_device(const std::string& name) {
 }  // namespace
 
 struct Device::State {
-  Library library;
+  std::optional<Library> library;  // not on the null device
+  double period_s = 0.0;           // of a block, on the null device
+  int frames_of_block = 0;
+  std::vector<std::vector<float>> channels;  // where the null device's blocks go
+  std::jthread clock;
   synth::Synthesiser* synthesiser = nullptr;
   PaStream* stream = nullptr;
   std::atomic<std::int64_t> callbacks{0}, frames{0}, underflows{0}, busy_ns{0};
   bool is_running = false;
+
+  void keep_time(const std::stop_token& stop) {
+    std::vector<float*> out;
+    for (std::vector<float>& channel : channels) out.push_back(channel.data());
+    const auto period = std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s));
+    auto due = std::chrono::steady_clock::now();
+    while (!stop.stop_requested()) {
+      play(nullptr, out.data(), static_cast<unsigned long>(frames_of_block), nullptr, 0, this);
+      due += period;
+      const auto now = std::chrono::steady_clock::now();
+      if (now > due + period) {
+        underflows.fetch_add(1, std::memory_order_relaxed);
+        due = now;
+      }
+      std::this_thread::sleep_until(due);
+    }
+  }
 
   static int play(const void*, void* out, unsigned long frames, const PaStreamCallbackTimeInfo*, PaStreamCallbackFlags flags, void* self) {
     auto& state = *static_cast<State*>(self);
@@ -90,6 +116,14 @@ std::vector<std::string> list_devices() {
 
 Device::Device(synth::Synthesiser& synthesiser, const DeviceOptions& options) : state_(std::make_unique<State>()) {
   state_->synthesiser = &synthesiser;
+  if (options.null) {
+    state_->period_s = options.frames / options.rate_hz;
+    state_->frames_of_block = options.frames;
+    state_->channels.assign(static_cast<std::size_t>(synthesiser.get_microphone_count()),
+                            std::vector<float>(static_cast<std::size_t>(options.frames)));
+    return;
+  }
+  state_->library.emplace();
   PaStreamParameters output{};
   output.device = find_device(options.name);
   output.channelCount = synthesiser.get_microphone_count();
@@ -104,26 +138,35 @@ Device::Device(synth::Synthesiser& synthesiser, const DeviceOptions& options) : 
 }
 
 Device::~Device() {
+  stop();
   if (state_->stream != nullptr) Pa_CloseStream(state_->stream);
 }
 
 void Device::start() {
+  if (state_->period_s > 0.0) {
+    state_->clock = std::jthread([state = state_.get()](const std::stop_token& stop) { state->keep_time(stop); });
+    return;
+  }
   const PaError error = Pa_StartStream(state_->stream);
   if (error != paNoError) throw SystemError(fmt::format("the sound card does not start: {}", Pa_GetErrorText(error)));
   state_->is_running = true;
 }
 
 void Device::stop() {
+  if (state_->clock.joinable()) {
+    state_->clock.request_stop();
+    state_->clock.join();
+  }
   if (state_->is_running) Pa_StopStream(state_->stream);
   state_->is_running = false;
 }
 
 DeviceStatistics Device::get_statistics() const noexcept {
-  const PaStreamInfo* info = Pa_GetStreamInfo(state_->stream);
+  const PaStreamInfo* info = state_->stream != nullptr ? Pa_GetStreamInfo(state_->stream) : nullptr;
   return {.callbacks = state_->callbacks.load(std::memory_order_relaxed),
           .frames = state_->frames.load(std::memory_order_relaxed),
           .underflows = state_->underflows.load(std::memory_order_relaxed),
-          .latency_s = info != nullptr ? info->outputLatency : 0.0,
+          .latency_s = info != nullptr ? info->outputLatency : state_->period_s,
           .busy_s = 1e-9 * static_cast<double>(state_->busy_ns.load(std::memory_order_relaxed))};
 }
 

@@ -1,4 +1,4 @@
-// A synthesiser on a sound card.
+// A synthesiser on a sound card, or on a clock alone.
 //
 //   live::Device device(synthesiser, {.frames = 256});
 //   device.start();  // from now on the card calls process()
@@ -13,8 +13,13 @@
 
 namespace carillon::live {
 
+/// What a program says where nothing can be heard.
+inline constexpr const char* kNoCardText =
+    "there is no sound card, and no sound server runs; --null plays without sound, and carillon-render writes a WAV file";
+
 struct DeviceOptions {
   std::string name;        // of list_devices(); empty: the system's default
+  bool null = false;       // no sound system is asked for: a thread takes the blocks at the pace of real time and drops them
   double rate_hz = 48000;  // that of the synthesiser
   int frames = 256;        // of a block; the card may take others
 };
@@ -22,8 +27,8 @@ struct DeviceOptions {
 struct DeviceStatistics {
   std::int64_t callbacks = 0;
   std::int64_t frames = 0;
-  std::int64_t underflows = 0;  // blocks that came too late, as the card says
-  double latency_s = 0.0;       // of the output, as the card says
+  std::int64_t underflows = 0;  // blocks that came too late, as the card says; without a card, by a block or more
+  double latency_s = 0.0;       // of the output, as the card says; without a card, of a block
   double busy_s = 0.0;          // CPU time that process() took
 };
 

@@ -4,11 +4,14 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "runtime/config/error.hpp"
 #include "runtime/config/printable.hpp"
 #include "runtime/live/device.hpp"
 #include "runtime/live/player.hpp"
+#include "runtime/version/version.hpp"
 
 namespace {
 
@@ -28,7 +31,9 @@ int main(int argc, char** argv) {
   });
   auto* scene = app.add_option("scene", options.scene, "Scene file (JSON)")->option_text("SCENE.json");
   app.add_flag("--list", lists, "List the sound cards' outputs, the default one first")->excludes(scene);
-  app.add_option("--device", options.device, "Output to play on, by its name")->option_text("NAME");
+  auto* device = app.add_option("--device", options.device, "Output to play on, by its name")->option_text("NAME");
+  app.add_flag("--null", options.null, "Play to nothing, at the pace of real time: works without a sound card")->excludes(device);
+  app.set_version_flag("--version", carillon::version::describe("carillon-live"));
   app.add_option("--frames", options.frames, "Frames of a block, 16 to 8192")->check(CLI::Range(16, 8192))->option_text("N");
   app.add_option("--look-ahead", options.look_ahead_s, "Seconds by which physics runs ahead of the sound, 0.02 to 10")
       ->check(CLI::Range(0.02, 10.0))
@@ -40,7 +45,7 @@ int main(int argc, char** argv) {
                  "Share of one core that the sound may take, 0.01 to 1; the least audible modes fade out for it")
       ->check(CLI::Range(0.01, 1.0))
       ->option_text("SHARE");
-  app.add_flag("-q,--quiet", options.quiet, "Print nothing");
+  app.add_flag("-q,--quiet", options.quiet, "Print nothing but errors");
   try {
     app.parse(argc, argv);
     if (!lists && scene->empty()) throw CLI::RequiredError("scene");
@@ -49,7 +54,9 @@ int main(int argc, char** argv) {
   }
   try {
     if (lists) {
-      for (const std::string& name : carillon::live::list_devices()) fmt::print("{}\n", carillon::config::printable(name));
+      const std::vector<std::string> names = carillon::live::list_devices();
+      for (const std::string& name : names) fmt::print("{}\n", carillon::config::printable(name));
+      if (names.empty()) fmt::print("{}\n", carillon::live::kNoCardText);
       return 0;
     }
     carillon::live::play(options);

@@ -158,7 +158,7 @@ void play(const PlayerOptions& options) {
   };
   const double hold_back_s = plans ? kChangeS : 0.0;
   Walk walk(microphones.centre);
-  Device device(synthesiser, {.name = options.device, .rate_hz = rate_hz, .frames = options.frames});
+  Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
   while (course.get_time_s() < options.look_ahead_s) course.advance(options.look_ahead_s);
   change_effects(options.look_ahead_s);
   course.hand_on(options.look_ahead_s - hold_back_s, synthesiser);

@@ -10,6 +10,7 @@ namespace carillon::live {
 struct PlayerOptions {
   std::filesystem::path scene;
   std::string device;         // empty: the system's default
+  bool null = false;          // no device: nothing is heard, and real time is the clock
   int frames = 256;           // of a block
   double look_ahead_s = 0.1;  // by which physics runs ahead of the sound
   double cpu_share = 0.0;     // of a core that the sound may take; 0: all that it needs

@@ -57,6 +57,72 @@ static void check_banks(const char* name, carillon_bank** bank) {
   free(bytes);
 }
 
+/* The nearest point of a triangle by brute force, and the barycentric coordinates as carillon_impulse has them. */
+static void check_nearest(const carillon_bank* bank) {
+  const int32_t vertices = carillon_bank_vertex_count(bank), triangles = carillon_bank_triangle_count(bank);
+  const double* x = carillon_bank_vertices_m(bank);
+  const int32_t* corner = carillon_bank_triangles(bank);
+  double low[3], high[3], point[3], weight[3], closest[3], centre[3], distance;
+  double bad[3] = {0, 0, 0};
+  int32_t triangle, i, j;
+  int k, n;
+  CHECK(vertices > 3 && x != NULL && corner != NULL);
+  for (k = 0; k < 3; ++k) low[k] = high[k] = x[k];
+  for (i = 0; i < vertices; ++i) {
+    for (k = 0; k < 3; ++k) {
+      low[k] = fmin(low[k], x[3 * i + k]);
+      high[k] = fmax(high[k], x[3 * i + k]);
+    }
+  }
+  for (i = 0; i < 3 * triangles; ++i) CHECK(corner[i] >= 0 && corner[i] < vertices);
+  carillon_bank_centre_m(bank, centre);
+  for (k = 0; k < 3; ++k) CHECK(centre[k] > low[k] && centre[k] < high[k]);
+  for (n = 0; n < 200; ++n) {
+    double least = INFINITY, from[3];
+    for (k = 0; k < 3; ++k) point[k] = low[k] + (high[k] - low[k]) * (1.6 * ((n * (37 + 22 * k) + 11) % 101) / 101.0 - 0.3);
+    CHECK(carillon_bank_nearest_point(bank, point, &triangle, weight, closest, &distance) == CARILLON_OK);
+    CHECK(triangle >= 0 && triangle < triangles && fabs(weight[0] + weight[1] + weight[2] - 1) < 1e-12);
+    for (k = 0; k < 3; ++k) {
+      CHECK(weight[k] >= 0);
+      from[k] = 0;
+      for (j = 0; j < 3; ++j) from[k] += weight[j] * x[3 * corner[3 * triangle + j] + k];
+      CHECK(fabs(from[k] - closest[k]) < 1e-12);
+      from[k] -= point[k];
+    }
+    CHECK(fabs(sqrt(from[0] * from[0] + from[1] * from[1] + from[2] * from[2]) - distance) < 1e-12);
+    for (i = 0; i < triangles; ++i) { /* every triangle on a grid */
+      int a, b;
+      for (a = 0; a <= 6; ++a) {
+        for (b = 0; a + b <= 6; ++b) {
+          double square = 0;
+          for (k = 0; k < 3; ++k) {
+            const double at = (a * x[3 * corner[3 * i] + k] + b * x[3 * corner[3 * i + 1] + k] + (6 - a - b) * x[3 * corner[3 * i + 2] + k]) / 6;
+            square += (at - point[k]) * (at - point[k]);
+          }
+          least = fmin(least, sqrt(square));
+        }
+      }
+    }
+    CHECK(distance <= least + 1e-12);
+  }
+  CHECK(carillon_bank_nearest_point(bank, x, &triangle, weight, NULL, NULL) == CARILLON_OK && triangle >= 0);
+  for (k = 0; k < 3; ++k) {
+    for (n = 0; n < 4; ++n) {
+      bad[k] = n == 0 ? NAN : n == 1 ? INFINITY : n == 2 ? -INFINITY : 1e200;
+      CHECK(carillon_bank_nearest_point(bank, bad, &triangle, weight, closest, &distance) == CARILLON_BAD_INPUT && triangle == -1);
+    }
+    bad[k] = 0;
+  }
+  CHECK(carillon_bank_nearest_point(NULL, point, &triangle, weight, closest, &distance) == CARILLON_BAD_ARGUMENT && triangle == -1);
+  CHECK(carillon_bank_nearest_point(bank, NULL, &triangle, weight, closest, &distance) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_nearest_point(bank, point, NULL, weight, closest, &distance) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_nearest_point(bank, point, &triangle, NULL, closest, &distance) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_bank_vertex_count(NULL) == 0 && carillon_bank_vertices_m(NULL) == NULL && carillon_bank_triangles(NULL) == NULL);
+  carillon_bank_centre_m(NULL, centre);
+  CHECK(centre[0] == 0 && centre[1] == 0 && centre[2] == 0);
+  carillon_bank_centre_m(bank, NULL);
+}
+
 static void check_models(const carillon_bank* bank, carillon_model** model) {
   carillon_model_options options;
   carillon_model* other;
@@ -422,6 +488,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   CHECK(carillon_abi_version() == CARILLON_ABI_VERSION);
   check_banks(argv[1], &bank);
+  check_nearest(bank);
   check_models(bank, &model);
   CHECK(strcmp(carillon_status_text(CARILLON_OK), "ok") == 0 && strlen(carillon_status_text(CARILLON_FULL)) > 3);
   CHECK(strlen(carillon_status_text((carillon_status)99)) > 3);

@@ -289,6 +289,8 @@ def check_program(folder):
     assert info["provenance"]["run"]["stations"][1]["seconds"] == 12.25 and info["bytes"] == os.path.getsize(path)
 
     page = bank_program("info", "--modes", "3", path).stdout
+    assert "provenance" not in page and "peak_bytes" not in page and "--all" in page and len(page.splitlines()) <= 22, page
+    page = bank_program("info", "--all", "--modes", "3", path).stdout
     assert max(map(len, page.splitlines())) <= 140 and "574.44" in page and "27 more" in page and "+-body" in page and "solve: peak_bytes_largest_rank 900.00 MB, seconds 12.25" in page, page
     check = bank_program("check", path)
     assert check.returncode == 0 and check.stderr == ""
@@ -298,6 +300,20 @@ def check_program(folder):
                   "6 of the one component, and nothing else below", "phi_i^T M phi_j = delta_ij to 2.0e-13", "discretisation at most 30 cent",
                   "seal", "version", "arrays", "worst 3.00e-09", "closed, outward", "ascending from 574.44", "20 to 20000 Hz", "whole and sane"):
         assert words in check.stdout, words
+
+    for words, law in ((("--tan-phi", "0.02"), "internal_friction, tan(phi) 0.02"), (("--loss", "100:0.01", "1000:0.02"), "loss_table, 2 rows"),
+                       (("--caughey", "0:5", "1:1e-9"), "caughey, c = 5 lambda^0"), (("--alphas", "1e-9", "3"), "rayleigh, alpha1 1e-09 s")):
+        done = bank_program("edit", path, f"{folder}/edited.hdf", *words)
+        assert (done.returncode, done.stdout) == (0, ""), done
+        assert law in bank_program("info", f"{folder}/edited.hdf").stdout and bank_program("check", f"{folder}/edited.hdf").returncode == 0
+    done = bank_program("edit", path, f"{folder}/edited.hdf", "--size", "2")
+    assert done.returncode == 0 and "10 to 10000 Hz" in done.stdout and "nothing above" in done.stdout, done
+    for words, told in ((("--tan-phi", "3"), "below 2"), (("--loss", "100"), "HZ:FACTOR"), (("--loss", "100:0.1", "50:0.1"), "ascend"),
+                        (("--tan-phi", "0.1", "--alphas", "0", "1"), "one of"), (("--caughey", "0:-5"), "decay")):
+        done = bank_program("edit", path, f"{folder}/bad.hdf", *words)
+        assert done.returncode == 2 and told in done.stderr and not os.path.exists(f"{folder}/bad.hdf"), done
+    done = bank_program("edit", path, f"{folder}/bad.mp3")
+    assert done.returncode == 2 and ".hdf" in done.stderr and not os.path.exists(f"{folder}/bad.mp3"), done
 
     check_reduced(path, f"{folder}/small.hdf")
 
@@ -333,7 +349,7 @@ def check_program(folder):
         bank["provenance"] = np.bytes_(b'{"run": {"\\u001b[31m": "\\u001b[32m red \x7f \xff", "list": [{"name": "\\u001b[33m", "a": 1}]}}')
 
     spoil(coloured)
-    done = subprocess.run([f"{BIN}/carillon-bank", "info", path], capture_output=True)
+    done = subprocess.run([f"{BIN}/carillon-bank", "info", "--all", path], capture_output=True)
     assert done.returncode == 0 and b"red" in done.stdout and b"\x1b" not in done.stdout and b"\x7f" not in done.stdout, done
 
     # What is no bank at all must neither hang nor crash.

@@ -128,6 +128,9 @@ with tempfile.TemporaryDirectory() as name:
         scene["impulses"] = []
         (folder / "fall.json").write_text(json.dumps(scene))
         run("scene", "fall.json", "-o", "silent.png", folder=folder)
+        piped = subprocess.run([PROGRAM, "scene", "fall.json", "-o", "-"], cwd=folder, capture_output=True, timeout=200)
+        expect(piped.stdout == (folder / "silent.png").read_bytes(), "scene: the picture on standard output is another one")
+        expect(b"pixels" in piped.stderr and not (folder / "-").exists(), f"scene: what is said beside a picture: {piped.stderr}")
         expect(count_like(read_png(folder / "silent.png")[: height - 150], (204, 26, 41), 0.02) < 20, "scene: a contact without an impulse")
 
     # A mode that does not move the surface is drawn at rest.

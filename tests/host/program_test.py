@@ -126,6 +126,20 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(struct.unpack(">II", png[16:24]), (1400, 900))
 
+    def test_another_format_by_name_is_refused_and_quiet_says_nothing(self):
+        for name in ("out.mp3", "out.flac", "out"):
+            run = render(self.scene("named.json"), "-o", self.root / name)
+            self.assertEqual(run.returncode, 2)
+            self.assertRegex(run.stderr, rf"{name}: .*\.wav")
+            self.assertFalse((self.root / name).exists())
+        run = render(self.scene("named.json"), "-o", self.root / "quiet.WAV", "--report", self.root / "quiet.json", "-q")
+        self.assertEqual((run.returncode, run.stdout, run.stderr), (0, "", ""))
+        self.assertTrue((self.root / "quiet.WAV").exists())
+        subprocess.run([BIN / "carillon-bank", "edit", self.root / "cube.h5", self.root / "large.h5", "--size", "2"], check=True, stdout=subprocess.DEVNULL)
+        scene = {"bodies": [{"name": "cube", "bank": "large.h5", "position_m": [0, 0, 0.3]}]}
+        run = render(self.scene("large.json", **scene), "-o", self.root / "large.wav")
+        self.assertRegex(run.stdout, r"cube +nothing above 1\d{4} Hz|cube +nothing above \d{4} Hz")
+
     def test_the_same_scene_gives_the_same_bytes(self):
         scene = self.scene("again.json")
         for name in ("one.wav", "two.wav"):

@@ -84,6 +84,34 @@ class Live(unittest.TestCase):
         run = live(self.scene, "--device", "system", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
         self.assertNotEqual(run.returncode, 0)
         self.assertRegex(run.stderr, r"^carillon-live: .*(no sound card|no output is called)")
+        if "no sound card" in run.stderr:
+            self.assertRegex(run.stderr, "--null.*carillon-render")
+
+    def test_a_list_without_a_card_says_so(self):
+        run = live("--list", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertTrue(run.stdout.strip())
+        if not any(pathlib.Path("/proc/asound").glob("card*")):
+            self.assertIn("there is no sound card", run.stdout)
+
+    def test_nothing_is_played_to_the_end_of_the_scene_without_a_card(self):
+        started = time.monotonic()
+        run = live(self.scene, "--null", "--look-ahead", "0.3", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
+        seconds = time.monotonic() - started
+        self.assertEqual((run.returncode, run.stderr), (0, ""))
+        played = re.search(r"played +(\S+) s in (\d+) blocks, (\d+) underflows, latency (\S+) ms", run.stdout)
+        self.assertGreaterEqual(float(played[1]), 2.0)
+        self.assertLess(float(played[1]), 2.5)
+        self.assertAlmostEqual(float(played[1]) * 48000 / 256, int(played[2]), delta=1)
+        self.assertGreater(seconds, 1.9)  # by the clock, not as fast as it can
+        strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
+        self.assertGreater(int(strikes[1]), 10)
+        self.assertEqual(int(strikes[3]), 0)
+        run = live(self.scene, "--null", "--device", "system")
+        self.assertEqual(run.returncode, 2)
+        self.assertIn("--null", run.stderr)
+        run = live(self.scene, "--null", "--quiet", "--frames", "1024")
+        self.assertEqual((run.returncode, run.stdout, run.stderr), (0, "", ""))
 
 
 if __name__ == "__main__":

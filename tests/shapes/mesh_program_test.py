@@ -42,7 +42,7 @@ def count_by_hand(path):
 
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
-    for shape in ["bar", "tube", "plate", "sphere", "bowl", "box", "hollow-box"]:
+    for shape in ["bar", "tube", "plate", "sphere", "bowl", "box", "hollow-box", "cylinder", "disc", "ring", "cone"]:
         for order in ["1", "2"]:
             done = run(["--shape", shape, "-o", "out.msh", "--order", order, "--nodes", "4000", "--json", "report.json"], folder)
             expect(done.returncode == 0, f"{shape} order {order}: exit code {done.returncode}: {done.stderr}")

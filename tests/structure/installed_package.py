@@ -49,6 +49,10 @@ for program in ("slide_c", "edit_cpp"):
     lines.append(re.fullmatch(r"peak (\S+) Pa, (\S+) Pa after the edit; (\d+) -> (\d+) Hz(?:; 0 underruns)?\n", line).groups())
 if lines[0][2:] != lines[1][2:]:
     sys.exit("the two programs do not edit the same bank")
+line = run(work / "example-build/click_c", bank, capture_output=True).stdout
+print("click_c", line.strip())
+if not re.fullmatch(r"triangle \d+ of \d+, peak \S+ Pa at the left ear\n", line):
+    sys.exit("a click does not strike")
 bad = subprocess.run([work / "example-build/strike_c", __file__], capture_output=True, text=True)
 if bad.returncode != 1 or "installed_package.py" not in bad.stderr:
     sys.exit(f"no clear error for a file that is no bank: {bad.stderr}")

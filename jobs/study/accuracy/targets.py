@@ -6,7 +6,7 @@ import scaling
 from errors import InputError
 
 SURFACES, MESHES = (".obj", ".stl", ".ply", ".off"), (".msh", ".vtu", ".mesh", ".node", ".ele", ".vtk", ".vtkhdf", ".hdf", ".h5")
-SHAPES = ("bar", "tube", "plate", "sphere", "bowl", "box", "hollow-box")
+SHAPES = ("bar", "tube", "plate", "sphere", "bowl", "box", "hollow-box", "cylinder", "disc", "ring", "cone")
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}}}
 STEEL_TEXT = "steel (200 GPa, nu 0.3, 7850 kg/m^3), as no material was given"
 

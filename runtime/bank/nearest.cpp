@@ -1,0 +1,190 @@
+// Method:     the nearest point of a triangle by its Voronoi regions (corners, edges, face); a tree of axis-aligned boxes, halved at the
+//             median of the triangles' centres along the longest side, nearer child first.
+// Source:     Ericson, Real-Time Collision Detection (2005), sections 5.1.5 and 6.2.
+// Deviations: a box is passed over only when it is further off than the best place by more than rounding, and ties go to the lowest
+//             triangle, so that the tree and the plain loop find the same place to the bit.
+#include "runtime/bank/nearest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace carillon::bank {
+namespace {
+
+constexpr std::int32_t kLeaf = 6;       // triangles
+constexpr int kDeepest = 64;            // halving 2^31 triangles takes 31 levels
+constexpr double kLeastArea = 1e-14;    // of a triangle: its height over its length, squared
+constexpr double kSlack = 1.0 - 1e-12;  // of a squared distance: more than its rounding
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 subtract(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+/// How far along (a, b), 0 to 1, the point nearest to p lies.
+double find_along(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 ab = subtract(b, a);
+  const double square = dot(ab, ab);
+  return square > 0.0 ? std::clamp(dot(subtract(p, a), ab) / square, 0.0, 1.0) : 0.0;
+}
+
+/// The same as find_nearest_barycentric() by the three edges alone, for triangles without area.
+Vec3 find_on_edges(const Vec3& p, const std::array<Vec3, 3>& corner) {
+  Vec3 best{1.0, 0.0, 0.0};
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    const double t = find_along(p, corner[i], corner[j]);
+    Vec3 way{};
+    for (std::size_t k = 0; k < 3; ++k) way[k] = corner[i][k] + t * (corner[j][k] - corner[i][k]) - p[k];
+    if (!(dot(way, way) < least)) continue;
+    least = dot(way, way);
+    best = {};
+    best[i] = 1.0 - t;
+    best[j] += t;
+  }
+  return best;
+}
+
+bool is_a_place(const Vec3& point_m) {
+  return std::all_of(point_m.begin(), point_m.end(), [](double x) { return std::abs(x) <= kFarthestPointM; });  // false for NaN
+}
+
+/// Takes a triangle for the best place where it is nearer, or as near and earlier.
+void try_triangle(const Bank& bank, std::int32_t triangle, const Vec3& p, double& least, NearestPlace& best) {
+  const auto& corner = bank.triangles[static_cast<std::size_t>(triangle)];
+  const Vec3 &a = bank.vertices_m[static_cast<std::size_t>(corner[0])], &b = bank.vertices_m[static_cast<std::size_t>(corner[1])],
+             &c = bank.vertices_m[static_cast<std::size_t>(corner[2])];
+  const Vec3 weight = find_nearest_barycentric(p, a, b, c);
+  Vec3 place{};
+  for (std::size_t k = 0; k < 3; ++k) place[k] = weight[0] * a[k] + weight[1] * b[k] + weight[2] * c[k];
+  const Vec3 way = subtract(place, p);
+  const double square = dot(way, way);
+  if (!(square < least || (square == least && triangle < best.triangle))) return;
+  least = square;
+  best = {triangle, weight, place, 0.0};
+}
+
+double calc_square(const Vec3& p, const Vec3& low, const Vec3& high) {
+  double square = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double out = std::max({low[k] - p[k], 0.0, p[k] - high[k]});
+    square += out * out;
+  }
+  return square;
+}
+
+}  // namespace
+
+Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
+  const Vec3 ab = subtract(b, a), ac = subtract(c, a);
+  // A triangle without area has no regions that rounding leaves standing.
+  const double square_ab = dot(ab, ab), square_ac = dot(ac, ac), along = dot(ab, ac);
+  if (!(square_ab * square_ac - along * along > kLeastArea * std::max(square_ab, square_ac) * std::max(square_ab, square_ac)))
+    return find_on_edges(p, {a, b, c});
+  const Vec3 ap = subtract(p, a), bp = subtract(p, b), cp = subtract(p, c);
+  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
+  if (d1 <= 0.0 && d2 <= 0.0) return {1.0, 0.0, 0.0};
+  if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0};
+  const double over_ab = d1 * d4 - d3 * d2;
+  if (over_ab <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return {1.0 - d1 / (d1 - d3), d1 / (d1 - d3), 0.0};
+  if (d6 >= 0.0 && d5 <= d6) return {0.0, 0.0, 1.0};
+  const double over_ac = d5 * d2 - d1 * d6;
+  if (over_ac <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return {1.0 - d2 / (d2 - d6), 0.0, d2 / (d2 - d6)};
+  const double over_bc = d3 * d6 - d5 * d4;
+  if (over_bc <= 0.0 && d4 >= d3 && d5 >= d6) {
+    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {0.0, 1.0 - w, w};
+  }
+  const double sum = over_ab + over_ac + over_bc;
+  const Vec3 weight{over_bc / sum, over_ac / sum, over_ab / sum};
+  const bool is_inside = std::all_of(weight.begin(), weight.end(), [](double w) { return w >= 0.0 && w <= 1.0; });
+  return is_inside ? weight : find_on_edges(p, {a, b, c});
+}
+
+NearestPlace find_nearest(const Bank& bank, const Vec3& point_m) noexcept {
+  NearestPlace best;
+  if (!is_a_place(point_m)) return best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t) try_triangle(bank, static_cast<std::int32_t>(t), point_m, least, best);
+  best.distance_m = best.triangle < 0 ? 0.0 : std::sqrt(least);
+  return best;
+}
+
+SurfaceTree::SurfaceTree(const Bank& bank) : bank_(&bank), order_(bank.triangles.size()) {
+  std::iota(order_.begin(), order_.end(), 0);
+  std::vector<Vec3> centres_m;
+  centres_m.reserve(order_.size());
+  for (const auto& corner : bank.triangles) {
+    Vec3 sum{};
+    for (const std::int32_t v : corner) {
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += bank.vertices_m[static_cast<std::size_t>(v)][k];
+    }
+    centres_m.push_back(sum);
+  }
+  boxes_.reserve(order_.size());
+  if (!order_.empty()) build(centres_m, 0, static_cast<std::int32_t>(order_.size()));
+}
+
+std::int32_t SurfaceTree::build(std::vector<Vec3>& centres_m, std::int32_t first, std::int32_t last) {
+  const auto at = static_cast<std::int32_t>(boxes_.size());
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  Box box{{kInfinite, kInfinite, kInfinite}, {-kInfinite, -kInfinite, -kInfinite}, first, last - first};
+  for (std::int32_t i = first; i < last; ++i) {
+    for (const std::int32_t v : bank_->triangles[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])]) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double x = bank_->vertices_m[static_cast<std::size_t>(v)][k];
+        box.low[k] = std::min(box.low[k], x);
+        box.high[k] = std::max(box.high[k], x);
+      }
+    }
+  }
+  boxes_.push_back(box);
+  if (last - first <= kLeaf) return at;
+  const Vec3 extent = subtract(box.high, box.low);
+  const auto axis = static_cast<std::size_t>(std::max_element(extent.begin(), extent.end()) - extent.begin());
+  const std::int32_t middle = first + (last - first) / 2;
+  std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last, [&](std::int32_t s, std::int32_t t) {
+    return centres_m[static_cast<std::size_t>(s)][axis] < centres_m[static_cast<std::size_t>(t)][axis];
+  });
+  build(centres_m, first, middle);
+  const std::int32_t second = build(centres_m, middle, last);
+  boxes_[static_cast<std::size_t>(at)].first = second;
+  boxes_[static_cast<std::size_t>(at)].count = 0;
+  return at;
+}
+
+NearestPlace SurfaceTree::find(const Vec3& point_m) const noexcept {
+  NearestPlace best;
+  if (boxes_.empty() || !is_a_place(point_m)) return best;
+  struct Waiting {
+    std::int32_t box;
+    double square;
+  };
+  const auto weigh = [&](std::int32_t at) {
+    const Box& box = boxes_[static_cast<std::size_t>(at)];
+    return Waiting{at, calc_square(point_m, box.low, box.high)};
+  };
+  double least = std::numeric_limits<double>::infinity();
+  std::array<Waiting, kDeepest> stack;
+  int depth = 0;
+  stack[static_cast<std::size_t>(depth++)] = weigh(0);
+  while (depth > 0) {
+    const Waiting next = stack[static_cast<std::size_t>(--depth)];
+    if (next.square * kSlack > least) continue;
+    const Box& box = boxes_[static_cast<std::size_t>(next.box)];
+    if (box.count > 0) {
+      for (std::int32_t i = box.first; i < box.first + box.count; ++i)
+        try_triangle(*bank_, order_[static_cast<std::size_t>(i)], point_m, least, best);
+      continue;
+    }
+    Waiting near = weigh(next.box + 1), far = weigh(box.first);
+    if (far.square < near.square) std::swap(near, far);
+    stack[static_cast<std::size_t>(depth++)] = far;
+    stack[static_cast<std::size_t>(depth++)] = near;
+  }
+  best.distance_m = best.triangle < 0 ? 0.0 : std::sqrt(least);
+  return best;
+}
+
+}  // namespace carillon::bank
