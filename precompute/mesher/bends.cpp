@@ -40,6 +40,7 @@ struct Outline {
   int triangles = 0;
   int sharp = 0;       // edges on which no smooth surface goes on
   int neighbours = 0;  // panes on which it may
+  double rim_turn_deg = 0;
 };
 
 struct Row {
@@ -58,6 +59,8 @@ class Judge {
 
   Bends judge() {
     find_rim_turns();
+    for (std::int32_t p = 0; p < static_cast<std::int32_t>(place_.size()); ++p)
+      if (place_[p] >= 0) outlines_[place_[p]].rim_turn_deg = calc_rim_turn(p);
     find_rows();
     std::vector<Bend> judged = out_.edges;
     for (std::size_t e = 0; e < judged.size(); ++e)
@@ -155,6 +158,7 @@ class Judge {
   /// Walks around the outline and starts a new side at every corner.
   void number_sides(Outline& outline) const {
     const std::size_t n = outline.edges.size();
+    if (n == 0) return;
     std::map<std::int32_t, std::vector<std::size_t>> at_point;
     for (std::size_t i = 0; i < n; ++i)
       for (const std::int32_t v : out_.edges[outline.edges[i]].ends) at_point[v].push_back(i);
@@ -349,7 +353,7 @@ class Judge {
       return;
     }
     // A shallow pyramid turns less at its edges than its outline does.
-    const double turn = std::max(edge.turn_deg, std::min(calc_rim_turn(panes[0]), calc_rim_turn(panes[1])));
+    const double turn = std::max(edge.turn_deg, std::min(outline_of(panes[0]).rim_turn_deg, outline_of(panes[1]).rim_turn_deg));
     edge.sharp = turn > sharp_angle_deg_;
     edge.doubtful = turn > kSureTurnDeg && turn <= kMostTurnDeg;
     if (edge.sharp) return;

@@ -43,7 +43,9 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
   const auto find_way = [&](std::int32_t v) {
     const auto [at, triangle] = body.nearest->find_on(mesh.nodes[v]);
     way[v] = body.round->find(triangle, at) - at;
+    if (!mesh.doubt_m.empty()) mesh.doubt_m[v] = body.round->find_doubt(triangle, at);
   };
+  if (body.round->is_doubtful()) mesh.doubt_m.assign(mesh.nodes.size(), Vec3{});
   for (std::size_t v = 0; v < on_skin.size(); ++v)
     if (on_skin[v] != 0) find_way(static_cast<std::int32_t>(v));
   // Corners first.

@@ -65,15 +65,17 @@ struct RoundSurface::Patches {
       while (root[c] != c) c = root[c] = root[root[c]];
       return c;
     };
-    std::vector<char> beside(corner.size(), 0);  // its face gives way to a plane at this point
+    std::vector<char> rules(corner.size(), 0), beside(corner.size(), 0);  // its face keeps its normal at this point, or gives way
     for (const Bend& edge : bends.edges) {
       if (edge.sharp) continue;
       for (const std::int32_t v : edge.ends) {
         const std::int32_t a = find(get_corner(edge.faces[0], v)), b = find(get_corner(edge.faces[1], v));
         root[std::max(a, b)] = std::min(a, b);
         if (edge.straight < 0) continue;
-        for (const std::int32_t c : bends.corners_at[v])
+        for (const std::int32_t c : bends.corners_at[v]) {
+          if (bends.pane[c / 3] == bends.pane[edge.faces[edge.straight]]) rules[c] = 1;
           if (bends.pane[c / 3] == bends.pane[edge.faces[1 - edge.straight]]) beside[c] = 1;
+        }
       }
     }
     std::vector<Vec3> sum(corner.size(), Vec3{}), all(corner.size(), Vec3{});
@@ -84,7 +86,7 @@ struct RoundSurface::Patches {
       if (!(squares > 0)) continue;
       const Vec3 part = (1 / squares) * cross(a, b);
       all[find(c)] = all[find(c)] + part;
-      if (!beside[c]) sum[find(c)] = sum[find(c)] + part;
+      if (rules[c] != 0 && beside[c] == 0) sum[find(c)] = sum[find(c)] + part;
     }
     for (std::int32_t c = 0; c < static_cast<std::int32_t>(corner.size()); ++c) {
       const std::int32_t r = find(c);
@@ -304,25 +306,24 @@ double RoundSurface::get_usual_bulge() const {
 }
 
 double RoundSurface::calc_volume() const {
-  // Every patch in sixteen and in four triangles; what either lacks falls as the square of their size.
-  double sixteen = 0, four = 0;
-  std::array<std::array<Vec3, 5>, 5> x;
+  // Every patch in 64 and in 16 triangles; what either lacks falls as the square of their size.
+  constexpr int kPieces = 8;
+  std::array<double, 2> sum{};
+  std::array<std::array<Vec3, kPieces + 1>, kPieces + 1> x;
   const auto calc_cone = [](const Vec3& a, const Vec3& b, const Vec3& c) { return dot(cross(a, b), c) / 6; };
-  const Vec3 middle = calc_box(facets_->points).low;  // near the body: far from the origin the differences would lose their digits
+  const Vec3 origin = facets_->points.front();  // near the body: far from it the differences would lose their digits
   for (std::int32_t f = 0; f < static_cast<std::int32_t>(facets_->triangles.size()); ++f) {
-    for (int j = 0; j <= 4; ++j)
-      for (int i = 0; i + j <= 4; ++i) x[j][i] = patches_->calc({f, {0.25 * (4 - i - j), 0.25 * i, 0.25 * j}}) - middle;
-    const auto add = [&](int step, double& sum) {
-      for (int j = 0; j < 4; j += step)
-        for (int i = 0; i + j < 4; i += step) {
-          sum += calc_cone(x[j][i], x[j][i + step], x[j + step][i]);
-          if (i + j + step < 4) sum += calc_cone(x[j][i + step], x[j + step][i + step], x[j + step][i]);
+    for (int j = 0; j <= kPieces; ++j)
+      for (int i = 0; i + j <= kPieces; ++i)
+        x[j][i] = patches_->calc({f, {1.0 * (kPieces - i - j) / kPieces, 1.0 * i / kPieces, 1.0 * j / kPieces}}) - origin;
+    for (int step = 1; step <= 2; ++step)
+      for (int j = 0; j < kPieces; j += step)
+        for (int i = 0; i + j < kPieces; i += step) {
+          sum[step - 1] += calc_cone(x[j][i], x[j][i + step], x[j + step][i]);
+          if (i + j + step < kPieces) sum[step - 1] += calc_cone(x[j][i + step], x[j + step][i + step], x[j + step][i]);
         }
-    };
-    add(1, sixteen);
-    add(2, four);
   }
-  return (4 * sixteen - four) / 3;
+  return (4 * sum[0] - sum[1]) / 3;
 }
 
 TriangleSurface RoundSurface::cut(int pieces) {

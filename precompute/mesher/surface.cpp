@@ -34,7 +34,7 @@ constexpr double kSmallTarget = 5000;
 constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kSliverDeg = 12;
-constexpr double kVisible = 0.02;    // of a linear element's edge: bulges below this are lost in its own chords
+constexpr double kVisible = 0.02;  // of a linear element's edge: bulges below this are lost in its own chords
 // Of the body's diagonal and of its mean thickness: facets that bulge less are as good as round.
 constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMostRounded = 100'000;  // triangles
@@ -277,6 +277,12 @@ void curve(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
 /// Puts the nodes of the skins on the smooth surface and sums the volume anew.
 void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   report.straightened_tets += place_on_smooth_surface(mesh, body, options.straight);
+  for (const Vec3& way : mesh.doubt_m) report.doubt_m = std::max(report.doubt_m, norm(way));
+  if (report.doubt_m > 0)
+    report.notes.push_back(fmt::format(
+        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart: the error "
+        "bars contain both; a surface in finer facets settles it, and --facets if they are the body.",
+        report.doubt_m));
   if (mesh.order == 1) {
     report.volume_m3 = measure(mesh).volume_m3;
     return;
