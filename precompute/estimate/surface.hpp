@@ -24,4 +24,8 @@ struct SurfaceEdge {
 /// edges each side is smooth by itself. Collective.
 std::vector<SurfaceEdge> find_surface_edges(MPI_Comm comm, const fem::LocalMesh& local);
 
+/// The same edges with the way to the surface that the body may have as well (TetMesh::doubt_m), in `gap_m`; those without doubt are left
+/// out. Collective.
+std::vector<SurfaceEdge> find_doubtful_edges(MPI_Comm comm, const fem::LocalMesh& local);
+
 }  // namespace carillon::estimate

@@ -46,6 +46,11 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body) {
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
   for (const std::string& line : body.check.warnings) run.stations.warn(line);
+  if (!mesh.doubt_m.empty())
+    run.stations.warn(
+        "facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars contain "
+        "both: a "
+        "surface in finer facets settles it, and carillon-mesh --facets if they are the body");
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);
