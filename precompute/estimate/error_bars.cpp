@@ -72,8 +72,9 @@ void load_displacement(const fem::LocalMesh& local, const std::vector<std::int32
   }
 }
 
-/// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude.
-constexpr int kSums = 5;
+/// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude, and the last two again for the
+/// surface that the body may have as well.
+constexpr int kSums = 7;
 using Sums = std::array<DoubleLanes, kSums>;
 
 Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, spec::Mass mass_kind, const DoubleLanes& lambda) {
@@ -102,6 +103,7 @@ Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, spec::Ma
   kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[1]);
   kernels.add_shifts(recovery.shifts, values, displacement, lambda, sums[3], sums[4]);
   kernels.add_tractions(recovery.tractions, values, sums[0]);
+  kernels.add_shifts(recovery.doubts, values, displacement, lambda, sums[5], sums[6]);
   for (int m = 0; m < kLanes; ++m) sums[2].lane[m] *= lambda.lane[m];
   return sums;
 }
@@ -185,6 +187,8 @@ ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffn
     parts.lumping = sum[2];
     parts.geometry = sum[3];
     parts.geometry_noise = sum[4];
+    parts.doubt = sum[5];
+    parts.doubt_noise = sum[6];
     bars.parts.push_back(parts);
     cents.push_back(predict_cents(parts, bars.kind));
     parts.interpolation = 0.0;  // elements that cannot follow a mode are too stiff: the truth lies below

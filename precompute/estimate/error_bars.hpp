@@ -56,6 +56,8 @@ struct ErrorBars {
     double lumping = 0.0;         // of a lumped mass: lambda (consistent) - lambda (lumped)
     double geometry = 0.0;        // lambda (smooth surface) - lambda (surface of the mesh), signed
     double geometry_noise = 0.0;  // how uncertain `geometry` is, >= 0
+    double doubt = 0.0;           // lambda (the other surface that the body may have, TetMesh::doubt_m) - lambda; no mesh makes it smaller
+    double doubt_noise = 0.0;
   };
   std::vector<Parts> parts;
   Kind kind = Kind::kT4;  // of the mesh the parts come from

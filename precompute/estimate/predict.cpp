@@ -37,7 +37,8 @@ double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio
     mesh = std::max(enlarge(kT10Lumped, interpolation) - lumping, 1.75 * lumping - 0.65 * interpolation);
   const double geometry =
       (kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise) * (kind == Kind::kT10Curved ? fourth : second);
-  return 600.0 * std::log2(1.0 + mesh + geometry);
+  const double doubt = kGeometry * std::abs(parts.doubt) + kNoise * parts.doubt_noise;
+  return 600.0 * std::log2(1.0 + mesh + geometry + doubt);
 }
 
 }  // namespace carillon::estimate

@@ -272,8 +272,8 @@ void find_middles(const fem::LocalMesh& local, const Patches& patches, Recovery&
 }
 
 /// Both faces of an edge in one entry, in the order of the elements.
-void find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& local, std::span<const std::int32_t> material_of_tet,
-                 Recovery& recovery) {
+std::vector<Shift> find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& local,
+                               std::span<const std::int32_t> material_of_tet, const Recovery& recovery) {
   const Elements& elements = recovery.elements;
   std::map<std::array<std::int32_t, 3>, double> volumes;  // by nodes, material and whether it is held
   for (const SurfaceEdge& edge : edges) {
@@ -284,6 +284,7 @@ void find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& lo
     const std::int32_t material = material_of_tet.empty() ? 0 : material_of_tet[edge.tet];
     volumes[{std::min(a, b), std::max(a, b), 2 * material + (edge.held ? 1 : 0)}] += edge.gap_m * edge.third_m2;
   }
+  std::vector<Shift> shifts;
   for (const auto& [key, volume] : volumes) {
     const std::int32_t material = key[2] / 2;
     const bool held = key[2] % 2 == 1;
@@ -294,8 +295,9 @@ void find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& lo
     }
     shift.volume_m3 = static_cast<float>(held ? -volume : volume);
     shift.density = held ? 0.0F : elements.density[material];
-    recovery.shifts.push_back(shift);
+    shifts.push_back(shift);
   }
+  return shifts;
 }
 
 /// The parts of a scaled strain that make traction on a face with this normal: an orthonormal basis of U N, N v being the strain of a
@@ -373,6 +375,7 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
   });
   patches->sum(recovery.vertices, elements.materials);
   const Surface surface = find_surface(comm, local);
+  const std::vector<SurfaceEdge> doubtful = find_doubtful_edges(comm, local);
   petsc::run_agreed(comm, [&] {
     patches->invert();
     elements.weight.resize(elements.count * 4 * elements.samples * elements.terms);
@@ -381,7 +384,8 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
       for (int t = 0; t < elements.terms; ++t) weight[t] = static_cast<float>(patches->weight(patch, p, t));
     });
     if (local.order == 2) find_middles(local, *patches, recovery);
-    find_shifts(surface.edges, local, material_of_tet, recovery);
+    recovery.shifts = find_shifts(surface.edges, local, material_of_tet, recovery);
+    recovery.doubts = find_shifts(doubtful, local, material_of_tet, recovery);
     if (local.order == 2 && mass_kind == spec::Mass::consistent) find_tractions(surface.free_faces, local, material_of_tet, recovery);
   });
   return recovery;

@@ -23,8 +23,8 @@ struct Recovery {
   std::vector<std::int32_t> vertex_node;   // (vertices) its place among the nodes
   std::vector<Middle> middles;             // T10 only
   std::vector<std::int32_t> value_of;      // (e, n) where the recovered value of an element's node is
-  std::vector<Shift> shifts;
-  std::vector<Traction> tractions;  // T10 with a consistent mass only
+  std::vector<Shift> shifts, doubts;       // to the smooth surface; to the surface that the body may have as well
+  std::vector<Traction> tractions;        // T10 with a consistent mass only
   NodeExchange nodes, vertices;
 };
 

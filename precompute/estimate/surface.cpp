@@ -211,4 +211,29 @@ Surface find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
   return surface;
 }
 
+std::vector<SurfaceEdge> find_doubtful_edges(MPI_Comm comm, const fem::LocalMesh& local) {
+  int has_any = local.doubt_m.empty() ? 0 : 1;
+  MPI_Allreduce(MPI_IN_PLACE, &has_any, 1, MPI_INT, MPI_MAX, comm);
+  std::vector<SurfaceEdge> edges;
+  if (has_any == 0) return edges;
+  const std::vector<Face> faces = find_faces(comm, local);
+  if (local.doubt_m.empty()) return edges;
+  for (const Face& face : faces) {
+    const auto& loop = mesh::kFaces[face.face];
+    std::array<std::int32_t, 3> nodes;
+    for (int i = 0; i < 3; ++i) nodes[i] = get_node(local, face.tet, loop[i]);
+    const Vec3 area =
+        cross(subtract(local.nodes_m[nodes[1]], local.nodes_m[nodes[0]]), subtract(local.nodes_m[nodes[2]], local.nodes_m[nodes[0]]));
+    const Vec3 normal = normalise(area);
+    const bool held = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, edge = mesh::find_edge(loop[i], loop[j]);
+      const double gap = local.order == 2 ? dot(local.doubt_m[get_node(local, face.tet, 4 + edge)], normal)
+                                          : 0.5 * (dot(local.doubt_m[nodes[i]], normal) + dot(local.doubt_m[nodes[j]], normal));
+      if (gap != 0.0) edges.push_back({face.tet, static_cast<std::int8_t>(edge), held, gap, std::sqrt(dot(area, area)) / 6});
+    }
+  }
+  return edges;
+}
+
 }  // namespace carillon::estimate

@@ -39,4 +39,8 @@ struct Surface {
 /// side is smooth by itself. Collective.
 Surface find_surface(MPI_Comm comm, const fem::LocalMesh& local);
 
+/// The same edges with the way to the surface that the body may have as well (TetMesh::doubt_m), in `gap_m`; those without doubt are left
+/// out. Collective.
+std::vector<SurfaceEdge> find_doubtful_edges(MPI_Comm comm, const fem::LocalMesh& local);
+
 }  // namespace carillon::estimate

@@ -162,6 +162,9 @@ Piece pack(const mesh::TetMesh& mesh, const Plan& plan, const std::vector<std::i
     piece.positions.insert(piece.positions.end(), mesh.nodes[node].begin(), mesh.nodes[node].end());
     local[node] = -1;
   }
+  if (!mesh.doubt_m.empty())
+    for (const std::int32_t node : touched)
+      piece.positions.insert(piece.positions.end(), mesh.doubt_m[node].begin(), mesh.doubt_m[node].end());
   return piece;
 }
 
@@ -186,6 +189,9 @@ LocalMesh unpack(const Piece& piece) {
   local.nodes_m.resize(n[2]);
   for (std::int32_t i = 0; i < n[2]; ++i)
     for (int k = 0; k < 3; ++k) local.nodes_m[i][k] = piece.positions[3 * i + k];
+  if (piece.positions.size() > 3 * local.nodes_m.size()) local.doubt_m.resize(n[2]);
+  for (std::size_t i = 0; i < local.doubt_m.size(); ++i)
+    for (int k = 0; k < 3; ++k) local.doubt_m[i][k] = piece.positions[3 * (local.nodes_m.size() + i) + k];
   return local;
 }
 

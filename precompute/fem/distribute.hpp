@@ -20,6 +20,7 @@ struct LocalMesh {
   std::vector<std::int32_t> tet_in_mesh;   // (e) number in the whole mesh
   std::vector<std::int32_t> region;        // (e) TetMesh::regions
   std::vector<Vec3> nodes_m;               // (n): owned free nodes by ascending row, owned held nodes, halo
+  std::vector<Vec3> doubt_m;               // (n) TetMesh::doubt_m, or empty
   std::vector<std::int32_t> node_in_mesh;  // (n) number in the whole mesh
   std::vector<std::int32_t> row;           // (n) global number among the free nodes of all ranks; -1: held
   std::vector<std::int32_t> component;     // (n) connected component

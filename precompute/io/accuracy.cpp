@@ -54,6 +54,18 @@ double calc_mean_edge(MPI_Comm comm, const fem::LocalMesh& local) {
   return sum[0] / sum[1];
 }
 
+/// The largest part of a bar that no mesh makes smaller: the facets of the surface leave it open what the body is.
+double calc_doubt(const estimate::ErrorBars& bars) {
+  double worst = 0.0;
+  for (const estimate::ErrorBars::Parts& parts : bars.parts) {
+    estimate::ErrorBars::Parts doubt;
+    doubt.doubt = parts.doubt;
+    doubt.doubt_noise = parts.doubt_noise;
+    worst = std::max(worst, estimate::predict_cents(doubt, bars.kind));
+  }
+  return worst;
+}
+
 /// The largest predicted bar on a mesh with edges `ratio` times as long. A refined mesh file keeps its facets.
 double predict_worst(const estimate::ErrorBars& bars, bool keeps_geometry, double ratio) {
   double worst = 0.0, widest = 0.0, own = 0.0, own_then = 0.0;
@@ -265,6 +277,12 @@ Decision Search::decide() {
   if (last.modes > 0 && last.worst_cents <= asked_) return {1, last.setting};
   if (const Trial* before = find_before(last); last.modes == 0 && before != nullptr && before->modes == 0)
     return {1, last.setting};  // twice none: there is none
+  if (const double doubt = calc_doubt(current_.solved.bars); doubt > asked_)
+    give_up(fmt::format(
+        "{:.3g} cents of it no mesh makes smaller: the facets of the surface are so coarse that they may be planes or samples of "
+        "a smooth surface; give a surface in finer facets, or, if the facets are the body, mesh it with carillon-mesh --facets "
+        "and give the mesh",
+        doubt));
   if (last.modes > 0 && last.algebraic_cents > 0.2 * asked_) tolerance_ = std::max(tolerance_ * 1e-2, 1e-12);
   if (report_.trials.size() >= kMostTrials) give_up(fmt::format("{} settings were tried; ask for less, or give the mesh", kMostTrials));
   return run_.job.body ? decide_on_body() : decide_on_file();

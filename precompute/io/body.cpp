@@ -52,13 +52,20 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Pa
       job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, patience) : mesh::read_mesh(job.mesh);
   if (patience != nullptr && patience->estimate) return {};
   if (job.mesh_scale != 1.0) {
-    for (mesh::Vec3& node : mesh.nodes) {
-      for (double& x : node) x *= job.mesh_scale;
+    for (std::vector<mesh::Vec3>* lengths : {&mesh.nodes, &mesh.doubt_m}) {
+      for (mesh::Vec3& length : *lengths) {
+        for (double& x : length) x *= job.mesh_scale;
+      }
     }
   }
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
   warn_of_mesh(run, body);
+  if (!mesh.doubt_m.empty())
+    run.stations.warn(
+        "facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars contain "
+        "both: a "
+        "surface in finer facets settles it, and carillon-mesh --facets if they are the body");
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);

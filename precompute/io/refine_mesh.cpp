@@ -105,6 +105,11 @@ class MiddleNodes {
     const Barycentric other = find_barycentric(j);
     for (int k = 0; k < 4; ++k) at[k] = (at[k] + other[k]) / 2;
     fine_.nodes.push_back(map_point(x, at));
+    if (!fine_.doubt_m.empty()) {
+      Vec3 doubt{};
+      for (int k = 0; k < 3; ++k) doubt[k] = 0.5 * (fine_.doubt_m[element[i]][k] + fine_.doubt_m[element[j]][k]);
+      fine_.doubt_m.push_back(doubt);
+    }
     join_sets(element, (1u << i) | (1u << j), found->second);
     return found->second;
   }

@@ -209,11 +209,13 @@ void drop_unused(TetMesh& mesh, const std::vector<std::int32_t>& stand, CheckRep
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] == 0) {
       mesh.nodes[static_cast<std::size_t>(kept)] = mesh.nodes[i];
+      if (!mesh.doubt_m.empty()) mesh.doubt_m[static_cast<std::size_t>(kept)] = mesh.doubt_m[i];
       number[i] = kept++;
     }
   report.unreferenced = static_cast<std::int64_t>(mesh.nodes.size()) - kept - report.welded;
   if (static_cast<std::size_t>(kept) == mesh.nodes.size()) return;
   mesh.nodes.resize(static_cast<std::size_t>(kept));
+  if (!mesh.doubt_m.empty()) mesh.doubt_m.resize(static_cast<std::size_t>(kept));
   for (auto& node : mesh.tets) node = number[static_cast<std::size_t>(node)];
   for (auto& [name, set] : mesh.node_sets) {
     for (auto& node : set) node = number[static_cast<std::size_t>(stand[static_cast<std::size_t>(node)])];

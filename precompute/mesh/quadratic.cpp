@@ -12,6 +12,7 @@ TetMesh to_quadratic(const TetMesh& mesh) {
   TetMesh fine;
   fine.order = 2;
   fine.nodes = mesh.nodes;
+  fine.doubt_m = mesh.doubt_m;
   fine.regions = mesh.regions;
   fine.region_names = mesh.region_names;
   fine.node_sets = mesh.node_sets;
@@ -47,6 +48,10 @@ TetMesh to_quadratic(const TetMesh& mesh) {
       if (edge == first || edge->high != (edge - 1)->high) {
         const Vec3 a = mesh.nodes[low], b = mesh.nodes[static_cast<std::size_t>(edge->high)];
         fine.nodes.push_back({0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])});
+        if (!mesh.doubt_m.empty()) {
+          const Vec3 &p = mesh.doubt_m[low], &q = mesh.doubt_m[static_cast<std::size_t>(edge->high)];
+          fine.doubt_m.push_back({0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2])});
+        }
         ends.push_back({static_cast<std::int32_t>(low), edge->high});
       }
       fine.tets[static_cast<std::size_t>(edge->slot)] = static_cast<std::int32_t>(fine.nodes.size()) - 1;
@@ -76,6 +81,7 @@ TetMesh to_linear(const TetMesh& mesh) {
     if (number[i] == 0) {
       number[i] = static_cast<std::int32_t>(coarse.nodes.size());
       coarse.nodes.push_back(mesh.nodes[i]);
+      if (!mesh.doubt_m.empty()) coarse.doubt_m.push_back(mesh.doubt_m[i]);
     }
   coarse.tets.reserve(static_cast<std::size_t>(4 * mesh.tet_count()));
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)

@@ -3,10 +3,11 @@
 // Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Gmsh's quadratic tetrahedron swaps the last
 // two
 //   mid nodes against VTK's.
-// Deviations: $Periodic, $GhostElements, post-processing data and parametric coordinates are not used.
+// Deviations: $Periodic, $GhostElements, parametric coordinates and post-processing data but carillon-mesh's own are not used.
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <set>
 #include <unordered_map>
 
@@ -50,6 +51,7 @@ class GmshReader {
   void read_nodes_4();
   void read_elements_2();
   void read_elements_4();
+  bool read_doubt();
   void skip_section(std::string_view name, std::size_t place);
   void skip_numbers(std::string_view name);
   const GmshType& find_type(int type, std::size_t place) const;
@@ -73,7 +75,8 @@ class GmshReader {
   std::map<Group, std::vector<std::int32_t>> entity_physicals_;
   std::map<Group, std::vector<RawMesh::Reference>> node_groups_;
   std::map<Group, std::vector<std::int64_t>> tet_groups_;
-  std::array<std::int64_t, 64> tags_{};  // the nodes of the element being read
+  std::unordered_map<std::int64_t, Vec3> doubt_m_;  // by node
+  std::array<std::int64_t, 64> tags_{};             // the nodes of the element being read
 };
 
 void GmshReader::read_format() {
@@ -383,6 +386,25 @@ void GmshReader::skip_numbers(std::string_view name) {
   }
 }
 
+/// The section $NodeData, if it is the one that carillon-mesh writes; false for others, of which nothing is read.
+bool GmshReader::read_doubt() {
+  const std::string head = fmt::format("1\n\"{}\"\n1\n0\n3\n0\n3\n", kDoubtName);
+  if (cursor_.bytes().substr(cursor_.place(), head.size()) != head) return false;
+  cursor_.seek(cursor_.place() + head.size());
+  const std::size_t at = cursor_.place();
+  const auto count =
+      cursor_.checked_count(cursor_.text_int("the number of nodes in doubt", INT64_MIN, INT64_MAX), binary_ ? 28 : 8, "nodes in doubt", at);
+  cursor_.line();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!binary_) cursor_.skip_space();
+    const std::size_t place = cursor_.place();
+    const Vec3 way = (doubt_m_[cursor_.int32("the number of a node")] = read_point());
+    for (const double x : way)
+      if (!std::isfinite(x)) cursor_.fail(place, "a way between two surfaces is not finite; write the mesh again");
+  }
+  return true;
+}
+
 void GmshReader::skip_section(std::string_view name, std::size_t place) {
   const std::string end = fmt::format("$End{}", name);
   const std::string_view bytes = cursor_.bytes();
@@ -465,7 +487,7 @@ TetMesh GmshReader::read() {
       version_ == 2 ? read_nodes_2(parametric) : read_nodes_4();
     } else if (name == "Elements") {
       version_ == 2 ? read_elements_2() : read_elements_4();
-    } else {
+    } else if (name != "NodeData" || version_ == 0 || !read_doubt()) {
       skip_section(name, place);
     }
     cursor_.skip_space();
@@ -480,7 +502,11 @@ TetMesh GmshReader::read() {
       cursor_.fail(cursor_.place(), "the file ends without a section ${}; it was cut short: write or copy it again", needed);
   merge_repeated();
   name_groups();
+  std::vector<Vec3> doubt_m(doubt_m_.empty() ? 0 : raw_.nodes.size());
+  for (std::size_t i = 0; i < doubt_m.size(); ++i)
+    if (const auto found = doubt_m_.find(raw_.node_tags[i]); found != doubt_m_.end()) doubt_m[i] = found->second;
   TetMesh mesh = assemble_mesh(std::move(raw_), cursor_, cursor_);
+  mesh.doubt_m = std::move(doubt_m);
   for (const auto& [group, name] : names_)
     if (group.first == 3) mesh.region_names[group.second] = name;
   return mesh;

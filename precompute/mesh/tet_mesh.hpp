@@ -21,6 +21,9 @@ struct TetMesh {
   std::vector<std::int32_t> regions;                           // (E), the file's region tag, 0 where it has none
   std::map<std::int32_t, std::string> region_names;            // of the tags that the file names
   std::map<std::string, std::vector<std::int32_t>> node_sets;  // named sets of the file, ascending
+  // (N) [m] of a surface whose facets may be planes or samples of a smooth surface: from each node to its place on the other of the two,
+  // zero where there is no doubt. Empty: no doubt anywhere.
+  std::vector<Vec3> doubt_m;
 
   int nodes_per_tet() const { return order == 1 ? 4 : 10; }
   std::int64_t tet_count() const { return static_cast<std::int64_t>(tets.size()) / nodes_per_tet(); }
@@ -28,6 +31,9 @@ struct TetMesh {
     return {tets.data() + e * nodes_per_tet(), static_cast<std::size_t>(nodes_per_tet())};
   }
 };
+
+/// What the section of a Gmsh file that keeps TetMesh::doubt_m is called.
+inline constexpr const char* kDoubtName = "carillon surface doubt [m]";
 
 /// The local corner pairs of the six edges, in the order of the mid-side nodes 4..9.
 inline constexpr std::array<std::array<int, 2>, 6> kEdges{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};

@@ -51,6 +51,21 @@ std::string clean_name(std::string name) {
   return name;
 }
 
+/// The section of post-processing data with TetMesh::doubt_m, of the nodes that have any.
+void write_doubt(const TetMesh& mesh, bool binary, Output& out) {
+  std::vector<std::size_t> nodes;
+  for (std::size_t i = 0; i < mesh.doubt_m.size(); ++i)
+    if (mesh.doubt_m[i] != Vec3{}) nodes.push_back(i);
+  if (nodes.empty()) return;
+  out.text(fmt::format("$NodeData\n1\n\"{}\"\n1\n0\n3\n0\n3\n{}\n", kDoubtName, nodes.size()));
+  for (const std::size_t i : nodes) {
+    out.int32(static_cast<std::int32_t>(i + 1));
+    for (const double value : mesh.doubt_m[i]) out.real(value);
+    out.end_line();
+  }
+  out.text(binary ? "\n$EndNodeData\n" : "$EndNodeData\n");
+}
+
 }  // namespace
 
 std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
@@ -154,6 +169,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
     }
   }
   out.text(binary ? "\n$EndElements\n" : "$EndElements\n");
+  write_doubt(mesh, binary, out);
   return out.take();
 }
 

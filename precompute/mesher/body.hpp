@@ -9,6 +9,7 @@
 #include "precompute/mesher/delaunay.hpp"
 #include "precompute/mesher/distance_field.hpp"
 #include "precompute/mesher/nearest.hpp"
+#include "precompute/mesher/round_surface.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 
@@ -21,6 +22,7 @@ constexpr double kEdgePerThickness = 1.4;
 
 struct Body {
   MendedSurface mended;
+  std::optional<RoundSurface> round;   // the smooth surface of which mended.surface is a cut
   std::optional<DistanceField> field;  // of a shell, a mended surface, or for stuffing
   std::optional<NearestPoint> nearest;
   std::vector<Polyline> curves;  // the sharp ones of both skins that the last mesh keeps

@@ -1,7 +1,9 @@
 // The exact distance to a triangle surface; std only, CGAL's AABB tree stays in nearest.cpp.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "precompute/mesher/triangle_surface.hpp"
 
@@ -13,6 +15,8 @@ class NearestPoint {
   ~NearestPoint();
   /// The point of the surface nearest to p.
   Vec3 find(const Vec3& p) const;
+  /// The same, and its triangle.
+  std::pair<Vec3, std::int32_t> find_on(const Vec3& p) const;
 
  private:
   struct Tree;

@@ -1,293 +1,413 @@
 // Method: a cubic patch over each triangle from its corners and the normals there. Normals are estimated from the facets of one side of the
-//   sharp edges, with weights that are exact on a sphere; sharp edges get cubics along the tangent of the circle through their points.
-//   Faces that are flat by design keep their normal at all their corners: polygons of more than four corners or with sharp edges all
-//   around, faces much wider than their neighbours (a plane beside a fillet), and the two sides of a single bend; two such meet in a line.
+//   sharp edges, with weights that are exact on a sphere; at the rim of a smooth part, where half of the facets is missing, the normal is
+//   tilted until the curve to its inner neighbours is an arc. A plane beside a curved part keeps its normal up to the common edge. Edges
+//   get the cubics that are circles where the normals at both ends say so; sharp edges those along the tangent of the circle through their
+//   points. At the tip of a cone the patch is ruled.
 // Source: Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001, section 3 (the patch); Max, "Weights for computing vertex
-//   normals from facet normals", J. Graphics Tools 4(2), 1999 (the normals).
-// Deviations: they take normals from the modeller and leave creases open; the creases' own curves close them.
+//   normals from facet normals", J. Graphics Tools 4(2), 1999 (the normals); Goldapp, "Approximation of circular arcs by cubic
+//   polynomials", CAGD 8, 1991 (the length of the handles).
+// Deviations: they take normals from the modeller and leave creases open; the creases' own curves close them. Their handles are a third
+//   of the projected chord, which cuts an arc of 22.5 degrees 3 % short of its height.
 #include "precompute/mesher/round_surface.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <numeric>
-#include <set>
+
+#include "precompute/mesher/bends.hpp"
 
 namespace carillon::mesher {
 namespace {
 
-constexpr double kFlatDeg = 0.1;     // faces that turn by less are one plane
-constexpr double kWider = 3;         // a face this many times wider than its neighbour is flat
-constexpr double kMostBulge = 0.15;  // of an edge's length; more is no estimate of a smooth surface
-constexpr double kFinePart = 0.95;   // of the edges must bulge by less than the tolerance
-constexpr std::size_t kMostTriangles = 100'000;
+constexpr double kMostBulge = 0.15;   // of an edge's length; more is no estimate of a smooth surface
+constexpr double kUsualPart = 0.95;   // of the edges that bulge at all
+constexpr double kSameNormal = 3e-3;  // radians
+constexpr double kMostTilt = 0.35;    // of the normal at a rim, radians
+constexpr double kOnSide = 1e-8;      // barycentric
 constexpr int kMostPieces = 16;
 
-using Ends = std::array<std::int32_t, 2>;
+using Weights = std::array<double, 3>;  // barycentric
 
 Vec3 calc_unit(const Vec3& a) {
   const double length = norm(a);
   return length > 0 ? (1 / length) * a : Vec3{};
 }
 
-struct Edge {
-  std::array<std::int32_t, 2> faces{-1, -1};
-  int count = 0;
-  double turn_deg = 180;
-  bool sharp = true;
-  std::array<Vec3, 2> control{};  // of the cubic: near the lower and near the higher end
+}  // namespace
+
+struct RoundSurface::Place {
+  std::int32_t facet = 0;
+  Weights at{};
 };
 
-class Rounding {
- public:
-  Rounding(const TriangleSurface& surface, double sharp_angle_deg) : surface_(surface), corner_(3 * surface.triangles.size()) {
-    for (const Triangle& t : surface.triangles) normals_.push_back(calc_unit(cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0]))));
-    find_edges(sharp_angle_deg);
-    find_flat_faces();
+struct RoundSurface::Patches {
+  Patches(const TriangleSurface& facets, Bends given, double sharp_angle_deg)
+      : surface(facets), bends(std::move(given)), corner(3 * facets.triangles.size()), control(bends.edges.size()) {
     find_corner_normals();
     find_edge_curves(sharp_angle_deg);
   }
 
-  /// How far the middles of the edges bulge, ascending.
-  std::vector<double> calc_bulges() const {
-    std::vector<double> bulges;
-    for (const auto& [ends, edge] : edges_) bulges.push_back(norm(calc_on_edge(ends, edge, 0.5) - 0.5 * (at(ends[0]) + at(ends[1]))));
-    std::sort(bulges.begin(), bulges.end());
-    return bulges;
-  }
+  const Vec3& at(std::int32_t v) const { return surface.points[static_cast<std::size_t>(v)]; }
 
-  TriangleSurface cut(int pieces) const {
-    TriangleSurface out;
-    out.points = surface_.points;
-    std::map<Ends, std::int32_t> first_of;  // the first inner point of each edge, from its lower end on
-    for (const auto& [ends, edge] : edges_) {
-      first_of[ends] = static_cast<std::int32_t>(out.points.size());
-      for (int n = 1; n < pieces; ++n) out.points.push_back(calc_on_edge(ends, edge, static_cast<double>(n) / pieces));
-    }
-    std::vector<std::vector<std::int32_t>> row(static_cast<std::size_t>(pieces) + 1);
-    for (const Triangle& t : surface_.triangles) {
-      const auto on_edge = [&](int from, int to, int n) {  // the n-th point from corner `from` to corner `to`
-        if (n == 0) return t[from];
-        if (n == pieces) return t[to];
-        const bool up = t[from] < t[to];
-        return first_of.at(up ? Ends{t[from], t[to]} : Ends{t[to], t[from]}) + (up ? n : pieces - n) - 1;
-      };
-      const auto patch = make_patch(t);
-      for (int j = 0; j <= pieces; ++j) {  // towards corner 2
-        auto& points = row[static_cast<std::size_t>(j)];
-        points.clear();
-        for (int i = 0; i + j <= pieces; ++i) {  // towards corner 1
-          const int k = pieces - i - j;
-          if (j == 0) {
-            points.push_back(on_edge(0, 1, i));
-          } else if (i == 0) {
-            points.push_back(on_edge(0, 2, j));
-          } else if (k == 0) {
-            points.push_back(on_edge(1, 2, j));
-          } else {
-            points.push_back(static_cast<std::int32_t>(out.points.size()));
-            out.points.push_back(calc_on_patch(patch, {1.0 * k / pieces, 1.0 * i / pieces, 1.0 * j / pieces}));
-          }
-        }
-      }
-      for (int j = 0; j < pieces; ++j)
-        for (int i = 0; i + j < pieces; ++i) {
-          out.triangles.push_back({row[j][i], row[j][i + 1], row[j + 1][i]});
-          if (i + j + 1 < pieces) out.triangles.push_back({row[j][i + 1], row[j + 1][i + 1], row[j + 1][i]});
-        }
-    }
-    return out;
-  }
-
- private:
-  const Vec3& at(std::int32_t v) const { return surface_.points[static_cast<std::size_t>(v)]; }
-  static Ends make_ends(std::int32_t a, std::int32_t b) { return a < b ? Ends{a, b} : Ends{b, a}; }
-
-  void find_edges(double sharp_angle_deg) {
-    for (std::size_t f = 0; f < surface_.triangles.size(); ++f)
-      for (int c = 0; c < 3; ++c) {
-        Edge& edge = edges_[make_ends(surface_.triangles[f][c], surface_.triangles[f][(c + 1) % 3])];
-        if (edge.count < 2) edge.faces[edge.count] = static_cast<std::int32_t>(f);
-        ++edge.count;
-      }
-    for (auto& [ends, edge] : edges_) {
-      if (edge.count != 2) continue;
-      const Vec3 &a = normals_[edge.faces[0]], &b = normals_[edge.faces[1]];
-      edge.turn_deg = std::atan2(norm(cross(a, b)), dot(a, b)) * 180 / std::numbers::pi;
-      edge.sharp = edge.turn_deg > sharp_angle_deg || !(norm(a) > 0 && norm(b) > 0);
-    }
-  }
-
-  /// Joins coplanar triangles to faces and decides which of these are flat by design; edges between two such are sharp.
-  void find_flat_faces() {
-    face_.resize(surface_.triangles.size());
-    std::iota(face_.begin(), face_.end(), 0);
-    const auto find = [&](std::int32_t f) {
-      while (face_[f] != f) f = face_[f] = face_[face_[f]];
-      return f;
-    };
-    for (const auto& [ends, edge] : edges_)
-      if (edge.count == 2 && edge.turn_deg < kFlatDeg) {
-        const std::int32_t a = find(edge.faces[0]), b = find(edge.faces[1]);
-        face_[std::max(a, b)] = std::min(a, b);
-      }
-    std::map<std::int32_t, std::set<std::int32_t>> corners;
-    for (std::size_t f = 0; f < face_.size(); ++f) {
-      face_[f] = find(static_cast<std::int32_t>(f));
-      corners[face_[f]].insert(surface_.triangles[f].begin(), surface_.triangles[f].end());
-    }
-    std::map<std::int32_t, int> bends;  // edges of a face that are neither sharp nor flat
-    for (const auto& [ends, edge] : edges_)
-      if (!edge.sharp && edge.turn_deg >= kFlatDeg) ++bends[face_[edge.faces[0]]], ++bends[face_[edge.faces[1]]];
-    flat_.assign(face_.size(), 0);
-    for (const auto& [face, own] : corners) flat_[face] = own.size() > 4 || bends[face] == 0;
-    for (const auto& [ends, edge] : edges_) {
-      if (edge.sharp || edge.turn_deg < kFlatDeg) continue;
-      const Vec3 along = calc_unit(at(ends[1]) - at(ends[0]));
-      std::array<double, 2> width{};
-      for (int side = 0; side < 2; ++side)
-        for (const std::int32_t v : corners[face_[edge.faces[side]]])
-          width[side] = std::max(width[side], norm(cross(along, at(v) - at(ends[0]))));
-      for (int side = 0; side < 2; ++side)
-        if (width[side] > kWider * width[1 - side] || (bends[face_[edge.faces[0]]] == 1 && bends[face_[edge.faces[1]]] == 1))
-          flat_[face_[edge.faces[side]]] = 1;
-    }
-    for (auto& [ends, edge] : edges_)
-      if (!edge.sharp && edge.turn_deg >= kFlatDeg && flat_[face_[edge.faces[0]]] && flat_[face_[edge.faces[1]]]) edge.sharp = true;
+  std::int32_t get_corner(std::int32_t f, std::int32_t v) const {
+    const Triangle& t = surface.triangles[f];
+    return 3 * f + (t[0] == v ? 0 : t[1] == v ? 1 : 2);
   }
 
   /// One normal for all corners at a point that hang together by edges which are not sharp.
   void find_corner_normals() {
-    std::vector<std::int32_t> root(corner_.size());
+    std::vector<std::int32_t> root(corner.size());
     std::iota(root.begin(), root.end(), 0);
     const auto find = [&](std::int32_t c) {
       while (root[c] != c) c = root[c] = root[root[c]];
       return c;
     };
-    const auto get_corner = [&](std::int32_t f, std::int32_t v) {
-      const Triangle& t = surface_.triangles[f];
-      return 3 * f + (t[0] == v ? 0 : t[1] == v ? 1 : 2);
-    };
-    for (const auto& [ends, edge] : edges_)
-      for (const std::int32_t v : ends)
-        if (!edge.sharp) {
-          const std::int32_t a = find(get_corner(edge.faces[0], v)), b = find(get_corner(edge.faces[1], v));
-          root[std::max(a, b)] = std::min(a, b);
+    std::vector<char> rules(corner.size(), 0), beside(corner.size(), 0);  // its face keeps its normal at this point, or gives way
+    for (const Bend& edge : bends.edges) {
+      if (edge.sharp) continue;
+      for (const std::int32_t v : edge.ends) {
+        const std::int32_t a = find(get_corner(edge.faces[0], v)), b = find(get_corner(edge.faces[1], v));
+        root[std::max(a, b)] = std::min(a, b);
+        if (edge.straight < 0) continue;
+        for (const std::int32_t c : bends.corners_at[v]) {
+          if (bends.pane[c / 3] == bends.pane[edge.faces[edge.straight]]) rules[c] = 1;
+          if (bends.pane[c / 3] == bends.pane[edge.faces[1 - edge.straight]]) beside[c] = 1;
         }
-    std::vector<Vec3> round(corner_.size(), Vec3{}), flat(corner_.size(), Vec3{});
-    for (std::int32_t c = 0; c < static_cast<std::int32_t>(corner_.size()); ++c) {
-      const Triangle& t = surface_.triangles[c / 3];
+      }
+    }
+    std::vector<Vec3> sum(corner.size(), Vec3{}), all(corner.size(), Vec3{});
+    for (std::int32_t c = 0; c < static_cast<std::int32_t>(corner.size()); ++c) {
+      const Triangle& t = surface.triangles[c / 3];
       const Vec3 a = at(t[(c + 1) % 3]) - at(t[c % 3]), b = at(t[(c + 2) % 3]) - at(t[c % 3]);
       const double squares = dot(a, a) * dot(b, b);
       if (!(squares > 0)) continue;
-      Vec3& sum = flat_[face_[c / 3]] ? flat[find(c)] : round[find(c)];
-      sum = sum + (1 / squares) * cross(a, b);
+      const Vec3 part = (1 / squares) * cross(a, b);
+      all[find(c)] = all[find(c)] + part;
+      if (rules[c] != 0 && beside[c] == 0) sum[find(c)] = sum[find(c)] + part;
     }
-    for (std::int32_t c = 0; c < static_cast<std::int32_t>(corner_.size()); ++c) {
+    for (std::int32_t c = 0; c < static_cast<std::int32_t>(corner.size()); ++c) {
       const std::int32_t r = find(c);
-      corner_[c] = calc_unit(norm(flat[r]) > 0 ? flat[r] : round[r]);
+      corner[c] = calc_unit(norm(sum[r]) > 0 ? sum[r] : all[r]);
+      root[c] = r;
     }
+    find_tips();
+    tilt_rims(root);
+  }
+
+  /// Where a smooth part ends, the facets of one side alone lean to that side: the normal is turned about the rim until it and that of the
+  /// inner neighbours are those of an arc over the edge between them. Where the part is one strip without an inner point, it is taken for
+  /// straight across.
+  void tilt_rims(const std::vector<std::int32_t>& root) {
+    struct Rim {
+      std::vector<Vec3> along;                        // from the point, on the sharp edges
+      std::vector<std::pair<Vec3, Vec3>> in, across;  // to points inside, to other rims: way, normal there
+    };
+    std::map<std::int32_t, Rim> rims;  // by root
+    std::vector<char> on_rim(surface.points.size(), 0);
+    for (const Bend& edge : bends.edges) {
+      if (!edge.sharp) continue;
+      for (int end = 0; end < 2; ++end) {
+        on_rim[edge.ends[end]] = 1;
+        for (int side = 0; side < std::min(edge.count, 2); ++side)
+          rims[root[get_corner(edge.faces[side], edge.ends[end])]].along.push_back(calc_unit(at(edge.ends[1 - end]) - at(edge.ends[end])));
+      }
+    }
+    for (const Bend& edge : bends.edges) {
+      if (edge.sharp) continue;
+      for (int end = 0; end < 2; ++end) {
+        const std::int32_t v = edge.ends[end], other = edge.ends[1 - end];
+        if (on_rim[v] == 0 || tip[other] != 0) continue;
+        Rim& rim = rims[root[get_corner(edge.faces[0], v)]];
+        (on_rim[other] != 0 ? rim.across : rim.in).emplace_back(at(other) - at(v), corner[get_corner(edge.faces[0], other)]);
+      }
+    }
+    std::vector<Vec3> turned(corner.size(), Vec3{});
+    for (const auto& [r, rim] : rims) {
+      if (rim.along.size() != 2) continue;
+      const Vec3 normal = corner[r], rim_way = rim.along[1] - rim.along[0];
+      if (norm(rim_way) < 1.7) continue;  // a corner
+      const Vec3 sideways = calc_unit(cross(rim_way, normal)), along = cross(normal, sideways);
+      double gap = 0, squares = 0;
+      for (const auto& [way, other] : rim.in.empty() ? rim.across : rim.in) {
+        const Vec3 unit = calc_unit(way);
+        const double reach = dot(unit, sideways);
+        // How far the way falls below the tangent plane, against an arc, or a part that bends along the rim alone.
+        const double arc =
+            rim.in.empty() ? dot(unit, along) * std::tan(0.5 * std::atan2(dot(other, along), dot(other, normal))) : dot(other, unit);
+        gap += (dot(normal, unit) + arc) * reach;
+        squares += reach * reach;
+      }
+      if (!(squares > 1e-6)) continue;
+      const double tilt = std::atan2(-gap, squares);
+      if (std::abs(tilt) < kMostTilt) turned[r] = std::cos(tilt) * normal + std::sin(tilt) * sideways;
+    }
+    for (std::size_t c = 0; c < corner.size(); ++c)
+      if (norm(turned[root[c]]) > 0) corner[c] = turned[root[c]];
+  }
+
+  void find_tips() {
+    tip.assign(surface.points.size(), 0);
+    std::vector<char> on_rim(surface.points.size(), 0);
+    for (const Bend& edge : bends.edges)
+      if (edge.sharp) on_rim[edge.ends[0]] = on_rim[edge.ends[1]] = 1;
+    for (std::size_t v = 0; v < tip.size(); ++v)
+      if (on_rim[v] == 0 && bends.corners_at[v].size() > 2)
+        tip[v] = is_tip(surface, bends, static_cast<std::int32_t>(v), corner[bends.corners_at[v][0]]) ? 1 : 0;
   }
 
   /// True for the line in which two flat faces meet.
-  bool is_straight(const Edge& edge) const {
-    return edge.sharp && edge.count == 2 && flat_[face_[edge.faces[0]]] && flat_[face_[edge.faces[1]]];
+  bool is_straight(const Bend& edge) const {
+    for (int side = 0; side < 2; ++side)
+      for (const std::int32_t v : edge.ends)
+        if (norm(corner[get_corner(edge.faces[side], v)] - bends.normals[edge.faces[side]]) > kSameNormal) return false;
+    return true;
   }
 
   void find_edge_curves(double sharp_angle_deg) {
-    std::map<std::int32_t, std::vector<std::int32_t>> along;  // points joined to each point by sharp edges
-    for (const auto& [ends, edge] : edges_)
-      if (edge.sharp) along[ends[0]].push_back(ends[1]), along[ends[1]].push_back(ends[0]);
-    // The tangent at point v of the sharp curve that goes on to `next`: that of the circle through three points. Zero where it ends or
+    std::map<std::int32_t, std::vector<std::int32_t>> along;  // edges: the sharp ones at each point
+    for (std::size_t e = 0; e < bends.edges.size(); ++e)
+      if (bends.edges[e].sharp)
+        for (const std::int32_t v : bends.edges[e].ends) along[v].push_back(static_cast<std::int32_t>(e));
+    const auto is_line = [&](const Bend& edge) { return edge.count == 2 && is_straight(edge); };
+    // The tangent at point v of the sharp curve that goes on along `edge`: that of the circle through three points. Zero where it ends or
     // bends.
-    const auto calc_tangent = [&](std::int32_t v, std::int32_t next) {
+    const auto calc_tangent = [&](std::int32_t v, std::int32_t e) {
       const auto& others = along.at(v);
       if (others.size() != 2) return Vec3{};
-      const std::int32_t before = others[0] == next ? others[1] : others[0];
-      const Vec3 in = at(v) - at(before), out = at(next) - at(v);
+      const Bend &edge = bends.edges[e], &last = bends.edges[others[0] == e ? others[1] : others[0]];
+      const Vec3 in = at(v) - at(last.ends[last.ends[0] == v ? 1 : 0]), out = at(edge.ends[edge.ends[0] == v ? 1 : 0]) - at(v);
       if (dot(in, out) < std::cos(sharp_angle_deg * std::numbers::pi / 180) * norm(in) * norm(out)) return Vec3{};
-      if (is_straight(edges_.at(make_ends(before, v)))) return calc_unit(in);
+      if (is_line(last)) return calc_unit(in);
       return calc_unit((norm(out) / norm(in)) * in + (norm(in) / norm(out)) * out);
     };
-    for (auto& [ends, edge] : edges_) {
-      const Vec3 &a = at(ends[0]), &b = at(ends[1]), chord = b - a;
+    for (std::size_t e = 0; e < bends.edges.size(); ++e) {
+      const Bend& edge = bends.edges[e];
+      const Vec3 &a = at(edge.ends[0]), &b = at(edge.ends[1]), chord = b - a;
       std::array<Vec3, 2> step{chord, chord};  // three times the way to the control points
-      if (is_straight(edge)) {
-      } else if (edge.sharp) {
-        std::array<Vec3, 2> tangent{calc_tangent(ends[0], ends[1]), -1.0 * calc_tangent(ends[1], ends[0])};
-        for (int side = 0; side < 2; ++side)  // a curve that ends here bends as it does at its other point
-          if (!(norm(tangent[side]) > 0) && norm(tangent[1 - side]) > 0)
-            tangent[side] = (2 * dot(tangent[1 - side], chord) / dot(chord, chord)) * chord - tangent[1 - side];
-        for (int side = 0; side < 2; ++side)
-          if (norm(tangent[side]) > 0) step[side] = dot(tangent[side], chord) * tangent[side];
-      } else {
-        const Triangle& t = surface_.triangles[edge.faces[0]];
-        for (int side = 0; side < 2; ++side) {
-          const int c = t[0] == ends[side] ? 0 : t[1] == ends[side] ? 1 : 2;
-          const Vec3& normal = corner_[3 * edge.faces[0] + c];
-          step[side] = chord - dot(chord, normal) * normal;
+      const auto mirror = [&](int side) {      // bends at this end as at the other
+        step[side] = (2 * dot(step[1 - side], chord) / dot(chord, chord)) * chord - step[1 - side];
+      };
+      if (edge.sharp) {
+        if (!is_line(edge)) {
+          const auto number = static_cast<std::int32_t>(e);
+          const std::array<Vec3, 2> tangent{calc_tangent(edge.ends[0], number), -1.0 * calc_tangent(edge.ends[1], number)};
+          for (int side = 0; side < 2; ++side)  // as long as those of a circle
+            if (norm(tangent[side]) > 0)
+              step[side] = (2 * dot(chord, chord) / (norm(chord) + std::abs(dot(tangent[side], chord)))) * tangent[side];
+          for (int side = 0; side < 2; ++side)
+            if (!(norm(tangent[side]) > 0) && norm(tangent[1 - side]) > 0) mirror(side);
         }
+      } else {
+        std::array<Vec3, 2> normal;
+        for (int side = 0; side < 2; ++side) normal[side] = corner[get_corner(edge.faces[0], edge.ends[side])];
+        const bool tips[2] = {tip[edge.ends[0]] != 0, tip[edge.ends[1]] != 0};
+        const Vec3 axis = calc_unit(cross(normal[0], normal[1]));
+        const double half = 0.5 * std::atan2(norm(cross(normal[0], normal[1])), dot(normal[0], normal[1]));
+        for (int side = 0; side < 2; ++side) {
+          step[side] = chord - dot(chord, normal[side]) * normal[side];
+          if (tips[0] || tips[1] || half > 0.8) continue;
+          const Vec3 forth = cross(axis, normal[side]);
+          const double longer = 1 / (std::cos(half) * std::pow(std::cos(half / 2), 2));
+          step[side] = step[side] + ((longer - 1) * dot(step[side], forth)) * forth;
+        }
+        if (tips[0] && tips[1]) step = {chord, chord};
+        if (tips[0] != tips[1]) mirror(tips[0] ? 0 : 1);
       }
-      edge.control = {a + (1.0 / 3) * step[0], b - (1.0 / 3) * step[1]};
-      if (norm(calc_on_edge(ends, edge, 0.5) - 0.5 * (a + b)) > kMostBulge * norm(chord))
-        edge.control = {a + (1.0 / 3) * chord, b - (1.0 / 3) * chord};
+      control[e] = {a + (1.0 / 3) * step[0], b - (1.0 / 3) * step[1]};
+      if (norm(calc_on_edge(e, 0.5) - 0.5 * (a + b)) > kMostBulge * norm(chord))
+        control[e] = {a + (1.0 / 3) * chord, b - (1.0 / 3) * chord};
     }
   }
 
-  Vec3 calc_on_edge(const Ends& ends, const Edge& edge, double t) const {
+  /// t: from the lower end of the edge.
+  Vec3 calc_on_edge(std::size_t e, double t) const {
     const double s = 1 - t;
-    return s * s * s * at(ends[0]) + 3 * s * s * t * edge.control[0] + 3 * s * t * t * edge.control[1] + t * t * t * at(ends[1]);
+    const Bend& edge = bends.edges[e];
+    return s * s * s * at(edge.ends[0]) + 3 * s * s * t * control[e][0] + 3 * s * t * t * control[e][1] + t * t * t * at(edge.ends[1]);
   }
 
-  /// Corners 0 1 2, then the control points near the first and the second end of the sides 01, 12, 20, then the middle.
-  using Patch = std::array<Vec3, 10>;
-  Patch make_patch(const Triangle& t) const {
-    Patch p{at(t[0]), at(t[1]), at(t[2])};
-    Vec3 sides{};
+  Vec3 calc(const Place& place) const {
+    const Triangle& t = surface.triangles[place.facet];
+    const Weights& l = place.at;
+    const auto& sides = bends.edges_of[place.facet];
+    const auto calc_on_side = [&](int c, double towards_next) {
+      return calc_on_edge(sides[c], t[c] < t[(c + 1) % 3] ? towards_next : 1 - towards_next);
+    };
     for (int c = 0; c < 3; ++c) {
-      const std::int32_t a = t[c], b = t[(c + 1) % 3];
-      const Edge& edge = edges_.at(make_ends(a, b));
-      p[3 + 2 * c] = edge.control[a < b ? 0 : 1];
-      p[4 + 2 * c] = edge.control[a < b ? 1 : 0];
-      sides = sides + p[3 + 2 * c] + p[4 + 2 * c];
+      if (tip[t[c]] == 0 || !is_ruled(sides[c]) || !is_ruled(sides[(c + 2) % 3])) continue;
+      const double rest = l[(c + 1) % 3] + l[(c + 2) % 3];
+      return rest > 0 ? l[c] * at(t[c]) + rest * calc_on_side((c + 1) % 3, l[(c + 2) % 3] / rest) : at(t[c]);
     }
-    const Vec3 mean = (1.0 / 6) * sides, middle = (1.0 / 3) * (p[0] + p[1] + p[2]);
-    p[9] = mean + 0.5 * (mean - middle);
-    return p;
-  }
-
-  static Vec3 calc_on_patch(const Patch& p, const std::array<double, 3>& l) {
-    Vec3 out = 6 * l[0] * l[1] * l[2] * p[9];
+    Vec3 edges{}, out{}, middle{};
     for (int c = 0; c < 3; ++c) {
+      const auto& ends = control[sides[c]];
+      const bool up = t[c] < t[(c + 1) % 3];
       const double a = l[c], b = l[(c + 1) % 3];
-      out = out + a * a * a * p[c] + 3 * a * a * b * p[3 + 2 * c] + 3 * a * b * b * p[4 + 2 * c];
+      edges = edges + ends[0] + ends[1];
+      middle = middle + (1.0 / 3) * at(t[c]);
+      out = out + a * a * a * at(t[c]) + 3 * a * a * b * ends[up ? 0 : 1] + 3 * a * b * b * ends[up ? 1 : 0];
     }
-    return out;
+    const Vec3 mean = (1.0 / 6) * edges;
+    return out + 6 * l[0] * l[1] * l[2] * (mean + 0.5 * (mean - middle));
   }
 
-  const TriangleSurface& surface_;
-  std::vector<Vec3> normals_;       // (T) of the triangles
-  std::map<Ends, Edge> edges_;      // ordered: the new points come in a fixed order
-  std::vector<std::int32_t> face_;  // (T) the first triangle of the plane it belongs to
-  std::vector<char> flat_;          // (T) by that first triangle: flat by design
-  std::vector<Vec3> corner_;        // (T, 3) normal of the smooth surface
+  bool is_ruled(std::int32_t e) const {
+    const Bend& edge = bends.edges[e];
+    const Vec3 chord = at(edge.ends[1]) - at(edge.ends[0]);
+    return norm(calc_on_edge(e, 0.5) - 0.5 * (at(edge.ends[0]) + at(edge.ends[1]))) < 1e-3 * norm(chord);
+  }
+
+  const TriangleSurface& surface;
+  Bends bends;
+  std::vector<Vec3> corner;                  // (T, 3) normal of the smooth surface
+  std::vector<std::array<Vec3, 2>> control;  // of the edges' cubics: near the lower and near the higher end
+  std::vector<char> tip;                     // (P) of a cone
 };
 
-}  // namespace
+RoundSurface::RoundSurface(TriangleSurface facets, double sharp_angle_deg) : facets_(std::make_unique<TriangleSurface>(std::move(facets))) {
+  Bends bends = find_bends(*facets_, sharp_angle_deg);
+  if (bends.doubtful) {
+    Bends other = bends;
+    for (Bend& edge : other.edges)
+      if (edge.doubtful) edge.sharp = !edge.sharp, edge.straight = -1;
+    other_ = std::make_unique<Patches>(*facets_, std::move(other), 50);
+  }
+  patches_ = std::make_unique<Patches>(*facets_, std::move(bends), sharp_angle_deg);
+}
 
-TriangleSurface round_surface(const TriangleSurface& surface, double sharp_angle_deg, double tolerance_m, int& pieces) {
-  pieces = 1;
-  if (surface.triangles.empty() || 4 * surface.triangles.size() > kMostTriangles) return surface;
-  const Rounding rounding(surface, sharp_angle_deg);
-  // Of the edges that bulge at all: a few bulging ones on a large box count too.
-  std::vector<double> bulges = rounding.calc_bulges();
-  std::erase_if(bulges, [&](double bulge) { return bulge < 0.01 * tolerance_m; });
-  if (bulges.empty()) return surface;
-  const double bulge = bulges[static_cast<std::size_t>(kFinePart * static_cast<double>(bulges.size() - 1))];
-  pieces = std::clamp(static_cast<int>(std::ceil(std::sqrt(bulge / tolerance_m))), 1, kMostPieces);
-  while (pieces > 1 && surface.triangles.size() * pieces * pieces > kMostTriangles) --pieces;
-  return pieces > 1 ? rounding.cut(pieces) : surface;
+RoundSurface::~RoundSurface() = default;
+RoundSurface::RoundSurface(RoundSurface&&) noexcept = default;
+RoundSurface& RoundSurface::operator=(RoundSurface&&) noexcept = default;
+
+double RoundSurface::get_largest_bulge() const {
+  double largest = 0;
+  for (std::size_t e = 0; e < patches_->control.size(); ++e) {
+    const Bend& edge = patches_->bends.edges[e];
+    largest = std::max(largest, norm(patches_->calc_on_edge(e, 0.5) - 0.5 * (patches_->at(edge.ends[0]) + patches_->at(edge.ends[1]))));
+  }
+  return largest;
+}
+
+double RoundSurface::get_usual_bulge() const {
+  const double largest = get_largest_bulge();
+  std::vector<double> bulges;  // of the edges that bulge at all: a few bulging ones on a large box count too
+  for (std::size_t e = 0; e < patches_->control.size(); ++e) {
+    const Bend& edge = patches_->bends.edges[e];
+    const double bulge = norm(patches_->calc_on_edge(e, 0.5) - 0.5 * (patches_->at(edge.ends[0]) + patches_->at(edge.ends[1])));
+    if (bulge > 0.01 * largest) bulges.push_back(bulge);
+  }
+  if (bulges.empty()) return 0;
+  const auto place = bulges.begin() + static_cast<std::ptrdiff_t>(kUsualPart * static_cast<double>(bulges.size() - 1));
+  std::nth_element(bulges.begin(), place, bulges.end());
+  return *place;
+}
+
+double RoundSurface::calc_volume() const {
+  // Every patch in 64 and in 16 triangles; what either lacks falls as the square of their size.
+  constexpr int kPieces = 8;
+  std::array<double, 2> sum{};
+  std::array<std::array<Vec3, kPieces + 1>, kPieces + 1> x;
+  const auto calc_cone = [](const Vec3& a, const Vec3& b, const Vec3& c) { return dot(cross(a, b), c) / 6; };
+  const Vec3 origin = facets_->points.front();  // near the body: far from it the differences would lose their digits
+  for (std::int32_t f = 0; f < static_cast<std::int32_t>(facets_->triangles.size()); ++f) {
+    for (int j = 0; j <= kPieces; ++j)
+      for (int i = 0; i + j <= kPieces; ++i)
+        x[j][i] = patches_->calc({f, {1.0 * (kPieces - i - j) / kPieces, 1.0 * i / kPieces, 1.0 * j / kPieces}}) - origin;
+    for (int step = 1; step <= 2; ++step)
+      for (int j = 0; j < kPieces; j += step)
+        for (int i = 0; i + j < kPieces; i += step) {
+          sum[step - 1] += calc_cone(x[j][i], x[j][i + step], x[j + step][i]);
+          if (i + j + step < kPieces) sum[step - 1] += calc_cone(x[j][i + step], x[j + step][i + step], x[j + step][i]);
+        }
+  }
+  return (4 * sum[0] - sum[1]) / 3;
+}
+
+TriangleSurface RoundSurface::cut(int pieces) {
+  pieces_ = std::clamp(pieces, 1, kMostPieces);
+  pieces = pieces_;
+  TriangleSurface out;
+  out.points = facets_->points;
+  std::vector<std::int32_t> first_of;  // the first inner point of each edge, from its lower end on
+  for (std::size_t e = 0; e < patches_->bends.edges.size(); ++e) {
+    first_of.push_back(static_cast<std::int32_t>(out.points.size()));
+    for (int n = 1; n < pieces; ++n) out.points.push_back(patches_->calc_on_edge(e, static_cast<double>(n) / pieces));
+  }
+  std::vector<std::vector<std::int32_t>> row(static_cast<std::size_t>(pieces) + 1);
+  for (std::size_t f = 0; f < facets_->triangles.size(); ++f) {
+    const Triangle& t = facets_->triangles[f];
+    const auto on_edge = [&](int side, int from, int to, int n) {  // the n-th point from corner `from` to corner `to`
+      if (n == 0) return t[from];
+      if (n == pieces) return t[to];
+      return first_of[patches_->bends.edges_of[f][side]] + (t[from] < t[to] ? n : pieces - n) - 1;
+    };
+    for (int j = 0; j <= pieces; ++j) {  // towards corner 2
+      auto& points = row[static_cast<std::size_t>(j)];
+      points.clear();
+      for (int i = 0; i + j <= pieces; ++i) {  // towards corner 1
+        const int k = pieces - i - j;
+        if (j == 0) {
+          points.push_back(on_edge(0, 0, 1, i));
+        } else if (i == 0) {
+          points.push_back(on_edge(2, 0, 2, j));
+        } else if (k == 0) {
+          points.push_back(on_edge(1, 1, 2, j));
+        } else {
+          points.push_back(static_cast<std::int32_t>(out.points.size()));
+          out.points.push_back(patches_->calc({static_cast<std::int32_t>(f), {1.0 * k / pieces, 1.0 * i / pieces, 1.0 * j / pieces}}));
+        }
+      }
+    }
+    for (int j = 0; j < pieces; ++j)
+      for (int i = 0; i + j < pieces; ++i) {
+        out.triangles.push_back({row[j][i], row[j][i + 1], row[j + 1][i]});
+        if (i + j + 1 < pieces) out.triangles.push_back({row[j][i + 1], row[j + 1][i + 1], row[j + 1][i]});
+      }
+  }
+  return out;
+}
+
+RoundSurface::Place RoundSurface::find_place(std::int32_t triangle, const Vec3& p) const {
+  // The triangles of a facet come in rows, in each row one that points up, then one that points down, and so on.
+  const int pieces = pieces_;
+  Place place{triangle / (pieces * pieces), {}};
+  int left = triangle % (pieces * pieces), j = 0;
+  while (left >= 2 * (pieces - j) - 1) left -= 2 * (pieces - j) - 1, ++j;
+  const int i = left / 2;
+  const auto make = [&](int to_1, int to_2) {
+    return Weights{1.0 * (pieces - to_1 - to_2) / pieces, 1.0 * to_1 / pieces, 1.0 * to_2 / pieces};
+  };
+  const std::array<Weights, 3> weights = left % 2 == 0 ? std::array{make(i, j), make(i + 1, j), make(i, j + 1)}
+                                                       : std::array{make(i + 1, j), make(i + 1, j + 1), make(i, j + 1)};
+  std::array<Vec3, 3> x;
+  for (int c = 0; c < 3; ++c) x[c] = patches_->calc({place.facet, weights[c]});
+  const Vec3 ab = x[1] - x[0], ac = x[2] - x[0], ap = p - x[0];
+  const double d00 = dot(ab, ab), d01 = dot(ab, ac), d11 = dot(ac, ac), d20 = dot(ap, ab), d21 = dot(ap, ac), det = d00 * d11 - d01 * d01;
+  Weights l{1, 0, 0};
+  if (det > 0) {
+    l[1] = (d11 * d20 - d01 * d21) / det;
+    l[2] = (d00 * d21 - d01 * d20) / det;
+    l[0] = 1 - l[1] - l[2];
+    double sum = 0;
+    for (double& part : l) sum += part = part < kOnSide ? 0 : part;  // what lies on a side stays there
+    for (double& part : l) part /= sum;
+  }
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 3; ++k) place.at[k] += l[c] * weights[c][k];
+  return place;
+}
+
+Vec3 RoundSurface::find(std::int32_t triangle, const Vec3& p) const { return patches_->calc(find_place(triangle, p)); }
+
+bool RoundSurface::is_doubtful() const { return other_ != nullptr; }
+
+Vec3 RoundSurface::find_doubt(std::int32_t triangle, const Vec3& p) const {
+  if (!other_) return {};
+  const Place place = find_place(triangle, p);
+  return other_->calc(place) - patches_->calc(place);
 }
 
 }  // namespace carillon::mesher

@@ -1,14 +1,50 @@
 // The smooth surface through the corners of a triangle surface.
 #pragma once
 
+#include <cstdint>
+#include <memory>
+
 #include "precompute/mesher/triangle_surface.hpp"
 
 namespace carillon::mesher {
 
-/// A finer triangle surface, its new points on curved patches through the points of `surface`: a faceted ball becomes a ball. Edges that
-/// turn by more than `sharp_angle_deg` stay edges (curved along themselves), flat faces stay flat. Fine enough that hardly a triangle
-/// bulges by more than tolerance_m, and at most 100,000 triangles; `surface` itself, and 1 in `pieces`, if it is that fine already.
-/// pieces: into how many each edge was cut.
-TriangleSurface round_surface(const TriangleSurface& surface, double sharp_angle_deg, double tolerance_m, int& pieces);
+/// Curved patches over the triangles of a surface: a faceted ball is a ball again. Edges of the body stay edges (curved along themselves),
+/// planes stay flat: bends.hpp says which. Keeps what it needs of the facets.
+class RoundSurface {
+ public:
+  RoundSurface(TriangleSurface facets, double sharp_angle_deg);
+  ~RoundSurface();
+  RoundSurface(RoundSurface&&) noexcept;
+  RoundSurface& operator=(RoundSurface&&) noexcept;
+
+  /// How far the patches bulge over the middles of the edges [m]: the largest, and the one that 95 % of those that bulge at all stay under.
+  double get_largest_bulge() const;
+  double get_usual_bulge() const;
+
+  /// The volume that the smooth surface encloses [m^3], to about 1e-5 of what the facets lack of it.
+  double calc_volume() const;
+
+  /// A triangle surface on the patches: each edge is cut into `pieces`, at most 16. It stands for this surface from now on, and its
+  /// triangles for the arguments of find() and find_doubt().
+  TriangleSurface cut(int pieces);
+
+  /// The point of the smooth surface that belongs to a point of a triangle of the last cut().
+  Vec3 find(std::int32_t triangle, const Vec3& p) const;
+
+  /// True if the facets leave open, somewhere, whether they are planes or samples of a smooth surface.
+  bool is_doubtful() const;
+  /// From the point of the smooth surface to that of the surface that is as likely: smooth where this one is flat and the other way round.
+  /// Zero where there is no doubt.
+  Vec3 find_doubt(std::int32_t triangle, const Vec3& p) const;
+
+ private:
+  struct Patches;
+  struct Place;
+  Place find_place(std::int32_t triangle, const Vec3& p) const;
+
+  std::unique_ptr<TriangleSurface> facets_;  // at one place: the patches refer to it
+  std::unique_ptr<Patches> patches_, other_;
+  int pieces_ = 1;
+};
 
 }  // namespace carillon::mesher

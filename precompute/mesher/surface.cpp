@@ -15,6 +15,7 @@
 #include "precompute/mesher/body.hpp"
 #include "precompute/mesher/curve_mesh.hpp"
 #include "precompute/mesher/part_nodes.hpp"
+#include "precompute/mesher/place_nodes.hpp"
 #include "precompute/mesher/quiet.hpp"
 #include "precompute/mesher/repair.hpp"
 #include "precompute/mesher/round_surface.hpp"
@@ -33,8 +34,10 @@ constexpr double kSmallTarget = 5000;
 constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kSliverDeg = 12;
-constexpr double kVisible = 0.02;    // of a linear element's edge: bulges below this are lost in its own chords
-constexpr double kRoundness = 1e-4;  // of the body's diagonal: facets that bulge less are as good as round
+constexpr double kVisible = 0.02;  // of a linear element's edge: bulges below this are lost in its own chords
+// Of the body's diagonal and of its mean thickness: facets that bulge less are as good as round.
+constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
+constexpr std::size_t kMostRounded = 100'000;  // triangles
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
 constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
@@ -273,6 +276,21 @@ void curve(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   report.curved_edges = edges.curved;
   report.straight_edges = edges.left;
   report.straightened_tets = edges.straightened;
+}
+
+/// Puts the nodes of the skins on the smooth surface and sums the volume anew.
+void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& options, SurfaceReport& report) {
+  report.straightened_tets += place_on_smooth_surface(mesh, body, options.straight);
+  for (const Vec3& way : mesh.doubt_m) report.doubt_m = std::max(report.doubt_m, norm(way));
+  if (report.doubt_m > 0)
+    report.notes.push_back(fmt::format(
+        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart: the error "
+        "bars contain both; a surface in finer facets settles it, and --facets if they are the body.",
+        report.doubt_m));
+  if (mesh.order == 1) {
+    report.volume_m3 = measure(mesh).volume_m3;
+    return;
+  }
   report.volume_m3 = 0;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) report.volume_m3 += mesh::calc_curved_volume(mesh, e);
 }
@@ -292,20 +310,28 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
 }
 
 /// Takes the smooth surface through the corners in place of the facets, unless it runs through itself where they do not.
-void round(MendedSurface& mended, const SurfaceOptions& options, SurfaceReport& report) {
-  double tolerance = kRoundness * calc_box(mended.surface.points).diagonal();
-  // Linear elements as coarse as these cannot tell the difference.
+void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
+  MendedSurface& mended = body.mended;
+  if (4 * mended.surface.triangles.size() > kMostRounded) return;
+  RoundSurface round(mended.surface, options.sharp_angle_deg);
+  const double diagonal = calc_box(mended.surface.points).diagonal();
+  const double thickness = 2 * std::abs(calc_volume(mended.surface)) / calc_area(mended.surface);
+  if (!round.is_doubtful() && round.get_largest_bulge() < std::min(kRoundness * diagonal, kThinRoundness * thickness)) return;
+  // So fine that the nodes hardly have to move from the cut to the smooth surface; for linear elements, that cannot tell, coarser.
   const double nodes = static_cast<double>(options.nodes.value_or(10000));
   const double shortest = options.edge_m.value_or(std::sqrt(calc_area(mended.surface) / nodes));
-  if (options.order == 1) tolerance = std::max(tolerance, kVisible * shortest);
-  TriangleSurface rounded = round_surface(mended.surface, options.sharp_angle_deg, tolerance, report.facet_pieces);
-  if (report.facet_pieces == 1) return;
-  if (mended.clean && !is_clean(rounded)) {
+  const double tolerance = options.order == 1 ? std::max(kRoundness * diagonal, kVisible * shortest) : kRoundness * diagonal;
+  int pieces = std::max(1, static_cast<int>(std::ceil(std::sqrt(round.get_usual_bulge() / tolerance))));
+  while (pieces > 1 && mended.surface.triangles.size() * pieces * pieces > kMostRounded) --pieces;
+  TriangleSurface rounded = round.cut(pieces);
+  report.facet_pieces = pieces;
+  if (mended.clean && pieces > 1 && !is_clean(rounded)) {
     report.facet_pieces = 1;
     report.notes.push_back("The smooth surface through the facets' corners would run through itself; the facets were taken as they are.");
     return;
   }
   mended.surface = std::move(rounded);
+  body.round = std::move(round);
 }
 
 mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
@@ -314,11 +340,11 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
   scale_surface(raw, options, report);
   body.mended = phases.run("mending", [&] { return mend_surface(std::move(raw), options.surface, report); });
-  if (!options.facets && !report.wrapped) phases.run("rounding", [&] { return round(body.mended, options, report), 0; });
+  if (!options.facets && !report.wrapped) phases.run("rounding", [&] { return round(body, options, report), 0; });
   body.wall_m = options.wall_m.value_or(0);
   const TriangleSurface& surface = body.mended.surface;
   report.input_area_m2 = calc_area(surface);
-  report.input_volume_m3 = calc_volume(surface) - body.mended.offset_m * report.input_area_m2;
+  report.input_volume_m3 = body.round ? body.round->calc_volume() : calc_volume(surface) - body.mended.offset_m * report.input_area_m2;
 
   // The wall takes at most the whole volume; its two skins are about its volume over its thickness each.
   const double wall_volume = std::min(body.wall_m * report.input_area_m2, report.input_volume_m3);
@@ -393,6 +419,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   report.edge_m = edge;
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
   if (options.order == 2 && !options.straight) phases.run("curving", [&] { return curve(out, body, report), 0; });
+  if (body.round || options.order == 2) phases.run("placing nodes", [&] { return place_nodes(out, body, options, report), 0; });
   report.nodes = static_cast<std::int64_t>(out.nodes.size());
   add_notes(options, body, report);
   return out;

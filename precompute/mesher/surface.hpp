@@ -53,6 +53,7 @@ struct SurfaceReport {
   std::int64_t flipped_triangles = 0;  // turned so that all of them face outward
   std::int64_t holes_closed = 0;       // boundary loops filled with triangles
   int facet_pieces = 1;                // into how many each facet's sides were cut to follow the smooth surface through its corners
+  double doubt_m = 0;                  // how far apart the facets and the smooth surface are where it cannot be told which is the body
   bool wrapped = false;                // the surface could not be mended: its alpha wrap was meshed
   std::int64_t components = 0;         // of the input surface after mending
   double scale = 1;                    // metres per unit of the file, as applied

@@ -17,11 +17,15 @@ class Written : public testing::TestWithParam<std::tuple<const char*, GmshEncodi
 TEST_P(Written, gmsh_file_is_read_back_bit_for_bit) {
   const auto& [file, encoding] = GetParam();
   const ScratchFolder scratch;
-  const TetMesh mesh = read_mesh(fixture(file));
+  TetMesh mesh = read_mesh(fixture(file));
+  EXPECT_TRUE(mesh.doubt_m.empty());
+  mesh.doubt_m.assign(mesh.nodes.size(), Vec3{});
+  for (std::size_t i = 0; i < mesh.nodes.size(); i += 3) mesh.doubt_m[i] = {1e-5 * static_cast<double>(i + 1), -0.25, 1.0 / 3};
   write_gmsh(mesh, scratch / "out.msh", encoding);
   const TetMesh back = read_mesh(scratch / "out.msh");
   EXPECT_EQ(back.order, mesh.order);
   EXPECT_EQ(back.nodes, mesh.nodes);
+  EXPECT_EQ(back.doubt_m, mesh.doubt_m);
   EXPECT_EQ(back.tets, mesh.tets);
   EXPECT_EQ(back.regions, mesh.regions);
   for (const auto& [name, set] : mesh.node_sets) EXPECT_EQ(back.node_sets.at(name), set) << name;
@@ -49,7 +53,9 @@ TEST_P(Written, gmsh_file_is_read_by_meshio_with_volume_and_sets) {
 TEST_P(Written, gmsh_file_is_read_by_gmsh_with_volume_and_sets) {
   const auto& [file, encoding] = GetParam();
   const ScratchFolder scratch;
-  write_gmsh(read_mesh(fixture(file)), scratch / "out.msh", encoding);
+  TetMesh mesh = read_mesh(fixture(file));
+  mesh.doubt_m.assign(mesh.nodes.size(), Vec3{0, 0, 1e-3});  // data that others may do with what they like
+  write_gmsh(mesh, scratch / "out.msh", encoding);
   std::string said;
   if (!read_with("gmsh", scratch / "out.msh", said)) GTEST_SKIP() << "gmsh's Python module is not installed";
   EXPECT_NE(said.find("volume 0.006000 tets 89 mid-off 0"), std::string::npos) << said;

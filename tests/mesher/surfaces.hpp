@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -120,6 +121,65 @@ inline Polygons make_filleted_bar(double a, double b, double fillet, double leng
       outline.push_back({x + fillet * std::cos(angle), y + fillet * std::sin(angle)});
     }
   return make_prism(outline, length);
+}
+
+/// How the panels of a body of revolution are cut.
+enum class Cut { kQuads, kDiagonal, kOtherDiagonal, kAlternating, kTurned };  // kTurned: every second ring by half a panel, triangles
+
+/// The body of revolution around z of a profile (r, z) that runs upwards, in n panels; r = 0 is a pole. `is_closed`: the profile is a loop
+/// (anticlockwise in the r-z plane), otherwise flat ends close it, each one polygon, or a fan of triangles when the panels are triangles.
+inline Polygons make_lathe(const std::vector<std::array<double, 2>>& profile, int n, Cut cut, bool is_closed = false) {
+  Polygons s;
+  const int m = static_cast<int>(profile.size());
+  std::vector<std::vector<int>> at(static_cast<std::size_t>(m));
+  for (int i = 0; i < m; ++i)
+    for (int j = 0; j < n; ++j) {
+      const auto [r, z] = profile[i];
+      if (r > 0 || j == 0) {
+        const double angle = 0.1 + 2 * std::acos(-1.0) * (j + (cut == Cut::kTurned ? 0.5 * (i % 2) : 0.0)) / n;
+        s.points.push_back({r * std::cos(angle), r * std::sin(angle), z});
+      }
+      at[i].push_back(static_cast<int>(s.points.size()) - 1);
+    }
+  const auto add = [&](std::vector<int> face) {  // corners at a pole fall together
+    face.erase(std::unique(face.begin(), face.end()), face.end());
+    if (face.front() == face.back()) face.pop_back();
+    if (face.size() > 2) s.faces.push_back(face);
+  };
+  for (int i = 0; i + (is_closed ? 0 : 1) < m; ++i)
+    for (int j = 0; j < n; ++j) {
+      const int k = (i + 1) % m, l = (j + 1) % n, a = at[i][j], b = at[i][l], c = at[k][l], d = at[k][j];
+      const bool first = cut == Cut::kDiagonal || (cut == Cut::kAlternating && (i + j) % 2 == 0) || (cut == Cut::kTurned && i % 2 == 1);
+      if (cut == Cut::kQuads || a == b || c == d) {
+        add({a, b, c, d});
+      } else if (first) {
+        add({a, b, c});
+        add({a, c, d});
+      } else {
+        add({a, b, d});
+        add({b, c, d});
+      }
+    }
+  for (const int end : {0, m - 1}) {
+    if (is_closed || !(profile[end][0] > 0)) continue;
+    std::vector<int> ring = at[end];
+    if (end == 0) std::reverse(ring.begin(), ring.end());
+    if (cut == Cut::kQuads) {
+      s.faces.push_back(ring);
+      continue;
+    }
+    s.points.push_back({0, 0, profile[end][1]});
+    for (int j = 0; j < n; ++j) s.faces.push_back({ring[j], ring[(j + 1) % n], static_cast<int>(s.points.size()) - 1});
+  }
+  return s;
+}
+
+/// `steps` pieces of a line or an arc: f maps 0 ... 1 to (r, z).
+template <class F>
+std::vector<std::array<double, 2>> make_profile(int steps, const F& f) {
+  std::vector<std::array<double, 2>> out;
+  for (int i = 0; i <= steps; ++i) out.push_back(f(static_cast<double>(i) / steps));
+  return out;
 }
 
 inline std::filesystem::path get_path(const std::string& name) {

@@ -1,0 +1,85 @@
+// Method: a node of the skin gets the way from its nearest point on the triangles to the point of the smooth surface that belongs to it.
+// The
+//   inner skin of a shell moves as the outer one does there. The ways are short: of the order of the height of an arc over one of the
+//   triangles.
+// Source: our own.
+// Deviations: none.
+#include "precompute/mesher/place_nodes.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "precompute/mesh/curved.hpp"
+#include "precompute/mesher/tet_quality.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+// An element keeps at least this part of its volume.
+constexpr double kLeastVolume = 0.3;
+
+double calc_volume(const mesh::TetMesh& mesh, std::int64_t e) {
+  const auto tet = mesh.tet(e);
+  const Vec3& origin = mesh.nodes[tet[0]];
+  return dot(cross(mesh.nodes[tet[1]] - origin, mesh.nodes[tet[2]] - origin), mesh.nodes[tet[3]] - origin) / 6;
+}
+
+}  // namespace
+
+std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool straight) {
+  if (!body.round) return 0;
+  mesh::TetMesh linear;  // the corners alone, numbered as they are
+  linear.nodes = mesh.nodes;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) linear.tets.insert(linear.tets.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
+  std::vector<char> on_skin(mesh.nodes.size(), 0);
+  std::set<std::array<std::int32_t, 2>> edges;  // of the skin
+  const auto make_edge = [](std::int32_t a, std::int32_t b) { return std::array{std::min(a, b), std::max(a, b)}; };
+  for (const Triangle& t : find_boundary(linear))
+    for (int c = 0; c < 3; ++c) {
+      on_skin[t[c]] = 1;
+      edges.insert(make_edge(t[c], t[(c + 1) % 3]));
+    }
+  std::vector<Vec3> way(mesh.nodes.size(), Vec3{});
+  const auto find_way = [&](std::int32_t v) {
+    const auto [at, triangle] = body.nearest->find_on(mesh.nodes[v]);
+    way[v] = body.round->find(triangle, at) - at;
+    if (!mesh.doubt_m.empty()) mesh.doubt_m[v] = body.round->find_doubt(triangle, at);
+  };
+  if (body.round->is_doubtful()) mesh.doubt_m.assign(mesh.nodes.size(), Vec3{});
+  for (std::size_t v = 0; v < on_skin.size(); ++v)
+    if (on_skin[v] != 0) find_way(static_cast<std::int32_t>(v));
+  // Corners first.
+  std::vector<double> volumes;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) volumes.push_back(calc_volume(linear, e));
+  for (bool again = true; again;) {
+    again = false;
+    for (std::size_t v = 0; v < mesh.nodes.size(); ++v) linear.nodes[v] = mesh.nodes[v] + way[v];
+    for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+      if (calc_volume(linear, e) > kLeastVolume * volumes[e]) continue;
+      for (int c = 0; c < 4; ++c) {
+        const std::int32_t v = linear.tets[4 * e + c];
+        again = again || norm(way[v]) > 0;
+        way[v] = {};
+      }
+    }
+  }
+  if (mesh.order == 1) {
+    mesh.nodes = linear.nodes;
+    return 0;
+  }
+  std::vector<char> done(mesh.nodes.size(), 0);
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+    for (int m = 0; m < 6; ++m) {
+      const std::int32_t a = mesh.tet(e)[mesh::kEdges[m][0]], b = mesh.tet(e)[mesh::kEdges[m][1]], middle = mesh.tet(e)[4 + m];
+      if (done[middle] != 0) continue;
+      done[middle] = 1;
+      if (!straight && edges.contains(make_edge(a, b)))
+        find_way(middle);
+      else
+        way[middle] = 0.5 * (way[a] + way[b]);
+    }
+  for (std::size_t v = 0; v < mesh.nodes.size(); ++v) mesh.nodes[v] = mesh.nodes[v] + way[v];
+  return straight ? 0 : mesh::straighten_folded_elements(mesh);
+}
+
+}  // namespace carillon::mesher
