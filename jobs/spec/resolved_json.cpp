@@ -79,6 +79,7 @@ Json::Value write_body(const Body& body, const fs::path& base) {
     if (body.wall_m) root["wall_m"] = *body.wall_m;
     if (body.height_m) root["height_m"] = *body.height_m;
     if (body.scale) root["scale"] = *body.scale;
+    if (body.close_holes) root["close_holes"] = *body.close_holes;
     root["up"] = std::string(1, body.up);
     root["method"] = body.method;
   }

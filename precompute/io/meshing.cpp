@@ -145,6 +145,7 @@ mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fi
   if (body.wall_m) add("--wall", format_length(*body.wall_m));
   if (body.height_m) add("--height", format_length(*body.height_m));
   if (body.scale) add("--scale", format_length(*body.scale));
+  if (body.close_holes) add("--close-holes", format_length(*body.close_holes));
   add("--up", std::string(1, body.up));
   add("--method", body.method);
   if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
@@ -170,9 +171,22 @@ mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fi
     return {};
   }
   if (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == 0) return mesh::read_mesh(file);
-  const std::string text = fmt::format("{}: the body cannot be meshed: {}", body.place, ended.errors);
+  const std::string failed = fmt::format("{}: the body cannot be meshed", body.place);
+  const std::string text = fmt::format("{}: {}", failed, ended.errors.empty() ? "carillon-mesh gave no reason" : ended.errors);
   if (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == kExitInput) throw InputError(text);
-  throw SystemError(WIFSIGNALED(ended.status) ? fmt::format("{} (ended by signal {})", text, WTERMSIG(ended.status)) : text);
+  if (!WIFSIGNALED(ended.status)) throw SystemError(text);
+  const int signal = WTERMSIG(ended.status);
+  // It says itself where it broke down, if it still can; a signal that it sends itself comes from the surface, one from outside does not.
+  const bool is_own =
+      signal == SIGSEGV || signal == SIGBUS || signal == SIGABRT || signal == SIGFPE || signal == SIGILL || signal == SIGXCPU;
+  const std::string said = ended.errors.empty() ? "" : fmt::format(" after it wrote '{}'", ended.errors);
+  if (is_own)
+    throw InputError(
+        fmt::format("{}: carillon-mesh broke down on {}, by signal {} ({}){}; ask for another number of nodes, try \"method\": "
+                    "\"stuffing\", or repair the surface in a modeller",
+                    failed, body.surface.string(), signal, ::strsignal(signal), said));
+  throw SystemError(fmt::format("{}: carillon-mesh was ended from outside, by signal {} ({}){}; was memory short?", failed, signal,
+                                ::strsignal(signal), said));
 }
 
 }  // namespace

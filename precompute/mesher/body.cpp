@@ -7,10 +7,14 @@
 #include <cmath>
 
 #include "precompute/mesher/inset_curves.hpp"
+#include "precompute/mesher/untangle_curves.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::mesher {
 namespace {
+
+// Curves closer than this part of the diagonal, but for their common ends, cannot be parted by elements.
+constexpr double kSameCurve = 1e-6;
 
 [[noreturn]] void throw_solid(const SurfaceOptions& options, double deepest_m) {
   throw InputError(
@@ -67,6 +71,7 @@ std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& op
       curves.insert(curves.end(), inset.begin(), inset.end());
     }
   }
+  curves = untangle_curves(std::move(curves), kSameCurve * calc_box(body.mended.surface.points).diagonal());
   return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.mended.surface, curves);
 }
 
@@ -83,7 +88,8 @@ Vec3 project(const Body& body, Vec3 p) {
   if (!body.field) return body.nearest->find(p);
   const DistanceField& field = *body.field;
   const double level = field.calc_distance(p) < -0.5 * body.wall_m && body.wall_m > 0 ? -body.wall_m : 0;
-  for (int n = 0; n < 3; ++n) {
+  double off = field.calc_distance(p) - level;
+  for (int n = 0; n < 6 && std::abs(off) > 1e-3 * field.voxel_m; ++n) {
     Vec3 gradient{};
     for (int c = 0; c < 3; ++c) {
       Vec3 low = p, high = p;
@@ -93,9 +99,42 @@ Vec3 project(const Body& body, Vec3 p) {
     }
     const double square = dot(gradient, gradient);
     if (square < 0.1) break;  // on the skeleton of the body, where no skin is nearest
-    p = p - ((field.calc_distance(p) - level) / square) * gradient;
+    // Near the skeleton the slope is too small and the step too long: it is halved until it leads closer.
+    Vec3 step = (off / square) * gradient;
+    double closer = off;
+    for (int half = 0; half < 5; ++half, step = 0.5 * step) {
+      closer = field.calc_distance(p - step) - level;
+      if (std::abs(closer) < std::abs(off)) break;
+    }
+    if (!(std::abs(closer) < std::abs(off))) break;
+    p = p - step;
+    off = closer;
   }
   return p;
+}
+
+namespace {
+
+/// The distance to the true surface, negative inside it; of a clean solid, the sign by the nearest triangle is not known and it is
+/// positive.
+double calc_signed(const Body& body, const Vec3& p) {
+  const double way = norm(body.nearest->find(p) - p);
+  const bool inside = body.field && body.field->calc_distance(p) < body.mended.offset_m;
+  return (inside ? -way : way) + body.mended.offset_m;
+}
+
+}  // namespace
+
+double calc_outside(const Body& body, const Vec3& p) {
+  const double d = calc_signed(body, p);
+  if (!body.field)
+    return d > 1e-9 * calc_box(body.mended.surface.points).diagonal() && std::abs(calc_winding(body.mended.surface, p)) < 0.5 ? d : 0;
+  return std::max({0.0, d, body.wall_m > 0 ? -d - body.wall_m : 0.0});
+}
+
+double calc_off_skin(const Body& body, const Vec3& p) {
+  const double d = calc_signed(body, p);
+  return body.wall_m > 0 ? std::min(std::abs(d), std::abs(d + body.wall_m)) : std::abs(d);
 }
 
 std::optional<Vec3> find_skin(const Body& body, const Vec3& middle, const Vec3& normal, double reach_m) {

@@ -40,8 +40,13 @@ std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& op
 
 DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m);
 
-/// The point of the body's nearest skin.
+/// The point of the body's nearest skin, or the best that could be found on the way to it.
 Vec3 project(const Body& body, Vec3 p);
+
+/// How far p lies outside the body (or in its hollow), 0 within it: exact, by the nearest point of the surface.
+double calc_outside(const Body& body, const Vec3& p);
+/// How far p lies from the nearest skin, outside or inside.
+double calc_off_skin(const Body& body, const Vec3& p);
 
 /// The point of the skin on the line through `middle` along the unit vector `normal`, or of a clean solid the nearest one; nothing if it is
 /// farther than reach_m.

@@ -102,7 +102,7 @@ class Mesh3Body : public DelaunayBody {
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
     if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
     insert_first_points(sizes.edge_m);
-    Watchdog watchdog(5 + 5e-4 * static_cast<double>(sizes.most_nodes));
+    Watchdog watchdog(2 + 5e-4 * static_cast<double>(sizes.most_nodes));
     stop_ = &watchdog.stop;
     CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
                         p::mesh_3_options(p::maximal_number_of_vertices = sizes.most_nodes, p::pointer_to_error_code = &unused,

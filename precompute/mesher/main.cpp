@@ -34,7 +34,7 @@ using Clock = std::chrono::steady_clock;
 struct Order {
   std::string surface, shape, out, json;
   std::map<std::string, double> lengths;  // --wall, --height and the dimensions of shapes, by name without dashes
-  std::optional<double> scale, edge;
+  std::optional<double> scale, edge, close_holes;
   std::optional<long long> nodes;
   std::string up, method;
   int order = 1;
@@ -127,6 +127,7 @@ void check_options(const Order& order) {
     const char* foreign = order.scale             ? "--scale"
                           : !order.up.empty()     ? "--up"
                           : !order.method.empty() ? "--method"
+                          : order.close_holes     ? "--close-holes"
                           : order.facets          ? "--facets"
                           : order.estimate        ? "--estimate"
                                                   : nullptr;
@@ -155,6 +156,7 @@ Result make_from_surface(const Order& order, const mesher::Progress& progress) {
   if (order.lengths.contains("height")) options.height_m = order.lengths.at("height");
   if (!order.up.empty()) options.up = order.up == "x" ? mesher::Axis::kX : order.up == "y" ? mesher::Axis::kY : mesher::Axis::kZ;
   options.scale = order.scale;
+  options.close_holes = order.close_holes;
   options.edge_m = order.edge;
   options.nodes = order.nodes;
   options.order = order.order;
@@ -232,6 +234,10 @@ std::string format_json(const Order& order, const Result& result, const mesh::Ch
         fmt::format("  \"method\": {},\n  \"input_triangles\": {},\n  \"scale\": {:.12g},\n  \"input_volume_m3\": {:.12g},\n",
                     quote(s.method == mesher::Method::kStuffing ? "stuffing" : "delaunay"), s.input_triangles, s.scale, s.input_volume_m3);
     text += fmt::format("  \"facet_pieces\": {},\n", s.facet_pieces);
+    text += fmt::format(
+        "  \"holes_closed\": {},\n  \"largest_hole_m\": {:.9g},\n  \"largest_hole_part\": {:.6g},\n  \"holes_area_part\": {:.6g},\n",
+        s.holes_closed, s.largest_hole_m, s.largest_hole_part, s.holes_area_part);
+    text += fmt::format("  \"shells\": {},\n  \"farthest_outside_m\": {:.9g},\n", s.shells, s.farthest_outside_m);
     text += fmt::format(
         "  \"expected_volume_m3\": {:.12g},\n  \"wall_min_m\": {:.9g},\n  \"wall_mean_m\": {:.9g},\n  \"wall_max_m\": {:.9g},\n",
         s.expected_volume_m3, s.wall_min_m, s.wall_mean_m, s.wall_max_m);
@@ -346,6 +352,10 @@ int run(int argc, char** argv) {
   app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [1]")->check(CLI::IsMember({1, 2}));
   app.add_flag("--straight", order.straight, "Order 2: mid-side nodes in the middle of their edges, not on the true surface");
   app.add_flag("--facets", order.facets, "Surface: its facets are the body; without this a smooth surface through their corners is");
+  app.add_option(
+         "--close-holes", order.close_holes,
+         "Surface: closes holes up to this part of the body's diagonal (a hole counts as the diameter of a circle of its area) [0.15]")
+      ->check(CLI::Range(0.0, 1.0));
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
   app.add_flag("--estimate", order.estimate,
                "Surface: says on standard error, before meshing, volume, area, thickness and about how many nodes there will be");
@@ -383,6 +393,7 @@ int fail(const char* what, int code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  carillon::mesher::guard_program("carillon-mesh");
   try {
     return run(argc, argv);
   } catch (const carillon::InputError& error) {

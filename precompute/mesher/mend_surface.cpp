@@ -1,7 +1,6 @@
 // Method: points at one place are joined; each patch is oriented across its edges; the boundary of the triangles, taken with
 //   their signs, is a set of loops, and each small enough loop is filled. A heap that this does not close is wrapped.
-// Source: the boundary of a chain is a cycle (any text on simplicial homology); winding number at a point: Van Oosterom and
-//   Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, 1983.
+// Source: the boundary of a chain is a cycle (any text on simplicial homology).
 // Deviations: none.
 #include <fmt/core.h>
 
@@ -10,6 +9,7 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <unordered_map>
 
 #include "precompute/mesher/repair.hpp"
@@ -20,10 +20,12 @@
 namespace carillon::mesher {
 namespace {
 
-// A hole is filled if the triangles over it are at most this part of the closed surface; a cube that lacks one of its
-// twelve triangles passes (1/12), one that lacks a side (1/6) does not: that is a vessel, not a body with a hole.
-constexpr double kLargestHole = 0.12;
-constexpr double kLargestHolesTogether = 0.3;
+// A hole counts as the diameter of a circle of the area of the triangles over it, in parts of the body's diagonal: cracks of no width are
+// no holes. Raw scans of the kind of the Stanford bunny leave up to 0.11 open where the object stood; the mouth of a cup is 0.3 and more.
+constexpr double kLargestHole = 0.15;
+constexpr double kLargestHolesTogether = 0.3;  // of the closed surface's area
+// Points closer than this part of the diagonal are one: coordinates in single precision differ by more.
+constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kMostComponentsNested = 2000;
 
 using Edge = std::array<std::int32_t, 2>;
@@ -176,10 +178,34 @@ std::vector<std::vector<std::int32_t>> find_loops(const std::vector<Triangle>& t
   return loops;
 }
 
-/// Fills every loop. False, and nothing changed, if one is too large for a hole or cannot be filled.
-bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops) {
-  const double area = calc_area(surface);
-  double filled = 0;
+/// The holes of a surface: how many, the sum of their areas, and the largest of them.
+struct Holes {
+  std::int64_t count = 0;
+  double area_m2 = 0, surface_m2 = 0;                             // of all of them, and of the surface without them
+  double largest_m2 = 0, largest_across_m = 0, largest_part = 0;  // part: of the diagonal, as kLargestHole
+};
+
+/// The largest distance of two points; of many points, twice that of the farthest from their middle.
+double calc_across(const Polyline& polygon) {
+  constexpr std::size_t kMostCompared = 1000;
+  double farthest = 0;
+  if (polygon.size() <= kMostCompared) {
+    for (const Vec3& p : polygon)
+      for (const Vec3& q : polygon) farthest = std::max(farthest, norm(p - q));
+    return farthest;
+  }
+  Vec3 middle{};
+  for (const Vec3& p : polygon) middle = middle + (1.0 / static_cast<double>(polygon.size())) * p;
+  for (const Vec3& p : polygon) farthest = std::max(farthest, 2 * norm(p - middle));
+  return farthest;
+}
+
+/// Fills every loop. False, and nothing changed, if one is larger than `close_holes` (in parts of the diagonal; without it as far as
+/// kLargestHole and kLargestHolesTogether go).
+bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops, const std::optional<double>& close_holes,
+                Holes& holes) {
+  const double diagonal = calc_box(surface.points).diagonal();
+  holes = {.surface_m2 = calc_area(surface)};
   std::vector<Triangle> fresh;
   for (const auto& loop : loops) {
     Polyline polygon;
@@ -188,25 +214,21 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
     std::vector<Triangle> fill = fill_polygon(polygon);
     if (fill.empty())  // a crack of no width: any triangles between its sides do
       for (std::int32_t c = 1; c + 1 < static_cast<std::int32_t>(loop.size()); ++c) fill.push_back({0, c, c + 1});
-    const double patch_area = calc_area({polygon, fill});
-    filled += patch_area;
-    if (patch_area > kLargestHole * (area + patch_area) || filled > kLargestHolesTogether * (area + filled)) return false;
+    const double area = calc_area({polygon, fill});
+    ++holes.count;
+    holes.area_m2 += area;
+    if (area >= holes.largest_m2) {
+      holes.largest_m2 = area;
+      holes.largest_across_m = calc_across(polygon);
+      holes.largest_part = 2 * std::sqrt(area / std::numbers::pi) / diagonal;
+    }
     for (const Triangle& t : fill)
       fresh.push_back({loop[static_cast<std::size_t>(t[0])], loop[static_cast<std::size_t>(t[1])], loop[static_cast<std::size_t>(t[2])]});
   }
+  if (holes.largest_part > close_holes.value_or(kLargestHole)) return false;
+  if (!close_holes && holes.area_m2 > kLargestHolesTogether * (holes.surface_m2 + holes.area_m2)) return false;
   surface.triangles.insert(surface.triangles.end(), fresh.begin(), fresh.end());
   return true;
-}
-
-/// How often the surface winds around p.
-double calc_winding(const TriangleSurface& surface, const Vec3& p) {
-  double sum = 0;
-  for (const Triangle& t : surface.triangles) {
-    const Vec3 a = surface.points[t[0]] - p, b = surface.points[t[1]] - p, c = surface.points[t[2]] - p;
-    const double la = norm(a), lb = norm(b), lc = norm(c);
-    sum += 2 * std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-  }
-  return sum / (4 * std::numbers::pi);
 }
 
 /// Turns every outermost component outward, and with it, as the file has them to each other, those inside it.
@@ -276,8 +298,9 @@ void weld(TriangleSurface& surface, double tolerance) {
   surface.points = std::move(kept);
 }
 
-/// Closes the surface by joining, orienting and filling. False if that is not enough.
-bool close_surface(TriangleSurface& surface, double tolerance, bool cancel, SurfaceReport& report) {
+/// Closes the surface by joining, orienting and filling. False if that is not enough; `holes` are those it found, if it came so far.
+bool close_surface(TriangleSurface& surface, double tolerance, bool cancel, const std::optional<double>& close_holes, SurfaceReport& report,
+                   Holes& holes) {
   weld(surface, tolerance);
   report.removed_triangles = drop_useless(surface.triangles, cancel);
   if (surface.triangles.empty()) return false;
@@ -288,49 +311,94 @@ bool close_surface(TriangleSurface& surface, double tolerance, bool cancel, Surf
     report.flipped_triangles = orient_patches(surface.triangles);
     loops = find_loops(surface.triangles, whole);
   }
-  if (!whole || !fill_loops(surface, loops)) return false;
-  report.holes_closed = static_cast<std::int64_t>(loops.size());
+  if (!whole || !fill_loops(surface, loops, close_holes, holes)) return false;
+  report.holes_closed = holes.count;
+  report.largest_hole_m = holes.largest_across_m;
+  report.largest_hole_part = holes.largest_part;
+  report.holes_area_part = holes.area_m2 / (holes.surface_m2 + holes.area_m2);
   return find_loops(surface.triangles, whole).empty();
+}
+
+/// "60.0 mm across (0.35 of the body's diagonal, 9.1 % of its surface)".
+std::string describe_hole(double across_m, double part, double area_part) {
+  return fmt::format("{:.3g} mm across ({:.2g} of the body's diagonal, {:.2g} % of its surface)", 1000 * across_m, part, 100 * area_part);
+}
+
+[[noreturn]] void refuse_holes(const SurfaceOptions& options, const Holes& holes) {
+  const double area_part = holes.largest_m2 / (holes.surface_m2 + holes.area_m2);
+  const std::string which = holes.count == 1 ? "a hole is" : fmt::format("{} holes are open, and the largest is", holes.count);
+  const std::string limit = options.close_holes || holes.largest_part > kLargestHole
+                                ? fmt::format("holes up to {:.3g} of the diagonal are closed", options.close_holes.value_or(kLargestHole))
+                                : fmt::format("holes are closed up to {:.0f} % of the surface together, and these are {:.0f} %",
+                                              100 * kLargestHolesTogether, 100 * holes.area_m2 / (holes.surface_m2 + holes.area_m2));
+  throw InputError(fmt::format(
+      "{}: {} {}; a closed surface is needed, and {}: close it in a modeller, give the sheet a thickness, or have it closed with "
+      "--close-holes {:.2g} (of a job's body: \"close_holes\")",
+      options.surface.string(), which, describe_hole(holes.largest_across_m, holes.largest_part, area_part), limit,
+      std::min(1.0, std::ceil(100 * holes.largest_part + 1) / 100)));
 }
 
 }  // namespace
 
-MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path& path, SurfaceReport& report) {
+MendedSurface mend_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report) {
   const double diagonal = calc_box(surface.points).diagonal();
   const auto refuse_open = [&](const std::string& what) {
     throw InputError(fmt::format("{}: {}; a closed surface is needed: close its openings, or give the sheet a thickness, in a modeller",
-                                 path.string(), what));
+                                 options.surface.string(), what));
   };
-  for (const auto& [tolerance, cancel] :
-       {std::pair{0.0, false}, std::pair{0.0, true}, std::pair{1e-6 * diagonal, false}, std::pair{1e-6 * diagonal, true}}) {
+  // What is missing of a body is at most this part of its skin; a sheet lacks half of it.
+  constexpr double kSheet = 0.4;
+  std::optional<Holes> too_large;
+  const double same = kSamePoint * diagonal, near = 1e-6 * diagonal;
+  for (const auto& [tolerance, cancel] : {std::pair{same, false}, std::pair{same, true}, std::pair{near, false}, std::pair{near, true}}) {
     TriangleSurface candidate = surface;
     SurfaceReport attempt = report;
-    if (!close_surface(candidate, tolerance, cancel, attempt)) continue;
+    Holes holes;
+    if (!close_surface(candidate, tolerance, cancel, options.close_holes, attempt, holes)) {
+      if (holes.count > 0 && holes.area_m2 < kSheet * (holes.surface_m2 + holes.area_m2)) too_large = holes;
+      continue;
+    }
     orient_outward(candidate, attempt);
     if (!(calc_volume(candidate) > 1e-9 * diagonal * calc_area(candidate))) continue;
     report = attempt;
+    if (report.holes_closed > 0)
+      report.notes.push_back(fmt::format("{} hole{} closed, {}{}.", report.holes_closed, report.holes_closed == 1 ? " was" : "s were",
+                                         report.holes_closed == 1 ? "" : "the largest ",
+                                         describe_hole(report.largest_hole_m, report.largest_hole_part, report.holes_area_part)));
     return {candidate, 0, is_clean(candidate)};
   }
   // No closed surface in it as it is: wrap it. A wrap that slips inside through an opening is a thin sheet around the
   // triangles, of hardly any volume within its offset; then only a coarser one can help.
-  weld(surface, 0);
+  weld(surface, same);
   report.removed_triangles = drop_useless(surface.triangles, false);
   report.input_vertices = static_cast<std::int64_t>(surface.points.size());
   if (surface.triangles.empty()) refuse_open("all its triangles are degenerate");
   const double area = calc_area(surface);
-  for (const double part : {50.0, 25.0, 12.0}) {
-    const double alpha = diagonal / part, offset = diagonal / 1000;
-    TriangleSurface wrapped = wrap(surface, alpha, offset);
-    const double core = calc_volume(wrapped) - offset * calc_area(wrapped);
-    if (!(core > 3 * offset * area) || calc_area(wrapped) > 1.6 * area) continue;
+  const double offset = diagonal / 1000;
+  const auto wrap_by = [&](double part) { return wrap(surface, diagonal / part, offset); };
+  const auto is_body = [&](const TriangleSurface& wrapped) {
+    return calc_volume(wrapped) - offset * calc_area(wrapped) > 3 * offset * area && calc_area(wrapped) <= 1.6 * area;
+  };
+  // A wrap goes through gaps wider than twice its alpha. Where the coarsest that is allowed slips inside, the others do: they are tried
+  // only if it does not, the finest first.
+  std::vector<double> parts{50, 25, 14};
+  std::erase_if(parts, [&](double part) { return 2 / part > options.close_holes.value_or(kLargestHole); });
+  const TriangleSurface coarsest = parts.empty() ? TriangleSurface{} : wrap_by(parts.back());
+  if (!parts.empty() && !is_body(coarsest)) parts.clear();
+  for (const double part : parts) {
+    const double alpha = diagonal / part;
+    TriangleSurface wrapped = part == parts.back() ? coarsest : wrap_by(part);
+    if (!is_body(wrapped)) continue;
     report.wrapped = true;
     report.notes.push_back(fmt::format(
-        "The surface could not be closed as it is; it was wrapped: gaps narrower than {:.3g} m are bridged and edges are rounded.", alpha));
+        "The surface could not be closed as it is; it was wrapped: gaps narrower than {:.3g} m are bridged and edges are rounded.",
+        2 * alpha));
     SurfaceReport unused;
     orient_outward(wrapped, unused);
     report.components = unused.components;
     return {wrapped, offset, false};
   }
+  if (too_large) refuse_holes(options, *too_large);
   refuse_open("it is an open sheet, not the skin of a body");
   return {};
 }

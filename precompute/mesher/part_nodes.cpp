@@ -62,7 +62,8 @@ struct Place {
 };
 
 /// The place over the fan that gives the best elements.
-Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, const std::function<Vec3(const Vec3&)>& project) {
+Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, const std::function<Vec3(const Vec3&)>& project,
+                 const std::function<bool(const Vec3&)>& is_on_skin) {
   const Vec3 middle = mesh.nodes[v];
   Vec3 normal{}, centre{};
   double length = 0;
@@ -73,10 +74,11 @@ Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, cons
   }
   std::vector<Vec3> places{centre};
   if (norm(normal) > 0)
-    for (const double part : {1.0, 0.7, 0.5, 0.35, 0.25, 0.15}) places.push_back(middle + (part * length / norm(normal)) * normal);
-  for (std::size_t n = places.size(); n-- > 0;) places.push_back(project(places[n]));
+    for (const double part : {1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.08}) places.push_back(middle + (part * length / norm(normal)) * normal);
   Place best;
-  for (const Vec3& x : places) {
+  for (const Vec3& place : places) {
+    const Vec3 x = project(place);
+    if (!is_on_skin(x)) continue;
     double worst = 180;
     for (const auto& [a, b] : fan) worst = std::min(worst, calc_flatness({middle, mesh.nodes[a], mesh.nodes[b], x}));
     if (worst > best.flatness) best = {worst, x};
@@ -86,7 +88,8 @@ Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, cons
 
 }  // namespace
 
-std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, const std::function<Vec3(const Vec3&)>& project) {
+std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, const std::function<Vec3(const Vec3&)>& project,
+                                const std::function<bool(const Vec3&)>& is_on_skin) {
   std::int64_t mended = 0;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const auto pinched = find_pinched(mesh);
@@ -106,7 +109,7 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
       Place best;
       const Fan* over = nullptr;
       for (const Fan& fan : fans) {
-        const Place place = find_place(mesh, v, fan, project);
+        const Place place = find_place(mesh, v, fan, project, is_on_skin);
         if (!(place.flatness > best.flatness)) continue;
         bool free = true;
         for (const auto& face : fan)

@@ -5,9 +5,9 @@
 #include "precompute/mesher/repair.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/shape_predicates.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
@@ -40,6 +40,9 @@ std::vector<std::vector<std::size_t>> make_polygons(const std::vector<Triangle>&
 std::vector<Triangle> fill_polygon(const Polyline& polygon) {
   if (polygon.size() < 3) return {};
   if (polygon.size() == 3) return {{0, 1, 2}};
+  // The time grows with the cube of the corners where the Delaunay triangulation offers no filling.
+  constexpr std::size_t kMostCorners = 1500;
+  if (polygon.size() > kMostCorners) return {};
   struct Face {
     int a, b, c;
     Face(int i, int j, int k) : a(i), b(j), c(k) {}
@@ -62,7 +65,8 @@ bool is_clean(const TriangleSurface& surface) {
   PMP::polygon_soup_to_polygon_mesh(make_points(surface.points), polygons, mesh);
   for (const auto face : faces(mesh))
     if (PMP::is_degenerate_triangle_face(face, mesh)) return false;
-  return CGAL::is_closed(mesh) && !PMP::does_self_intersect(mesh) && PMP::does_bound_a_volume(mesh);
+  // The nesting is looked at by ourselves: CGAL's own test crashes on surfaces of very different lengths.
+  return CGAL::is_closed(mesh) && !PMP::does_self_intersect(mesh) && is_nested(surface);
 }
 
 TriangleSurface wrap(const TriangleSurface& surface, double alpha_m, double offset_m) {

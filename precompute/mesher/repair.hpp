@@ -7,7 +7,8 @@
 
 namespace carillon::mesher {
 
-/// Triangles of least area over a closed polygon, as indices into it, in the polygon's own sense of rotation. Empty if there are none.
+/// Triangles of least area over a closed polygon, as indices into it, in the polygon's own sense of rotation. Empty if there are none
+/// or the polygon has more than 1500 corners.
 std::vector<Triangle> fill_polygon(const Polyline& polygon);
 
 /// True if the surface is a 2-manifold, encloses a volume and no two of its triangles intersect.

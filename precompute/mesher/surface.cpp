@@ -14,6 +14,7 @@
 #include "precompute/mesh/curved.hpp"
 #include "precompute/mesher/body.hpp"
 #include "precompute/mesher/curve_mesh.hpp"
+#include "precompute/mesher/guard.hpp"
 #include "precompute/mesher/part_nodes.hpp"
 #include "precompute/mesher/place_nodes.hpp"
 #include "precompute/mesher/quiet.hpp"
@@ -23,6 +24,7 @@
 #include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
+#include "precompute/mesher/verify.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::mesher {
@@ -40,14 +42,18 @@ constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMostRounded = 100'000;  // triangles
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
+// Processor seconds after which the program gives up (guard_program). The hollow bunny of 37,000 nodes takes 7 s and is given 336 s.
+constexpr double kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
 constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
 /// Tells the user of a phase and keeps its time.
 class Phases {
  public:
-  Phases(SurfaceReport& report, const Progress& progress) : report_(report), progress_(progress) {}
+  Phases(SurfaceReport& report, const Progress& progress, std::string file)
+      : report_(report), progress_(progress), file_(std::move(file)) {}
   template <class Work>
   auto run(const std::string& name, Work&& work) {
+    set_guarded_step(file_, name);
     if (progress_) progress_(name);
     const Clock clock{report_, name};
     return work();
@@ -73,6 +79,7 @@ class Phases {
   };
   SurfaceReport& report_;
   const Progress& progress_;
+  std::string file_;
 };
 
 void check_options(const SurfaceOptions& o) {
@@ -85,6 +92,8 @@ void check_options(const SurfaceOptions& o) {
   positive(o.edge_m, "edge");
   if (o.scale && !(*o.scale > 0 && std::isfinite(*o.scale)))
     throw InputError(fmt::format("scale is {}; it must be a positive number", *o.scale));
+  if (o.close_holes && !(*o.close_holes >= 0 && *o.close_holes <= 1))
+    throw InputError(fmt::format("close_holes is {}; it must be a part of the body's diagonal, from 0 to 1", *o.close_holes));
   if (o.height_m && o.scale) throw InputError("height and scale exclude each other; give one of them");
   if (o.edge_m && o.nodes) throw InputError("edge and nodes exclude each other; give one of them");
   if (o.order != 1 && o.order != 2) throw InputError(fmt::format("order is {}; it must be 1 or 2", o.order));
@@ -125,13 +134,43 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
         "The body is {:.3g} m long. If the file is not in metres, give its height or a scale (0.001 for millimetres).", largest));
 }
 
+/// Scales the surface once more where joining, wrapping or rounding has changed its extent, so that the body itself has the height asked
+/// for. Returns the factor.
+double fit_height(MendedSurface& mended, const SurfaceOptions& options, SurfaceReport& report) {
+  TriangleSurface used;
+  for (const Triangle& t : mended.surface.triangles)
+    for (const std::int32_t v : t) used.points.push_back(mended.surface.points[static_cast<std::size_t>(v)]);
+  const Box box = calc_box(used.points);
+  Vec3 extent = box.extent();
+  for (double& e : extent) e -= 2 * mended.offset_m;
+  double factor = 1;
+  if (options.height_m) {
+    factor = *options.height_m / extent[static_cast<int>(options.up)];
+    // The offset of a wrap and what rounding adds are small; anything else would be no longer the same body.
+    if (!(factor > 0.5 && factor < 2)) factor = 1;
+    for (Vec3& p : mended.surface.points) p = factor * p;
+    mended.offset_m *= factor;
+    report.scale *= factor;
+  }
+  report.extent_m = factor * extent;
+  return factor;
+}
+
 /// Makes the body of a fresh mesh sound: no pinched edges or nodes, no crumbs, no element flatter than need be.
 void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   const auto project_here = [&](const Vec3& p) { return project(body, p); };
   report.removed_tets = make_manifold(mesh, report.components);
-  report.parted_nodes = part_pinched_nodes(mesh, report.components, project_here);
+  const double close = body.field ? 0.25 * body.field->voxel_m : 1e-6 * calc_box(body.mended.surface.points).diagonal();
+  const auto is_on_skin = [&](const Vec3& p) { return calc_off_skin(body, p) <= close; };
+  report.parted_nodes = part_pinched_nodes(mesh, report.components, project_here, is_on_skin);
   better_flat_elements(mesh, kSliverDeg, project_here);
 }
+
+/// The finished mesh is not the body (verify.hpp); what() is the end of a sentence.
+struct WrongMesh : std::runtime_error {
+  WrongMesh(const std::string& what, double edge) : std::runtime_error(what), edge_m(edge) {}
+  double edge_m;
+};
 
 /// Refines until the count is met, and finishes the mesh; again with a corrected target should finishing have changed the count too much.
 mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double& edge_m, SurfaceReport& report, Phases& phases,
@@ -141,16 +180,30 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
       throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
                                    options.surface.string(), edge_m));
   };
+  const double longest = calc_box(body.mended.surface.points).diagonal();
+  // A finished mesh that is not the body is made anew with slightly shorter edges: which elements lie across a thin wall changes then.
+  constexpr double kShorter = 0.97;
+  Comparison comparison;
+  const auto is_the_body = [&](const mesh::TetMesh& mesh) {
+    comparison = phases.run("comparing with the body", [&] {
+      return compare(mesh, body, {.edge_m = edge_m, .volume_m3 = report.expected_volume_m3, .shells = count_shells(body, edge_m)});
+    });
+    report.shells = comparison.shells;
+    report.farthest_outside_m = comparison.farthest_outside_m;
+    return comparison.fault.empty();
+  };
   if (!options.nodes) {
-    ++report.attempts;
-    mesh::TetMesh mesh = phases.run("refining", [&] { return refine(edge_m); });
-    refuse_empty(mesh);
-    finish(mesh);
-    refuse_empty(mesh);
-    return mesh;
+    for (int n = 0; n < kMostFinishes; ++n, edge_m *= kShorter) {
+      ++report.attempts;
+      mesh::TetMesh mesh = phases.run("refining", [&] { return refine(edge_m); });
+      refuse_empty(mesh);
+      finish(mesh);
+      refuse_empty(mesh);
+      if (is_the_body(mesh)) return mesh;
+    }
+    throw WrongMesh(comparison.fault, edge_m);
   }
   const auto asked = static_cast<double>(*options.nodes);
-  const double longest = calc_box(body.mended.surface.points).diagonal();
   double target = asked, nearest = 0;
   for (int n = 0; n < kMostFinishes; ++n) {
     mesh::TetMesh mesh = phases.run("refining", [&] {
@@ -159,11 +212,26 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     });
     finish(mesh);
     const double count = std::max(static_cast<double>(count_nodes(mesh, options.order)), 1.0);
-    if (std::abs(count / asked - 1) <= kCountTolerance) return mesh;
+    const bool met = std::abs(count / asked - 1) <= kCountTolerance;
+    if (met && is_the_body(mesh)) return mesh;
+    if (met) {
+      target = std::min(1.03 * target, asked * (1 + 0.7 * kCountTolerance));
+      edge_m *= kShorter;
+      continue;
+    }
     nearest = count;
     target *= std::clamp(asked / count, 0.7, 1.5);
   }
+  if (!comparison.fault.empty()) throw WrongMesh(comparison.fault, edge_m);
   throw CountError("the count cannot be met", nearest, nearest);
+}
+
+/// What to ask for where a mesh with edges of that length is not the body.
+[[noreturn]] void throw_wrong(const SurfaceOptions& options, const Body& body, const WrongMesh& failure) {
+  const double shorter = failure.edge_m / 1.4;
+  const double nodes = std::max(body.model.calc_nodes(shorter), 1.5 * static_cast<double>(options.nodes.value_or(0)));
+  throw InputError(fmt::format("{}: with edges of {:.3g} m the mesh {}; ask for about {:.2g} nodes, or for edges of {:.2g} m",
+                               options.surface.string(), failure.edge_m, failure.what(), nodes, shorter));
 }
 
 [[noreturn]] void throw_count(const SurfaceOptions& options, const CountError& failure) {
@@ -211,6 +279,8 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
   } catch (const CountError& failure) {
     if (report.sharp_curves == 0) throw_count(options, failure);
     with_sharp = failure;
+  } catch (const WrongMesh&) {
+    throw;
   } catch (const std::exception& failure) {
     if (report.sharp_curves == 0) {
       if (dynamic_cast<const InputError*>(&failure)) throw;
@@ -230,6 +300,9 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
   } catch (const CountError& failure) {
     throw_count(options, with_sharp.value_or(failure));
   } catch (const InputError&) {
+    throw;
+  } catch (const WrongMesh&) {
+    if (with_sharp) throw_count(options, *with_sharp);
     throw;
   } catch (const std::exception& failure) {
     refuse(failure);
@@ -303,6 +376,12 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
                     100 * error));
   if (report.min_dihedral_deg < 8)
     report.notes.push_back(fmt::format("The flattest element has a dihedral angle of {:.1f} degrees.", report.min_dihedral_deg));
+  if (options.height_m) {
+    const int up = static_cast<int>(options.up);
+    if (std::abs(report.mesh_extent_m[up] / *options.height_m - 1) > 0.02)
+      report.notes.push_back(fmt::format("The mesh is {:.4g} m high where {:.4g} m were asked for: its elements are coarse for its shape.",
+                                         report.mesh_extent_m[up], *options.height_m));
+  }
   if (body.wall_m > 0 && options.order == 1 && report.layers_mean < 1.5)
     report.notes.push_back(
         fmt::format("The wall is about {:.1f} linear elements thick and will be too stiff in bending; take more nodes or order 2.",
@@ -334,13 +413,31 @@ void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   body.round = std::move(round);
 }
 
+/// The smooth surface of the height asked for. The patches keep the facets that they were made of, so those are scaled, and rounded again.
+void round_to_height(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
+  const bool is_rounded = !options.facets && !report.wrapped;
+  MendedSurface facets;
+  if (is_rounded && options.height_m) facets = body.mended;
+  if (is_rounded) round(body, options, report);
+  const double factor = fit_height(body.mended, options, report);
+  if (!body.round || factor == 1) return;
+  for (Vec3& p : facets.surface.points) p = factor * p;
+  facets.offset_m *= factor;
+  body.mended = std::move(facets);
+  body.round.reset();
+  round(body, options, report);
+}
+
 mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   Body body;
   TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
   report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
+  const double nodes_asked = static_cast<double>(options.nodes.value_or(30000));
+  std::optional<CpuLimit> cpu_limit(std::in_place,
+                                    kLeastCpu + kCpuPerTriangle * static_cast<double>(raw.triangles.size()) + kCpuPerNode * nodes_asked);
   scale_surface(raw, options, report);
-  body.mended = phases.run("mending", [&] { return mend_surface(std::move(raw), options.surface, report); });
-  if (!options.facets && !report.wrapped) phases.run("rounding", [&] { return round(body, options, report), 0; });
+  body.mended = phases.run("mending", [&] { return mend_surface(std::move(raw), options, report); });
+  phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
   body.wall_m = options.wall_m.value_or(0);
   const TriangleSurface& surface = body.mended.surface;
   report.input_area_m2 = calc_area(surface);
@@ -364,6 +461,11 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
                                  options.surface.string(), edge, nodes, kMostNodes));
   const double least = body.model.calc_nodes(kEdgePerThickness * body.thickness_m);
+  if (!options.nodes && std::max(body.model.calc_nodes(edge), least) > nodes_asked) {
+    cpu_limit.reset();
+    cpu_limit.emplace(kLeastCpu + kCpuPerTriangle * static_cast<double>(report.input_triangles) +
+                      kCpuPerNode * std::max(body.model.calc_nodes(edge), least));
+  }
   if (!options.nodes && least > 1.5 * kMostNodes) throw_count(options, CountError("", least, least));
   if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * least)
     throw_count(options, CountError("", least, least));
@@ -396,6 +498,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   mesh::TetMesh linear;
   try {
     linear = report.method == Method::kStuffing ? stuff_body() : make_delaunay_mesh(body, options, edge, report, phases);
+  } catch (const WrongMesh& failure) {
+    throw_wrong(options, body, failure);
   } catch (const DelaunayError&) {
     if (options.method != Method::kAutomatic || !body.field) throw;
     report.notes.push_back(
@@ -405,22 +509,23 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     report.sharp_edges_m = 0;
     body.curves.clear();
     edge = body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : body.model.calc_nodes(edge));
-    linear = stuff_body();
+    try {
+      linear = stuff_body();
+    } catch (const WrongMesh& failure) {
+      throw_wrong(options, body, failure);
+    }
   }
   if (report.removed_tets > 0)
     report.notes.push_back(fmt::format("{} elements were removed where the body only touched itself or was cut off.", report.removed_tets));
   if (report.parted_nodes > 0)
     report.notes.push_back(fmt::format("The mesh was mended at {} nodes where both skins of a thin part met.", report.parted_nodes));
   measure_mesh(linear, body, report);
-  if (!(report.volume_m3 > 0.6 * report.expected_volume_m3))
-    throw InputError(
-        fmt::format("{}: with edges of {:.3g} m only {:.0f} % of the body's volume can be meshed; ask for shorter edges or more nodes",
-                    options.surface.string(), edge, 100 * report.volume_m3 / report.expected_volume_m3));
   report.edge_m = edge;
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
   if (options.order == 2 && !options.straight) phases.run("curving", [&] { return curve(out, body, report), 0; });
   if (body.round || options.order == 2) phases.run("placing nodes", [&] { return place_nodes(out, body, options, report), 0; });
   report.nodes = static_cast<std::int64_t>(out.nodes.size());
+  report.mesh_extent_m = calc_box(out.nodes).extent();
   add_notes(options, body, report);
   return out;
 }
@@ -430,7 +535,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
 mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report, const Progress& progress) {
   report = SurfaceReport{};
   check_options(options);
-  Phases phases(report, progress);
+  Phases phases(report, progress, options.surface.string());
   const Quiet quiet;
   try {
     return make_mesh(options, report, phases);

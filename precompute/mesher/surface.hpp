@@ -38,6 +38,7 @@ struct SurfaceOptions {
   std::optional<double> edge_m = std::nullopt;       // length of the tetrahedra's edges
   std::optional<std::int64_t> nodes = std::nullopt;  // nodes of the final mesh (order 2: with the mid-side ones), met within 10 %
   int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten
+  std::optional<double> close_holes = std::nullopt;  // largest hole that is closed, as a part of the body's diagonal; 0.15 without it
   bool facets = false;                               // the facets are the body, not samples of a smooth surface
   bool straight = false;                             // order 2: all mid-side nodes in the middle, none on the true surface
   double sharp_angle_deg = 40;                       // an edge whose two faces turn by more than this, and not by noise, stays sharp
@@ -52,6 +53,8 @@ struct SurfaceReport {
   std::int64_t removed_triangles = 0;  // duplicate or degenerate ones
   std::int64_t flipped_triangles = 0;  // turned so that all of them face outward
   std::int64_t holes_closed = 0;       // boundary loops filled with triangles
+  double largest_hole_m = 0;           // across; as a part of the body's diagonal (the diameter of a circle of its area); and the area
+  double largest_hole_part = 0, holes_area_part = 0;  // of all holes over that of the closed surface
   int facet_pieces = 1;                // into how many each facet's sides were cut to follow the smooth surface through its corners
   double doubt_m = 0;                  // how far apart the facets and the smooth surface are where it cannot be told which is the body
   bool wrapped = false;                // the surface could not be mended: its alpha wrap was meshed
@@ -83,6 +86,10 @@ struct SurfaceReport {
   double wall_min_m = 0, wall_mean_m = 0, wall_max_m = 0;  // distance of the inner skin's nodes to the input surface
   double layers_mean = 0;                                  // wall over mean edge length: about how many elements lie through the wall
 
+  std::array<double, 3> mesh_extent_m{};  // of the mesh
+  std::int64_t shells = 0;                // closed surfaces that the mesh's boundary consists of
+  double farthest_outside_m = 0;          // a node's distance from the body
+
   std::vector<std::pair<std::string, double>> seconds;  // per phase, in the order they ran
   std::vector<std::string> notes;                       // sentences for the user: what was mended, what fell short
 };
@@ -92,9 +99,16 @@ using Progress = std::function<void(std::string_view)>;
 
 /// Meshes a surface. The tetrahedra are positively oriented, every node is used, the boundary is a closed 2-manifold
 /// (every boundary edge has two boundary faces), and the same input gives the same mesh. Regions are all 0.
-/// Throws InputError, with the file and the mend, if the file cannot be read as a surface, if it encloses nothing, if the
-/// wall is thicker than the body or the target count cannot be met; SystemError if memory runs out.
+/// The mesh is compared with the body before it is returned (verify.hpp): its volume, its shells, how far its nodes lie outside.
+/// Throws InputError, with the file and what to change, if the file cannot be read as a surface, if it encloses nothing or has too large a
+/// hole, if the wall is thicker than the body, if the target count cannot be met or only by a mesh that is not the body; SystemError if
+/// memory runs out.
 mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report, const Progress& progress = {});
+
+/// For a program that meshes files of strangers: from now on a crash inside CGAL, or a mesh_surface that takes far more processor time than
+/// its size explains (12 s, and 2 ms a triangle, and 5 ms a node), ends the process with exit code kExitInput and one line that begins with
+/// `program` and says at which step. Not under sanitizers, which report crashes themselves.
+void guard_program(const char* program);
 
 /// The report as lines for a person.
 std::string describe(const SurfaceReport& report);

@@ -1,9 +1,12 @@
 // Measures of a triangle surface.
+// Source: winding number at a point: Van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, 1983.
 #include "precompute/mesher/triangle_surface.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <numeric>
 
 namespace carillon::mesher {
 
@@ -34,6 +37,71 @@ double calc_area(const TriangleSurface& surface) {
   for (const Triangle& t : surface.triangles)
     sum += norm(cross(surface.points[t[1]] - surface.points[t[0]], surface.points[t[2]] - surface.points[t[0]]));
   return sum / 2;
+}
+
+double calc_winding(const TriangleSurface& surface, const Vec3& p) {
+  double sum = 0;
+  for (const Triangle& t : surface.triangles) {
+    const Vec3 a = surface.points[t[0]] - p, b = surface.points[t[1]] - p, c = surface.points[t[2]] - p;
+    const double la = norm(a), lb = norm(b), lc = norm(c);
+    sum += 2 * std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  }
+  return sum / (4 * std::numbers::pi);
+}
+
+std::vector<TriangleSurface> split_parts(const TriangleSurface& surface, std::vector<std::int32_t>* part_of) {
+  std::vector<std::int32_t> root(surface.points.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](std::int32_t v) {
+    while (root[v] != v) v = root[v] = root[root[v]];
+    return v;
+  };
+  for (const Triangle& t : surface.triangles)
+    for (int c = 1; c < 3; ++c) {
+      const std::int32_t a = find(t[0]), b = find(t[c]);
+      root[std::max(a, b)] = std::min(a, b);
+    }
+  std::vector<TriangleSurface> parts;
+  std::vector<std::int32_t> part(surface.points.size(), -1), number(surface.points.size(), -1);
+  if (part_of) part_of->clear();
+  for (const Triangle& t : surface.triangles) {
+    std::int32_t& own = part[find(t[0])];
+    if (own < 0) {
+      own = static_cast<std::int32_t>(parts.size());
+      parts.emplace_back();
+    }
+    TriangleSurface& to = parts[own];
+    Triangle copy{};
+    for (int c = 0; c < 3; ++c) {
+      std::int32_t& n = number[t[c]];
+      if (n < 0) {
+        n = static_cast<std::int32_t>(to.points.size());
+        to.points.push_back(surface.points[t[c]]);
+      }
+      copy[c] = n;
+    }
+    to.triangles.push_back(copy);
+    if (part_of) part_of->push_back(own);
+  }
+  return parts;
+}
+
+bool is_nested(const TriangleSurface& surface) {
+  const auto parts = split_parts(surface);
+  std::vector<Box> boxes;
+  for (const auto& part : parts) boxes.push_back(calc_box(part.points));
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const Vec3& at = parts[p].points.front();
+    double around = 0;
+    for (std::size_t q = 0; q < parts.size(); ++q) {
+      bool in_box = q != p;
+      for (int c = 0; c < 3; ++c) in_box = in_box && at[c] >= boxes[q].low[c] && at[c] <= boxes[q].high[c];
+      if (in_box) around += calc_winding(parts[q], at);
+    }
+    const bool outward = calc_volume(parts[p]) > 0;
+    if (std::abs(around - (outward ? 0 : 1)) > 0.01) return false;
+  }
+  return true;
 }
 
 }  // namespace carillon::mesher

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "precompute/mesh/tet_mesh.hpp"
@@ -11,6 +13,7 @@
 namespace carillon::mesher {
 
 struct SurfaceReport;  // of surface.hpp, which the slow CGAL files need not see
+struct SurfaceOptions;
 
 using mesh::Vec3;
 using Triangle = std::array<std::int32_t, 3>;
@@ -42,20 +45,34 @@ Box calc_box(const std::vector<Vec3>& points);
 double calc_volume(const TriangleSurface& surface);
 double calc_area(const TriangleSurface& surface);
 
+/// How often the surface winds around p: 1 inside a closed surface that faces outward, 0 outside.
+double calc_winding(const TriangleSurface& surface, const Vec3& p);
+
+/// The parts of a surface that hang together by corners, each with its own points. part_of (if given): the part of each triangle.
+std::vector<TriangleSurface> split_parts(const TriangleSurface& surface, std::vector<std::int32_t>* part_of = nullptr);
+
+/// True if the parts of a closed surface that does not intersect itself lie in each other so that it encloses a body: those that face
+/// outward in the open, those that face inward in one of them, and so on.
+bool is_nested(const TriangleSurface& surface);
+
 /// Reads OBJ, STL, PLY or OFF, chosen by the ending of the name. Polygons become triangles, points at one place become one.
 /// Throws InputError if there is no such file, no such format, no triangle, or a coordinate that is no finite number.
 TriangleSurface read_surface(const std::filesystem::path& path);
+/// The same of the bytes of such a file; `name` stands in messages, `format` is obj, stl, ply or off. Safe with any bytes.
+TriangleSurface parse_surface(std::string_view bytes, const std::string& name, const std::string& format);
 
-/// Makes a closed, consistently outward oriented surface of any heap of triangles: drops duplicate and degenerate
-/// triangles, orients, fills holes; where that does not lead to a closed manifold, wraps it (CGAL alpha wrap).
+/// Makes a closed, consistently outward oriented surface of any heap of triangles: joins points closer than 1e-9 of its size, drops
+/// duplicate and degenerate triangles, orients, fills holes up to the size that options.close_holes allows; where that does not lead to a
+/// closed manifold, wraps it (CGAL alpha wrap).
 /// `offset_m` is how far the returned surface lies outside the true one: 0 unless it was wrapped; the distance field adds it.
-/// `clean` is true if no two triangles of it intersect. Throws InputError (naming `path`) if it encloses nothing.
+/// `clean` is true if no two triangles of it intersect. Throws InputError if it encloses nothing or
+/// has too large a hole.
 struct MendedSurface {
   TriangleSurface surface;
   double offset_m = 0;
   bool clean = false;
 };
-MendedSurface mend_surface(TriangleSurface surface, const std::filesystem::path& path, SurfaceReport& report);
+MendedSurface mend_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report);
 
 /// The sharp edges of a mended surface, joined to curves. An edge is sharp if its two faces turn by more than
 /// `sharp_angle_deg`, also when its sides are averaged over `radius`; curves shorter than `shortest_m` are left out

@@ -9,6 +9,7 @@
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesher/surface.hpp"
+#include "runtime/config/error.hpp"
 #include "tests/mesher/surfaces.hpp"
 
 namespace carillon::mesher {
@@ -175,6 +176,86 @@ TEST(bodies, coarse_hollow_sphere_is_mended_where_its_skins_meet) {
   expect_sound(m);
   expect_count(m, 2000);
   EXPECT_NEAR(calc_volume_of(m) / report.expected_volume_m3, 1, 0.03);
+}
+
+/// Pairs of boundary components by a flood over shared nodes; independent of the mesher's own count.
+int count_shells_of(const mesh::TetMesh& m) {
+  std::map<std::array<std::int32_t, 3>, int> faces;
+  for (std::int64_t e = 0; e < m.tet_count(); ++e)
+    for (int skip = 0; skip < 4; ++skip) {
+      std::array<std::int32_t, 3> f{};
+      for (int c = 0, n = 0; c < 4; ++c)
+        if (c != skip) f[n++] = m.tet(e)[c];
+      std::sort(f.begin(), f.end());
+      ++faces[f];
+    }
+  std::map<std::int32_t, std::set<std::int32_t>> next;
+  for (const auto& [f, count] : faces)
+    if (count == 1)
+      for (int c = 0; c < 3; ++c) next[f[c]].insert(f[(c + 1) % 3]), next[f[c]].insert(f[(c + 2) % 3]);
+  int shells = 0;
+  for (std::set<std::int32_t> left =
+           [&] {
+             std::set<std::int32_t> all;
+             for (const auto& [v, around] : next) all.insert(v);
+             return all;
+           }();
+       !left.empty(); ++shells) {
+    std::vector<std::int32_t> stack{*left.begin()};
+    left.erase(left.begin());
+    while (!stack.empty()) {
+      const std::int32_t v = stack.back();
+      stack.pop_back();
+      for (const std::int32_t w : next[v])
+        if (left.erase(w)) stack.push_back(w);
+    }
+  }
+  return shells;
+}
+
+TEST(bodies, coarse_walls_are_the_body_or_are_refused) {
+  // Elements longer than the wall is thick. No node may lie outside or in the hollow, both skins must be there, and what cannot be had is
+  // refused with what to ask for.
+  const double pi = std::numbers::pi;
+  int made = 0;
+  for (const double wall : {0.003, 0.002})
+    for (const int levels : {3, 5})
+      for (const std::int64_t nodes : {2500, 4000, 5000}) {
+        if (wall < 0.003 && nodes > 4000) continue;  // takes long
+        SCOPED_TRACE(std::to_string(wall) + " m, " + std::to_string(levels) + " levels, " + std::to_string(nodes) + " nodes");
+        SurfaceReport report;
+        mesh::TetMesh m;
+        try {
+          m = mesh_surface({.surface = write_text("walls.off", to_off(make_sphere(0.05, levels))), .wall_m = wall, .nodes = nodes}, report);
+        } catch (const InputError& error) {
+          EXPECT_NE(std::string(error.what()).find("ask for"), std::string::npos) << error.what();
+          continue;
+        }
+        ++made;
+        expect_sound(m);
+        for (const auto& p : m.nodes) {
+          const double r = std::hypot(p[0], p[1], p[2]);
+          EXPECT_GT(r, 0.05 - wall - 2e-4);
+          EXPECT_LT(r, 0.05 + 1e-4);
+        }
+        EXPECT_NEAR(calc_volume_of(m) / (4 * pi / 3 * (std::pow(0.05, 3) - std::pow(0.05 - wall, 3))), 1, 0.03);
+        EXPECT_EQ(count_shells_of(m), 2);
+        EXPECT_EQ(report.shells, 2);
+      }
+  EXPECT_GE(made, 4);
+}
+
+TEST(bodies, coarse_round_solids_pass_the_comparison_with_the_body) {
+  for (const auto& [name, surface] :
+       {std::pair{"coarse_ball.off", make_sphere(0.05, 4)}, std::pair{"coarse_ring.off", make_torus(0.05, 0.02, 24, 12)}})
+    for (const std::int64_t nodes : {200, 500})
+      for (const Method method : {Method::kDelaunay, Method::kStuffing}) {
+        SCOPED_TRACE(std::string(name) + " " + std::to_string(nodes) + (method == Method::kStuffing ? " stuffing" : ""));
+        SurfaceReport report;
+        const auto m = mesh_surface({.surface = write_text(name, to_off(surface)), .nodes = nodes, .method = method}, report);
+        expect_sound(m);
+        EXPECT_EQ(report.shells, 1);
+      }
 }
 
 TEST(bodies, small_and_slender_targets_are_met) {

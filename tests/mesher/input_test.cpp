@@ -45,13 +45,70 @@ TEST(input, height_is_measured_along_the_chosen_axis_and_scale_multiplies) {
   EXPECT_NEAR(report.extent_m[2], 0.004, 1e-12);
 }
 
-TEST(input, a_hole_is_closed_and_said_so) {
-  Polygons box = make_box(1, 1, 1);
-  box.faces.pop_back();
+/// A sphere without the triangles whose middle is above z.
+Polygons cut_sphere(double radius, int levels, double z) {
+  Polygons sphere = make_sphere(radius, levels);
+  std::erase_if(sphere.faces, [&](const auto& f) {
+    double sum = 0;
+    for (const int v : f) sum += sphere.points[v][2];
+    return sum / 3 > z;
+  });
+  return sphere;
+}
+
+TEST(input, a_small_hole_is_closed_and_said_with_its_size) {
+  // A cap whose rim has a radius of about 12 mm, in a ball of 100 mm.
   SurfaceReport report;
-  mesh_surface({.surface = write_text("hole.off", to_off(box)), .nodes = 500}, report);
+  mesh_surface({.surface = write_text("hole.off", to_off(cut_sphere(0.05, 5, 0.0485))), .nodes = 1000}, report);
   EXPECT_EQ(report.holes_closed, 1);
+  EXPECT_NEAR(report.largest_hole_m, 0.0243, 0.003);
+  EXPECT_NEAR(report.largest_hole_part, 0.0243 / 0.172, 0.02);
+  EXPECT_NEAR(report.holes_area_part, 0.0152, 0.004);
+  ASSERT_FALSE(report.notes.empty());
+  EXPECT_NE(report.notes[0].find("1 hole was closed, 2"), std::string::npos) << report.notes[0];
+}
+
+TEST(input, a_large_hole_is_refused_unless_told_to_close_it) {
+  // A rim of 60 mm in a ball of 100 mm.
+  const auto path = write_text("large_hole.off", to_off(cut_sphere(0.05, 5, 0.04)));
+  SurfaceReport report;
+  try {
+    mesh_surface({.surface = path, .nodes = 1000}, report);
+    ADD_FAILURE() << "was meshed";
+  } catch (const InputError& error) {
+    const std::string said = error.what();
+    for (const char* words : {"a hole is 6", "mm across", "9.", "--close-holes 0.3", "close_holes", "a closed surface is needed"})
+      EXPECT_NE(said.find(words), std::string::npos) << words << ": " << said;
+  }
+  mesh_surface({.surface = path, .nodes = 1000, .close_holes = 0.4}, report);
+  EXPECT_EQ(report.holes_closed, 1);
+  EXPECT_NEAR(report.largest_hole_m, 0.06, 0.003);
+  // The ball without its cap of 10 mm.
+  const double cap = std::acos(-1.0) * 0.01 * 0.01 * (3 * 0.05 - 0.01) / 3;
+  EXPECT_NEAR(report.volume_m3, 4 * std::acos(-1.0) / 3 * 1.25e-4 - cap, 0.02 * 5.2e-4);
+  // None at all: the small one is refused then too. And a box without a side gets a lid.
+  EXPECT_THROW(
+      mesh_surface({.surface = write_text("none.off", to_off(cut_sphere(0.05, 5, 0.0485))), .nodes = 1000, .close_holes = 0.0}, report),
+      InputError);
+  Polygons box = make_box(1, 1, 1);
+  box.faces.resize(10);
+  mesh_surface({.surface = write_text("lid.off", to_off(box)), .nodes = 500, .close_holes = 1.0}, report);
   EXPECT_NEAR(report.volume_m3, 1, 1e-3);
+}
+
+TEST(input, the_body_as_meshed_has_the_height_asked_for) {
+  // A coarse torus: the smooth surface through its corners bulges beyond them. On its side its height is that of the outer circle.
+  const auto torus = write_text("tall_torus.off", to_off(make_torus(0.05, 0.015, 12, 8)));
+  for (const auto& [axis, wall] : {std::pair{Axis::kX, 0.0}, std::pair{Axis::kZ, 0.0}, std::pair{Axis::kY, 0.006}}) {
+    SurfaceReport report;
+    SurfaceOptions options{.surface = torus, .height_m = 0.15, .up = axis, .nodes = 9000, .order = 2};
+    if (wall > 0) options.wall_m = wall;
+    const auto m = mesh_surface(options, report);
+    double low = 1e9, high = -1e9;
+    for (const auto& p : m.nodes) low = std::min(low, p[static_cast<int>(axis)]), high = std::max(high, p[static_cast<int>(axis)]);
+    EXPECT_NEAR(high - low, 0.15, 0.0015);
+    EXPECT_NEAR(report.extent_m[static_cast<int>(axis)], 0.15, 1e-9);
+  }
 }
 
 TEST(input, mixed_orientation_duplicate_and_degenerate_triangles_are_mended) {
@@ -202,8 +259,8 @@ TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
       {"points.off", "OFF\n1 0 0\n0 0 0\n", plain, "no triangles in it"},
       {"huge.off", "OFF\n900000000000 12 0\n0 0 0\n", plain, "the header promises 900000000000 vertices"},
       {"huge.ply", "ply\nformat ascii 1.0\nelement vertex 99999999\nproperty float x\nend_header\n", plain,
-       "the header promises 99999999 vertex"},
-      {"no.ply", "plop\n", plain, "line 1 is not 'ply'"},
+       "huge.ply:3: the header promises 99999999 'vertex'"},
+      {"no.ply", "plop\n", plain, "no.ply:1: line 1 is not 'ply'"},
       {"cut.stl", to_binary_stl(make_box(1, 1, 1)).substr(0, 300), plain, "the header promises 12 triangles"},
       {"index.off", bad_index, plain, "index.off"},
       {"large.off", with_nan, plain, "must be a finite number"},
@@ -218,12 +275,12 @@ TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
       {"long.off", box, surface([](auto& o) { o.nodes.reset(), o.edge_m = 5; }), "longer than the body"},
       {"short.off", box, surface([](auto& o) { o.nodes.reset(), o.edge_m = 1e-5; }), "ask for longer ones"},
       {"order.off", box, surface([](auto& o) { o.order = 3; }), "order is 3"},
-      {"nan.off", replaced(box, "\n1 0 0", "\nnan 0 0"), plain, "line 4: the coordinate 'nan' must be a finite number"},
-      {"nan.obj", replaced(to_obj(cube), "v 1 0 0", "v nan 0 0"), plain, "line 4: the coordinate 'nan'"},
+      {"nan.off", replaced(box, "\n1 0 0", "\nnan 0 0"), plain, "nan.off:4: the coordinate 'nan' must be a finite number"},
+      {"nan.obj", replaced(to_obj(cube), "v 1 0 0", "v nan 0 0"), plain, "nan.obj:4: the coordinate 'nan'"},
       {"word.obj", replaced(to_obj(cube), "v 1 0 0", "v one 0 0"), plain, "the coordinate 'one'"},
-      {"nan.ply", replaced(to_ply(cube), "\n1 0 0", "\ninf 0 0"), plain, "line 11: the coordinate 'inf'"},
+      {"nan.ply", replaced(to_ply(cube), "\n1 0 0", "\ninf 0 0"), plain, "nan.ply:11: the coordinate 'inf'"},
       {"nan.stl", replaced(to_stl(cube), "vertex 1 ", "vertex nan "), plain, "the coordinate 'nan'"},
-      {"beyond.obj", to_obj(cube) + "f 1 2 99\n", plain, "line 23: the face names vertex 99, but there are only 8"},
+      {"beyond.obj", to_obj(cube) + "f 1 2 99\n", plain, "beyond.obj:23: the face names vertex 99, but there are only 8"},
       {"huge_index.obj", to_obj(cube) + "f 1 2 99999999999999999999\n", plain, "names the vertex '99999999999999999999'"},
       {"zeroth.obj", to_obj(cube) + "f 0 1 2\n", plain, "names the vertex '0'"},
       {"negative.ply", replaced(to_ply(cube), "3 0 2 3", "3 0 2 -3"), plain, "names the vertex '-3'"},

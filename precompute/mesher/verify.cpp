@@ -1,0 +1,185 @@
+// Method: the volume by tetrahedra against the one by the divergence theorem or the distance field; distances of the boundary's nodes by
+// the
+//   exact nearest point; the mesh's shells by walking its boundary. The body's shells: of a clean solid the parts of its surface; otherwise
+//   the parts of the body and of the space around it, found in the distance field by rows of samples, are one more than the surfaces
+//   between them (in space, each closed surface parts one region in two).
+// Source: our own; the last is the tree of regions that nested surfaces make (Alexander duality).
+// Deviations: none.
+#include "precompute/mesher/verify.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "precompute/mesher/tet_quality.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+// Parts thinner than this many edges, or shorter than the second, may be lost in elements of that size.
+constexpr double kLeastThickness = 1.0, kLeastLength = 3;
+
+/// A region of the field: where the body is, or where it is not.
+struct Region {
+  double samples = 0, faces = 0;  // faces: of samples against the other kind
+  std::array<std::int32_t, 3> low{INT32_MAX, INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN, INT32_MIN};
+};
+
+/// A run of samples of one kind along x.
+struct Run {
+  std::int32_t first = 0, last = 0;
+  bool inside = false;
+};
+
+/// The regions of the field that hang together by faces of samples; with `by_corners` by their edges and corners too.
+std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool by_corners) {
+  const auto rows = static_cast<std::size_t>(field.size[1]) * static_cast<std::size_t>(field.size[2]);
+  std::vector<std::size_t> start(rows + 1, 0);
+  std::vector<Run> runs;
+  for (std::size_t row = 0; row < rows; ++row) {
+    start[row] = runs.size();
+    const float* s = field.samples.data() + row * static_cast<std::size_t>(field.size[0]);
+    for (std::int32_t i = 0; i < field.size[0]; ++i) {
+      const bool inside = s[i] < 0 && (wall_m <= 0 || s[i] > -wall_m);
+      if (i == 0 || runs.back().inside != inside) runs.push_back({i, i, inside});
+      runs.back().last = i;
+    }
+  }
+  start[rows] = runs.size();
+  std::vector<std::int32_t> root(runs.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](std::int32_t r) {
+    while (root[r] != r) r = root[r] = root[root[r]];
+    return r;
+  };
+  std::vector<double> faces(runs.size(), 0);
+  const std::int32_t reach = by_corners ? 1 : 0;
+  const auto join = [&](std::size_t a, std::size_t b) {
+    const std::int32_t x = find(static_cast<std::int32_t>(a)), y = find(static_cast<std::int32_t>(b));
+    root[std::max(x, y)] = std::min(x, y);
+  };
+  // Runs of two rows side by side (or, if `across`, only diagonally).
+  const auto join_rows = [&](std::size_t one, std::size_t other, bool across) {
+    std::size_t a = start[one], b = start[other];
+    while (a < start[one + 1] && b < start[other + 1]) {
+      const std::int32_t first = std::max(runs[a].first, runs[b].first), last = std::min(runs[a].last, runs[b].last);
+      if (first <= last && runs[a].inside != runs[b].inside && !across) {
+        faces[a] += last - first + 1;
+        faces[b] += last - first + 1;
+      } else if (first <= last && runs[a].inside == runs[b].inside) {
+        join(a, b);
+      }
+      // The next run of either row may touch this one of the other by a corner.
+      if (reach > 0 && b + 1 < start[other + 1] && runs[b].last == last && runs[b + 1].inside == runs[a].inside) join(a, b + 1);
+      if (reach > 0 && a + 1 < start[one + 1] && runs[a].last == last && runs[a + 1].inside == runs[b].inside) join(a + 1, b);
+      runs[a].last < runs[b].last ? ++a : ++b;
+    }
+  };
+  for (std::size_t row = 0; row < rows; ++row) {
+    const auto ny = static_cast<std::size_t>(field.size[1]);
+    if (row % ny + 1 < ny) join_rows(row, row + 1, false);
+    if (row + ny < rows) join_rows(row, row + ny, false);
+    if (by_corners && row % ny + 1 < ny && row + ny + 1 < rows) join_rows(row, row + ny + 1, true);
+    if (by_corners && row % ny > 0 && row + ny < rows) join_rows(row, row + ny - 1, true);
+    for (std::size_t r = start[row]; r + 1 < start[row + 1]; ++r) ++faces[r], ++faces[r + 1];
+  }
+  std::vector<std::int32_t> number(runs.size(), -1);
+  std::vector<Region> regions;
+  for (std::size_t row = 0; row < rows; ++row)
+    for (std::size_t r = start[row]; r < start[row + 1]; ++r) {
+      std::int32_t& n = number[find(static_cast<std::int32_t>(r))];
+      if (n < 0) {
+        n = static_cast<std::int32_t>(regions.size());
+        regions.emplace_back();
+      }
+      Region& region = regions[n];
+      region.samples += runs[r].last - runs[r].first + 1;
+      region.faces += faces[r];
+      const std::array<std::int32_t, 3> low{runs[r].first, static_cast<std::int32_t>(row) % field.size[1],
+                                            static_cast<std::int32_t>(row) / field.size[1]};
+      for (int c = 0; c < 3; ++c) {
+        region.low[c] = std::min(region.low[c], low[c]);
+        region.high[c] = std::max(region.high[c], c == 0 ? runs[r].last : low[c]);
+      }
+    }
+  return regions;
+}
+
+/// Of boundary faces, the sets that hang together by edges.
+std::int64_t count_parts(const std::vector<Triangle>& boundary, std::size_t nodes) {
+  TriangleSurface skin;
+  skin.points.resize(nodes);
+  skin.triangles = boundary;
+  return static_cast<std::int64_t>(split_parts(skin).size());
+}
+
+}  // namespace
+
+Shells count_shells(const Body& body, double edge_m) {
+  Shells shells;
+  if (!body.field) {
+    for (const TriangleSurface& part : split_parts(body.mended.surface)) {
+      const double thickness = 2 * std::abs(calc_volume(part)) / calc_area(part);
+      ++shells.most;
+      shells.least += thickness >= kLeastThickness * edge_m && calc_box(part.points).diagonal() >= kLeastLength * edge_m;
+    }
+  } else {
+    const double voxel = body.field->voxel_m;
+    // Parts that touch may come out joined or apart.
+    shells.most = static_cast<std::int64_t>(find_regions(*body.field, body.wall_m, false).size());
+    const auto regions = find_regions(*body.field, body.wall_m, true);
+    for (const Region& region : regions) {
+      // A surface of samples' faces has about one and a half times the area of the smooth one.
+      const double thickness = 2 * region.samples * voxel / std::max(region.faces / 1.5, 1.0);
+      double diagonal = 0;
+      for (int c = 0; c < 3; ++c) diagonal = std::hypot(diagonal, voxel * (region.high[c] - region.low[c] + 1));
+      const bool is_space = &region == regions.data();  // the field begins outside the body
+      shells.least += is_space || (thickness >= std::min(kLeastThickness * edge_m, body.wall_m > 0 ? 0.6 * body.wall_m : edge_m) &&
+                                   diagonal >= kLeastLength * edge_m);
+    }
+    --shells.most;
+    --shells.least;
+  }
+  shells.least = std::max<std::int64_t>(shells.least, 1);
+  shells.most = std::max(shells.most, shells.least);
+  return shells;
+}
+
+Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectation& expectation) {
+  Comparison result;
+  const double edge = expectation.edge_m;
+  result.volume_m3 = measure(linear).volume_m3;
+  const auto boundary = find_boundary(linear);
+  result.shells = count_parts(boundary, linear.nodes.size());
+  std::vector<char> seen(linear.nodes.size(), 0);
+  std::int64_t outside = 0;
+  const double most_outside = 0.1 * edge + (body.field ? 0.5 * body.field->voxel_m : 0);
+  for (const Triangle& t : boundary)
+    for (const std::int32_t v : t) {
+      if (seen[v]++) continue;
+      const double way = calc_outside(body, linear.nodes[v]);
+      result.farthest_outside_m = std::max(result.farthest_outside_m, way);
+      outside += way > most_outside;
+    }
+
+  const double part =
+      0.1 * edge * (body.wall_m > 0 ? calc_area(body.mended.surface) / 3 : calc_area(body.mended.surface)) / expectation.volume_m3;
+  const double most_off = (body.wall_m > 0 ? 0.08 : 0.03) + part;
+  const double off = result.volume_m3 / expectation.volume_m3 - 1;
+  if (!(std::abs(off) <= most_off))
+    result.fault = fmt::format("has {:+.1f} % of the body's volume too {}, where {:.1f} % are the most that its facets explain",
+                               100 * std::abs(off), off > 0 ? "much" : "little", 100 * most_off);
+  else if (outside > 0)
+    result.fault = fmt::format("has {} node{} outside the body, by up to {:.3g} mm", outside, outside == 1 ? "" : "s",
+                               1000 * result.farthest_outside_m);
+  else if (result.shells < expectation.shells.least || result.shells > expectation.shells.most)
+    result.fault = fmt::format("has {} closed surface{} where the body has {}", result.shells, result.shells == 1 ? "" : "s",
+                               expectation.shells.least == expectation.shells.most
+                                   ? fmt::format("{}", expectation.shells.most)
+                                   : fmt::format("{} to {}", expectation.shells.least, expectation.shells.most));
+  return result;
+}
+
+}  // namespace carillon::mesher

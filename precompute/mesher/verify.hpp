@@ -1,0 +1,36 @@
+// Whether a mesh is the body it was made of.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "precompute/mesher/body.hpp"
+
+namespace carillon::mesher {
+
+/// How many closed surfaces the body's boundary has: those that elements of this length must show, and all there are.
+struct Shells {
+  std::int64_t least = 0, most = 0;
+};
+Shells count_shells(const Body& body, double edge_m);
+
+/// What the mesh is compared with, beyond the body.
+struct Expectation {
+  double edge_m = 0;
+  double volume_m3 = 0;
+  Shells shells;
+};
+
+struct Comparison {
+  double volume_m3 = 0;
+  std::int64_t shells = 0;
+  double farthest_outside_m = 0;
+  std::string fault = {};  // empty: the mesh is the body; else what is off, as the end of a sentence "the mesh ..."
+};
+
+/// Compares a linear mesh with the body. Off is: a volume that differs by more than 3 % and what facets a tenth of an edge off the skin
+/// would take away from a solid (8 % and a third of that for a wall); a node farther outside, or inside the hollow, than a tenth of an edge
+/// and half a sample of the distance field; other shells than expected.
+Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectation& expectation);
+
+}  // namespace carillon::mesher
