@@ -24,7 +24,7 @@ struct Recovery {
   std::vector<Middle> middles;             // T10 only
   std::vector<std::int32_t> value_of;      // (e, n) where the recovered value of an element's node is
   std::vector<Shift> shifts, doubts;       // to the smooth surface; to the surface that the body may have as well
-  std::vector<Traction> tractions;        // T10 with a consistent mass only
+  std::vector<Traction> tractions;         // T10 with a consistent mass only
   NodeExchange nodes, vertices;
 };
 

@@ -365,8 +365,8 @@ void GmshReader::skip_numbers(std::string_view name) {
     for (std::size_t n = 0; n < strings; ++n) cursor_.line();
     const auto reals = cursor_.checked_count(read_line_int("the number of real tags"), 2, "real tags", cursor_.place());
     for (std::size_t n = 0; n < reals; ++n) cursor_.text_real("a real tag");
-    const auto integers = cursor_.checked_count(cursor_.text_int("the number of integer tags", INT64_MIN, INT64_MAX), 2, "integer tags",
-                                                cursor_.place());
+    const auto integers =
+        cursor_.checked_count(cursor_.text_int("the number of integer tags", INT64_MIN, INT64_MAX), 2, "integer tags", cursor_.place());
     std::array<std::int64_t, 3> tags{0, 0, 0};  // time step, components, entries
     for (std::size_t n = 0; n < integers; ++n) {
       const auto tag = cursor_.text_int("an integer tag", INT32_MIN, INT32_MAX);
@@ -474,8 +474,10 @@ TetMesh GmshReader::read() {
     if (name == "NOD" || name == "ELM")
       cursor_.fail(place, "Gmsh format 1 is not read, only 2.2 and 4.1; convert it: gmsh FILE -save -format msh41 -o NEW.msh");
     const bool parametric = name == "ParametricNodes";  // of version 2, in place of $Nodes
-    const bool ours = name == "Nodes" || parametric || name == "Elements" || name == "Entities" || name == "MeshFormat" || name == "PartitionedEntities";
-    if (ours && !seen.insert(parametric ? "Nodes" : name).second) cursor_.fail(place, "a second section ${}; keep one mesh in a file", name);
+    const bool ours =
+        name == "Nodes" || parametric || name == "Elements" || name == "Entities" || name == "MeshFormat" || name == "PartitionedEntities";
+    if (ours && !seen.insert(parametric ? "Nodes" : name).second)
+      cursor_.fail(place, "a second section ${}; keep one mesh in a file", name);
     if (ours && name != "MeshFormat" && version_ == 0) cursor_.fail(place, "${} comes before $MeshFormat; write the mesh again", name);
     if (name == "MeshFormat") {
       read_format();

@@ -55,13 +55,13 @@ struct SurfaceReport {
   std::int64_t holes_closed = 0;       // boundary loops filled with triangles
   double largest_hole_m = 0;           // across; as a part of the body's diagonal (the diameter of a circle of its area); and the area
   double largest_hole_part = 0, holes_area_part = 0;  // of all holes over that of the closed surface
-  int facet_pieces = 1;                // into how many each facet's sides were cut to follow the smooth surface through its corners
-  double doubt_m = 0;                  // how far apart the facets and the smooth surface are where it cannot be told which is the body
-  bool wrapped = false;                // the surface could not be mended: its alpha wrap was meshed
-  std::int64_t components = 0;         // of the input surface after mending
-  double scale = 1;                    // metres per unit of the file, as applied
-  std::array<double, 3> extent_m{};    // of the scaled surface along x, y, z
-  double input_volume_m3 = 0;          // enclosed by the scaled surface (with a wall: by the surface, not by the shell)
+  int facet_pieces = 1;              // into how many each facet's sides were cut to follow the smooth surface through its corners
+  double doubt_m = 0;                // how far apart the facets and the smooth surface are where it cannot be told which is the body
+  bool wrapped = false;              // the surface could not be mended: its alpha wrap was meshed
+  std::int64_t components = 0;       // of the input surface after mending
+  double scale = 1;                  // metres per unit of the file, as applied
+  std::array<double, 3> extent_m{};  // of the scaled surface along x, y, z
+  double input_volume_m3 = 0;        // enclosed by the scaled surface (with a wall: by the surface, not by the shell)
   double input_area_m2 = 0;
   double sharp_edges_m = 0;  // length of the edges of the input that were kept sharp
   std::int64_t sharp_curves = 0;

@@ -147,10 +147,10 @@ void check_bodies(const std::filesystem::path& file, const std::vector<stream::R
   }
   const auto is_unmarked = [](const stream::RecordedBody& body) { return !body.surface; };
   if (std::any_of(theirs.begin(), theirs.end(), is_unmarked)) {
-    warnings.push_back(
-        fmt::format("{}: does not say how large its bodies are (\"size_m\", \"order_m\"); that they have as many triangles as the scene's is all "
-                    "that was compared",
-                    file.string()));
+    warnings.push_back(fmt::format(
+        "{}: does not say how large its bodies are (\"size_m\", \"order_m\"); that they have as many triangles as the scene's is all "
+        "that was compared",
+        file.string()));
   }
 }
 

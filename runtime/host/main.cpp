@@ -29,7 +29,8 @@ int main(int argc, char** argv) {
   });
   app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
   auto* output =
-      app.add_option("-o,--output", options.wav, "WAV file to write: stereo, or a channel for each microphone; - is standard output; required without --plan")
+      app.add_option("-o,--output", options.wav,
+                     "WAV file to write: stereo, or a channel for each microphone; - is standard output; required without --plan")
           ->option_text("OUT.wav");
   app.add_option("--spectrogram", options.spectrogram, "Picture of the sound: level over time and frequency")->option_text("OUT.png");
   app.add_option("--trajectory", options.trajectory, "Paths of the bodies and their contacts")->option_text("OUT.json");

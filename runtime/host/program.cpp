@@ -4,8 +4,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cctype>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -160,8 +160,8 @@ void print_bands(std::FILE* notes, const Scene& scene, double rate_hz) {
   for (const SceneBody& body : scene.bodies) {
     const double end_hz = body.spec.bank->band_hz[1];
     if (end_hz < std::min(kMostAudibleHz, 0.5 * rate_hz))
-      fmt::print(notes, "  {:<16} nothing above {:.5g} Hz, where its bank ends; compute one with a higher \"band_hz\" to hear more\n", config::printable(body.name),
-                 end_hz);
+      fmt::print(notes, "  {:<16} nothing above {:.5g} Hz, where its bank ends; compute one with a higher \"band_hz\" to hear more\n",
+                 config::printable(body.name), end_hz);
   }
 }
 

@@ -231,16 +231,15 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                                   .ground = make_ground(scene),
                                   .ticks = options.measures ? &synth::get_cpu_ticks : nullptr});
   for (std::size_t i = 0; i < fed.size(); ++i) {
-    synthesiser.add_body(body_models[i],
-                         {.position_m = courses[i].first.position_m,
-                          .rotation = courses[i].first.rotation,
-                          .effects = changes.find_first(i),
-                          .silence_pa = find_silence_pa(scene, i, options.plan),
-                          .surface = make_surface(scene.bodies[i]),
-                          .longest_m = longest_m[i],
-                          .max_waypoints = waypoints[i],
-                          .isa = scene.quality.instructions,
-                          .audits_energy = options.audits});
+    synthesiser.add_body(body_models[i], {.position_m = courses[i].first.position_m,
+                                          .rotation = courses[i].first.rotation,
+                                          .effects = changes.find_first(i),
+                                          .silence_pa = find_silence_pa(scene, i, options.plan),
+                                          .surface = make_surface(scene.bodies[i]),
+                                          .longest_m = longest_m[i],
+                                          .max_waypoints = waypoints[i],
+                                          .isa = scene.quality.instructions,
+                                          .audits_energy = options.audits});
   }
 
   constexpr std::size_t kLatency = synth::Synthesiser::kLatency;

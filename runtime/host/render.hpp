@@ -89,7 +89,6 @@ synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::Effec
 /// Mode-samples that a second of sound may take: quality.modes at all times, or as many as there are.
 double calc_budget(const Quality& quality, double rate_hz);
 
-
 /// The gain [full scale per Pa] that goes into the file. A given gain that would clip is reduced to the one of "auto".
 struct Gain {
   double per_pa = 1.0;

@@ -188,7 +188,8 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
                    bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j, bodies.weight_n, f.audit->modes_rise);
   }
   json += " \"warnings\": [";
-  for (std::size_t i = 0; i < scene.warnings.size(); ++i) json += (i == 0 ? "" : ", ") + config::quote(config::printable(scene.warnings[i]));
+  for (std::size_t i = 0; i < scene.warnings.size(); ++i)
+    json += (i == 0 ? "" : ", ") + config::quote(config::printable(scene.warnings[i]));
   json += "],\n \"per_body\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const std::int64_t played = i < f.tally.body_impulses.size() ? f.tally.body_impulses[i] : 0;

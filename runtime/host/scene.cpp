@@ -30,7 +30,7 @@ constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
 constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body lasts as long as a person's step on less
 constexpr double kStiffestGroundPa = 1e13;  // ten times a diamond
-constexpr double kRoughestM = 1e-3;  // what is higher is no roughness but a shape
+constexpr double kRoughestM = 1e-3;         // what is higher is no roughness but a shape
 
 using Quaternion = std::array<double, 4>;
 

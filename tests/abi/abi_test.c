@@ -96,7 +96,8 @@ static void check_nearest(const carillon_bank* bank) {
         for (b = 0; a + b <= 6; ++b) {
           double square = 0;
           for (k = 0; k < 3; ++k) {
-            const double at = (a * x[3 * corner[3 * i] + k] + b * x[3 * corner[3 * i + 1] + k] + (6 - a - b) * x[3 * corner[3 * i + 2] + k]) / 6;
+            const double at =
+                (a * x[3 * corner[3 * i] + k] + b * x[3 * corner[3 * i + 1] + k] + (6 - a - b) * x[3 * corner[3 * i + 2] + k]) / 6;
             square += (at - point[k]) * (at - point[k]);
           }
           least = fmin(least, sqrt(square));
