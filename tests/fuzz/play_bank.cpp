@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const bank::Bank loose = bank::read_bank_unchecked(file);
     for (const bank::Check& check : bank::calc_checks(loose)) bank::format_check(check);
     const bank::Bank bank = bank::read_bank(file);
-    bank::format_info(bank, file, 100);
+    bank::format_info(bank, file, 100, true);
     bank::format_info_json(bank, file);
     if (bank.mode_count() > 200 || bank.triangles.size() > 2000) {
       fuzz::tell("only read");
