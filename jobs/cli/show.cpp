@@ -14,36 +14,12 @@
 namespace carillon::cli {
 namespace {
 
-/// Characters that move the cursor, colour, or turn the direction of writing: C0, DEL, C1 (U+0080 - U+009F), U+200E, U+200F, U+202A -
-/// U+202E, U+2066 - U+2069. Length in bytes at `at`, 0 for others.
-std::size_t find_control(std::string_view text, std::size_t at) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
-  const unsigned a = byte(at), b = byte(at + 1), c = byte(at + 2);
-  if (a < 0x20 || a == 0x7F) return 1;
-  if (a == 0xC2 && b < 0xA0) return 2;
-  if (a == 0xE2 && b == 0x80 && (c == 0x8E || c == 0x8F || (c >= 0xAA && c <= 0xAE))) return 3;
-  if (a == 0xE2 && b == 0x81 && c >= 0xA6 && c <= 0xA9) return 3;
-  return 0;
-}
-
 std::string escape(const std::string& raw, std::size_t most) {
-  const std::string text = store::to_text(raw);
-  std::string result;
-  for (std::size_t at = 0; at < text.size();) {
-    // Cut only where a character begins.
-    if (result.size() >= most && (static_cast<unsigned char>(text[at]) & 0xC0U) != 0x80U) return result + "...";
-    const std::size_t control = find_control(text, at);
-    if (control == 0) {
-      result += text[at++];
-      continue;
-    }
-    if (text[at] == '\n')
-      result += "\\n";
-    else
-      for (std::size_t i = 0; i < control; ++i) result += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[at + i]));
-    at += control;
-  }
-  return result;
+  std::string text = store::to_terminal(raw);
+  if (text.size() <= most) return text;
+  // Cut only where a character begins.
+  while (most < text.size() && (static_cast<unsigned char>(text[most]) & 0xC0U) == 0x80U) ++most;
+  return most < text.size() ? text.substr(0, most) + "..." : text;
 }
 
 }  // namespace
@@ -78,7 +54,7 @@ void print_json(const Json::Value& root) {
   Json::StreamWriterBuilder writer;
   writer["indentation"] = "  ";
   writer["emitUTF8"] = true;
-  fmt::print("{}\n", Json::writeString(writer, root));
+  fmt::print("{}\n", store::to_plain_json(Json::writeString(writer, root)));
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
 }
 
