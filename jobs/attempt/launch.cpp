@@ -89,7 +89,7 @@ bool has_option(const fs::path& program, const char* option) {
 }
 
 int open_output(const fs::path& file, int mode) {
-  const int output = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | mode, 0666);
+  const int output = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | mode, 0666);
   if (output < 0)
     throw SystemError(
         fmt::format("{}: cannot write this: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(errno)));
@@ -178,6 +178,8 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   if (launcher == Launcher::mpirun) {
     launch.arguments = {find_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
     launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
+    // Under Slurm ranks run on other machines too, where only the folder's name leads to it.
+    if (!is_under_slurm()) launch.arguments.insert(launch.arguments.end(), {"--wdir", options.work.string()});
     for (const char* name : {"CARILLON_ATTEMPT", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "HWLOC_COMPONENTS"}) {
       launch.arguments.insert(launch.arguments.end(), {"-x", name});
     }

@@ -7,13 +7,16 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/statvfs.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <system_error>
 
 #include "jobs/attempt/attempt.hpp"
+#include "jobs/store/identity.hpp"
+#include "jobs/store/open_folder.hpp"
 #include "runtime/bank/bank.hpp"
+#include "runtime/config/file.hpp"
 
 namespace carillon::attempt {
 namespace {
@@ -22,18 +25,40 @@ namespace fs = std::filesystem;
 
 constexpr const char* kReserveFile = "reserve";
 constexpr off_t kReserveBytes = 64 << 10;
-constexpr double kFullBytes = 1 << 20;
 
-/// A missing file is passed over.
+/// Copies a regular file; follows no link, waits for no pipe. False when there is none.
+bool take_copy(const fs::path& from, const fs::path& to) {
+  const int file = ::open(from.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  struct stat info {};
+  if (file < 0 || ::fstat(file, &info) != 0 || !S_ISREG(info.st_mode)) {
+    if (file >= 0) ::close(file);
+    return false;
+  }
+  try {
+    config::WholeFile whole(to);
+    std::string piece(1 << 20, '\0');
+    for (ssize_t got = 0; (got = ::read(file, piece.data(), piece.size())) > 0;)
+      whole.append(std::string_view(piece.data(), static_cast<std::size_t>(got)));
+    whole.commit();
+  } catch (...) {
+    ::close(file);
+    throw;
+  }
+  ::close(file);
+  return true;
+}
+
+/// The same by another name for the same file, where that can be.
 void link_or_copy(const fs::path& from, const fs::path& to) {
   std::error_code error;
   if (!fs::is_regular_file(fs::symlink_status(from, error))) return;
   fs::create_hard_link(from, to, error);
-  if (error) fs::copy_file(from, to, error);
-  if (error) throw SystemError(fmt::format("{}: cannot copy this to {}: {}", from.string(), to.string(), error.message()));
+  if (!error && fs::is_regular_file(fs::symlink_status(to, error))) return;
+  fs::remove(to, error);
+  take_copy(from, to);
 }
 
-/// A page about the bank. A bank is no worse without.
+/// A page about the bank. A bank is no worse without. Programs that draw need a path that they can open too.
 void write_report(const fs::path& folder, report::Options& wanted) {
   try {
     if (const std::optional<store::Request> request = store::read_request(folder)) wanted.title = store::find_input_name(*request);
@@ -45,53 +70,71 @@ void write_report(const fs::path& folder, report::Options& wanted) {
 
 }  // namespace
 
-std::optional<std::string> find_bank_fault(const fs::path& work, bool& has_bank) {
+std::optional<std::string> find_bank_fault(const fs::path& work, const store::Request& request, bool& has_bank) {
   const fs::path file = work / store::kBankFile;
   std::error_code error;
-  has_bank = fs::exists(fs::symlink_status(file, error));
+  const fs::file_status status = fs::symlink_status(file, error);
+  has_bank = fs::exists(status);
   if (!has_bank) return "there is no bank";
+  if (!fs::is_regular_file(status)) return "what lies in place of the bank is no regular file";
   try {
-    (void)bank::read_bank(file);
-    return std::nullopt;
+    return store::find_origin_fault(bank::read_bank(file).provenance, request);
   } catch (const InputError& fault) {
     return fault.what();
   }
 }
 
-void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, report::Options wanted) {
-  const fs::path work = store.work_folder(id);
-  const fs::path folder = store.make_temporary();
+std::optional<std::string> find_published_fault(const store::Store& store, const store::Id& id) {
+  if (std::optional<std::string> fault = store.find_bank_fault(id, store::Look::full)) return fault;
+  const fs::path folder = store.bank_folder(id);
+  try {
+    const bank::Bank bank = bank::read_bank(folder / store::kBankFile);
+    const std::optional<store::Request> request = store::read_request(folder);
+    if (!request || request->id != id.text() || store::calc_id(*request) != id) return "its request.json is not what was submitted";
+    return bank.provenance.empty() ? std::nullopt : store::find_origin_fault(bank.provenance, *request);
+  } catch (const InputError& fault) {
+    return fault.what();
+  }
+}
+
+void publish(const store::Store& store, const store::Id& id, const fs::path& work, const outcome::Outcome& outcome,
+             report::Options wanted) {
+  const store::Temporary temporary = store.make_temporary();
+  const fs::path folder = temporary.content().shared_path();
   try {
     link_or_copy(work / store::kBankFile, folder / store::kBankFile);
     // The solver writes the job with every value that it used beside the bank; it runs again as a job.
-    const fs::path resolved = work / (std::string(store::kBankFile) + ".resolved.json");
-    std::error_code error;
-    link_or_copy(fs::exists(resolved, error) ? resolved : work / store::kJobFile, folder / store::kJobFile);
-    link_or_copy(work / "request.json", folder / "request.json");
-    link_or_copy(work / store::kLogFile, folder / store::kLogFile);
+    if (!take_copy(work / (std::string(store::kBankFile) + ".resolved.json"), folder / store::kJobFile))
+      take_copy(work / store::kJobFile, folder / store::kJobFile);
+    take_copy(work / store::kRequestFile, folder / store::kRequestFile);
+    take_copy(work / store::kLogFile, folder / store::kLogFile);
     write_report(folder, wanted);
     outcome::write_outcome(folder, outcome);
-    store.publish(id, folder);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(folder, ignored);
-    throw;
+    store.publish(id, temporary);
+  } catch (const SystemError& error) {
+    throw SystemError(store::show_names(temporary.content(), error.what()));
+  }
+}
+
+void clear_way(const fs::path& work, const std::string& name) {
+  struct stat info {};
+  const fs::path file = work / name;
+  if (::lstat(file.c_str(), &info) != 0 || (S_ISREG(info.st_mode) && info.st_nlink == 1)) return;
+  if (!S_ISDIR(info.st_mode)) {
+    ::unlink(file.c_str());
+  } else {
+    store::OpenFolder::open(work).remove(name);
   }
 }
 
 void make_reserve(const fs::path& work) {
-  const int file = ::open((work / kReserveFile).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+  remove_reserve(work);
+  const int file = ::open((work / kReserveFile).c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (file < 0) return;
   (void)::posix_fallocate(file, 0, kReserveBytes);
   ::close(file);
 }
 
 void remove_reserve(const fs::path& work) { ::unlink((work / kReserveFile).c_str()); }
-
-bool is_disk_full(const fs::path& folder) {
-  struct statvfs info {};
-  if (::statvfs(folder.c_str(), &info) != 0) return false;
-  return static_cast<double>(info.f_bavail) * static_cast<double>(info.f_frsize) < kFullBytes;
-}
 
 }  // namespace carillon::attempt

@@ -7,24 +7,30 @@
 
 #include "jobs/outcome/outcome.hpp"
 #include "jobs/report/report.hpp"
+#include "jobs/store/records.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::attempt {
 
-/// What is wrong with the bank in the folder of work, in one sentence; none when it is whole and sane. `has_bank` says whether there is
-/// one.
-std::optional<std::string> find_bank_fault(const std::filesystem::path& work, bool& has_bank);
+/// What is wrong with the bank in the folder of work, in one sentence; none when it is whole and sane and was made of that request.
+/// `has_bank` says whether there is one.
+std::optional<std::string> find_bank_fault(const std::filesystem::path& work, const store::Request& request, bool& has_bank);
 
-/// Puts bank, resolved job, request, log, outcome and a report (titled by the job's input) into one folder and publishes it as the bank of
-/// `id`; nothing is taken from the folder of work before that. SystemError when the disk refuses: nothing is published then.
-void publish(const store::Store& store, const store::Id& id, const outcome::Outcome& outcome, report::Options wanted);
+/// The same of a bank in the store, all its bytes read. A bank that does not say what it was made of has no fault in that.
+std::optional<std::string> find_published_fault(const store::Store& store, const store::Id& id);
+
+/// Puts bank, resolved job, request, log, outcome and a report (titled by the job's input) from the folder of work into one folder and
+/// publishes it as the bank of `id`; nothing is taken from the folder of work before that. SystemError when the disk refuses: nothing is
+/// published then.
+void publish(const store::Store& store, const store::Id& id, const std::filesystem::path& work, const outcome::Outcome& outcome,
+             report::Options wanted);
+
+/// Makes sure that `name` in the folder of work is a regular file with no other name, or not there: anything else goes.
+void clear_way(const std::filesystem::path& work, const std::string& name);
 
 /// A file that keeps some room on the disk, so that the end of an attempt can be written when the disk is full. Without effect where there
 /// is no room already.
 void make_reserve(const std::filesystem::path& work);
 void remove_reserve(const std::filesystem::path& work);
-
-/// Whether hardly a byte is free where `folder` is.
-bool is_disk_full(const std::filesystem::path& folder);
 
 }  // namespace carillon::attempt

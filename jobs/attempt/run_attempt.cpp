@@ -21,6 +21,9 @@
 #include "jobs/outcome/outcome.hpp"
 #include "jobs/outcome/policy.hpp"
 #include "jobs/process/process.hpp"
+#include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
+#include "jobs/store/open_folder.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::attempt {
@@ -33,7 +36,7 @@ constexpr std::uintmax_t kMostLog = 1 << 16;  // what is read of it
 constexpr double kMostDrawSeconds = 60.0;
 
 fs::path find_root(const fs::path& work) {
-  // work/ab/<id> of a store
+  // work/ab/<id> of a store, as named: a link on the way is refused when the folder is opened
   const fs::path root = work.parent_path().parent_path().parent_path();
   std::error_code error;
   if (!fs::is_regular_file(root / "VERSION", error) || work.parent_path().parent_path().filename() != "work")
@@ -76,26 +79,27 @@ report::Options find_report_options(const Options& attempt) {
 }
 
 /// Others look at the lock for a moment now and then.
-std::optional<process::Lock> take_lock(const fs::path& work) {
-  for (int round = 0; round < 20; ++round) {
-    if (std::optional<process::Lock> lock = process::Lock::take(work / "lock")) return lock;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+std::optional<process::Lock> take_lock(const store::OpenFolder& work) {
+  try {
+    for (int round = 0; round < 20; ++round) {
+      if (std::optional<process::Lock> lock = process::Lock::take(work.path() / "lock")) return lock;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return std::nullopt;
+  } catch (const SystemError& error) {
+    throw SystemError(store::show_names(work, error.what()));
   }
-  return std::nullopt;
 }
 
 class Attempt {
  public:
-  Attempt(const Options& options, const fs::path& work)
-      : options_(options),
-        work_(work),
-        store_(store::Store::open(find_root(work))),
-        id_(store::require_id(work.filename().string(), work.string())) {
+  Attempt(const Options& options, const store::Store& store, const store::Id& id, const store::OpenFolder& folder)
+      : options_(options), folder_(folder), work_(folder.shared_path()), store_(store), id_(id) {
     outcome_.token = options.token.empty() ? store::make_random_name() : options.token;
     outcome_.ranks = options.ranks;
     outcome_.host = process::find_host();
     outcome_.started = outcome::find_utc();
-    options_.work = work;
+    options_.work = work_;
     // For what this process itself starts (the pictures of the report); its own entry in /proc stays as it is.
     ::setenv("CARILLON_ATTEMPT", outcome_.token.c_str(), 1);
   }
@@ -108,13 +112,13 @@ class Attempt {
       clean();
       solve(before ? before->percent : 0.0);
     } catch (const SystemError& error) {
-      set(is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+      set(store::is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
     } catch (const InputError& error) {
       set(Cause::bad_input, error.what());
     } catch (const std::bad_alloc&) {
       set(Cause::memory, "out of memory while the bank was verified");
     } catch (const std::exception& error) {
-      set(is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+      set(store::is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
     }
     outcome_.seconds = find_seconds() - start_s;
     outcome_.percent = std::max(outcome_.percent, before ? before->percent : 0.0);
@@ -124,7 +128,7 @@ class Attempt {
  private:
   void set(Cause cause, const std::string& reason, double need_gb = 0.0) {
     outcome_.cause = cause;
-    outcome_.reason = reason;
+    outcome_.reason = store::show_names(folder_, reason);
     outcome_.memory_need_gb = need_gb;
   }
 
@@ -136,6 +140,7 @@ class Attempt {
       Scratch::remove_left(before->token);
     }
     remove_temporary_files();
+    for (const char* name : {store::kLogFile, store::kProgressFile, store::kCheckpointFile, "prediction.new"}) clear_way(work_, name);
     outcome::write_attempt(work_, {outcome_.token, process::find_self(), options_.ranks, options_.memory_gb, outcome_.started});
     make_reserve(work_);
   }
@@ -149,10 +154,21 @@ class Attempt {
     }
   }
 
+  /// What is solved is what the id says: the job and every byte of its input.
+  store::Request check_inputs() {
+    if (const auto fault = store::find_job_fault(store_, id_, work_))
+      throw InputError(*fault + "; submit the job again, or carillon verify --repair makes its folder again");
+    const store::Request request = *store::read_request(work_);
+    if (const auto fault = store::find_input_fault(store_, request))
+      throw InputError(fmt::format("{}; submit the job again, which copies its {} again", *fault, request.input_kind));
+    return request;
+  }
+
   void solve(double percent_before) {
+    const store::Request request = check_inputs();
     bool has_bank = false;
-    if (!find_bank_fault(work_, has_bank)) return set(Cause::done, "");  // killed between the solve and the publication
-    if (has_bank) fs::remove(work_ / store::kBankFile);
+    if (!find_bank_fault(work_, request, has_bank)) return set(Cause::done, "");  // killed between the solve and the publication
+    if (has_bank) store::OpenFolder::open(work_).remove(store::kBankFile);
     const fs::path log = work_ / store::kLogFile, checkpoint = work_ / store::kCheckpointFile;
     std::optional<Scratch> scratch;
     if (!is_under_slurm()) scratch.emplace(outcome_.token);
@@ -173,8 +189,8 @@ class Attempt {
     outcome_.peak_memory_gb = watched.peak_memory_gb;
     outcome_.is_further = outcome_.percent > percent_before && find_mark(checkpoint) != mark && find_mark(checkpoint).first != 0;
     const std::string end = read_end(log, error ? 0 : log_start);
-    outcome::Ending ending{watched.exit_code, watched.was_asked_to_stop,   watched.was_out_of_time, watched.was_hung,
-                           watched.still_s,   find_memory_kills() > kills, is_disk_full(work_),     end};
+    outcome::Ending ending{watched.exit_code, watched.was_asked_to_stop,   watched.was_out_of_time,    watched.was_hung,
+                           watched.still_s,   find_memory_kills() > kills, store::is_disk_full(work_), end};
     const outcome::Verdict verdict = outcome::classify(ending);
     set(verdict.cause, verdict.reason, verdict.memory_need_gb);
     if (verdict.cause != Cause::done) return;
@@ -182,8 +198,10 @@ class Attempt {
       fs::rename(printed, work_ / kPredictionFile);
       return set(Cause::predicted, "what it needs is predicted; waits for room");
     }
-    if (const std::optional<std::string> fault = find_bank_fault(work_, has_bank))
-      set(Cause::bad_bank, "the solver said that all is well, but: " + *fault);
+    if (const std::optional<std::string> fault = find_bank_fault(work_, request, has_bank))
+      return set(Cause::bad_bank, "the solver said that all is well, but: " + *fault);
+    if (const auto fault = store::find_input_fault(store_, request))
+      set(Cause::bad_input, fmt::format("while it was solved {}; submit the job again", *fault));
   }
 
   /// Publishes or says why not; returns the exit code.
@@ -193,13 +211,13 @@ class Attempt {
     if (outcome_.cause == Cause::done) {
       outcome_.percent = 100.0;
       try {
-        publish(store_, id_, outcome_, find_report_options(options_));
+        publish(store_, id_, work_, outcome_, find_report_options(options_));
         process::end_with_environment("CARILLON_ATTEMPT=" + outcome_.token);
         store_.remove_work(id_);
         return 0;
       } catch (const std::exception& error) {
         if (store_.has_bank(id_)) return 0;  // only the work could not be removed
-        set(is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+        set(store::is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
       }
     }
     fmt::print(stderr, "carillon attempt: {}: {}\n", outcome::to_text(outcome_.cause), outcome_.reason);
@@ -217,8 +235,9 @@ class Attempt {
   }
 
   Options options_;
-  const fs::path work_;
-  const store::Store store_;
+  const store::OpenFolder& folder_;
+  const fs::path work_;  // that folder, whatever its name leads to
+  const store::Store& store_;
   const store::Id id_;
   outcome::Outcome outcome_;
 };
@@ -226,19 +245,20 @@ class Attempt {
 }  // namespace
 
 int run_attempt(const Options& options) {
-  std::error_code error;
-  const fs::path work = fs::canonical(options.work, error);
-  if (error) {
-    // Published and cleared away meanwhile by another attempt: nothing is left to do.
-    throw InputError(fmt::format("{}: there is no such folder of work: {}", options.work.string(), error.message()));
-  }
-  find_root(work);
-  const std::optional<process::Lock> lock = take_lock(work);
+  fs::path work = fs::absolute(options.work).lexically_normal();
+  if (!work.has_filename()) work = work.parent_path();
+  const store::Store store = store::Store::open(find_root(work));
+  const store::Id id = store::require_id(work.filename().string(), work.string());
+  if (work != store.work_folder(id)) throw InputError(fmt::format("{}: no folder of work; name work/ab/ID of a store", work.string()));
+  // Published and cleared away meanwhile by another attempt: nothing is left to do.
+  if (!store.has_work(id)) throw InputError(fmt::format("{}: there is no such folder of work", work.string()));
+  const store::OpenFolder folder = store.open_work(id);
+  const std::optional<process::Lock> lock = take_lock(folder);
   if (!lock) {
     fmt::print(stderr, "{}: another attempt works here; nothing was done\n", work.string());
     return kExitBusy;
   }
-  return Attempt(options, work).run();
+  return Attempt(options, store, id, folder).run();
 }
 
 std::vector<std::string> make_arguments(const fs::path& program, const Options& options) {

@@ -85,6 +85,13 @@ Verdict find_verdict(Shared& shared, const store::Id& id, const std::optional<re
     return {"done",
             fmt::format("nothing would run: its bank is {}", show((shared.store().bank_folder(id) / store::kBankFile).string(), 4000)),
             false};
+  const bool is_open =
+      job && (job->state == registry::State::queued || job->state == registry::State::running || job->state == registry::State::waiting);
+  if (shared.store().has_bank_folder(id) && !is_open)
+    return {"failed",
+            fmt::format("it would run: {}; carillon submit, or retry, computes it again",
+                        show_message(shared.store().find_bank_fault(id, store::Look::quick).value_or("its bank is damaged"))),
+            true};
   if (!job) return {"new", "it would run: the store has no bank of these inputs", true};
   const std::string state = to_text(job->state), reason = show_message(find_reason(shared, *job));
   if (job->state == registry::State::cancelled)

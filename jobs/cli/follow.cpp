@@ -63,7 +63,7 @@ void print_changes(Shared& shared, const std::vector<registry::Job>& jobs, std::
     if (has_ended(job) && before.count(job.id) > 0 && before[job.id] == to_text(job.state)) continue;
     const std::string line = Json::writeString(writer, describe(shared, job));
     std::string& known = before[job.id];
-    if (known != line) fmt::print("{}\n", line);
+    if (known != line) fmt::print("{}\n", store::to_plain_json(line));
     known = has_ended(job) ? to_text(job.state) : line;
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");

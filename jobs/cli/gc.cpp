@@ -2,20 +2,24 @@
 // Method:     A job file refers to what it was last submitted as, for as long as the file is there. Banks, failed and cancelled jobs that
 // no
 //             job file refers to are garbage; so are inputs that no bank and no job was made of, folders of work whose bank is published,
-//             temporary folders of processes that are gone, and registries that were set aside. What is queued, waits or runs never is.
+//             temporary folders of processes that are gone, and registries and banks that were set aside. Names that the store does not
+//             give stay. What is queued, waits or runs never is.
 // Source:     own.
 // Deviations: none.
 #include <fmt/core.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <map>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 #include "jobs/cli/shared.hpp"
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/open_folder.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::cli {
@@ -25,7 +29,7 @@ namespace fs = std::filesystem;
 
 /// Something that could go.
 struct Item {
-  std::string kind;  // "bank", "job", "input", "work", "temporary", "registry"
+  std::string kind;  // "bank", "job", "input", "work", "temporary", "damaged", "registry"
   fs::path path;
   std::string why;
   double bytes = 0.0;
@@ -33,17 +37,26 @@ struct Item {
   std::string error = "";  // why it could not be removed
 };
 
-double calc_bytes(const fs::path& path) {
-  struct stat info {};
-  if (::lstat(path.c_str(), &info) != 0) return 0.0;
-  if (!S_ISDIR(info.st_mode)) return static_cast<double>(info.st_size);
+/// Of what has this name in a folder, links not followed.
+double calc_bytes(const store::OpenFolder& folder, const std::string& name) {
+  const auto info = folder.look_at(name);
+  if (!info) return 0.0;
+  if (!S_ISDIR(info->st_mode)) return S_ISREG(info->st_mode) ? static_cast<double>(info->st_size) : 0.0;
   double sum = 0.0;
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(path, fs::directory_options::skip_permission_denied, error), end; !error && it != end;
-       it.increment(error)) {
-    if (::lstat(it->path().c_str(), &info) == 0 && S_ISREG(info.st_mode)) sum += static_cast<double>(info.st_size);
+  try {
+    const auto inner = folder.find(name);
+    for (const std::string& entry : inner ? inner->list() : std::vector<std::string>()) sum += calc_bytes(*inner, entry);
+  } catch (const SystemError&) {  // what may not be read counts for nothing
   }
   return sum;
+}
+
+double calc_bytes(const store::Store& store, const char* folder, const store::Id& id) {
+  try {
+    return calc_bytes(store.open_folder(folder).make(id.text().substr(0, 2)), id.text());
+  } catch (const SystemError&) {
+    return 0.0;
+  }
 }
 
 /// The file of a submission: a manifest without the number of its line.
@@ -133,40 +146,96 @@ bool add_jobs(Shared& shared, const References& references, std::vector<Item>& i
     if (references.ids.count(id) > 0 || is_kept_by_request(references, id, store.bank_folder(id)))
       use_input(store.bank_folder(id));
     else
-      items.push_back({"bank", store.bank_folder(id), explain(references, id), calc_bytes(store.bank_folder(id)), id});
+      items.push_back({"bank", store.bank_folder(id), explain(references, id), calc_bytes(store, "banks", id), id});
   }
   for (const store::Id& id : store.list_work()) {
     const fs::path folder = store.work_folder(id);
     const auto job = shared.registry().find(id);
     const bool has_ended = job && (job->state == registry::State::failed || job->state == registry::State::cancelled);
     if (job && job->state == registry::State::done && store.has_bank(id))
-      items.push_back({"work", folder, "its bank is published", calc_bytes(folder), id});
+      items.push_back({"work", folder, "its bank is published", calc_bytes(store, "work", id), id});
     else if (has_ended && references.ids.count(id) == 0 && !is_kept_by_request(references, id, folder))
-      items.push_back({"job", folder, fmt::format("{}, and {}", to_text(job->state), explain(references, id)), calc_bytes(folder), id});
+      items.push_back(
+          {"job", folder, fmt::format("{}, and {}", to_text(job->state), explain(references, id)), calc_bytes(store, "work", id), id});
     else
       use_input(folder);
   }
   return is_known;
 }
 
+/// The names that the store gives: <sha256>, with an ending where the input had one.
+bool is_input_name(const std::string& shard, const std::string& name) {
+  const std::string stem = name.substr(0, name.find('.')), ending = name.substr(std::min(stem.size() + 1, name.size()));
+  const bool is_plain =
+      ending.size() <= 8 && std::all_of(ending.begin(), ending.end(), [](unsigned char c) { return std::isalnum(c) != 0; });
+  return store::parse_id(stem) && stem.substr(0, 2) == shard && is_plain && !name.ends_with('.');
+}
+
 void add_inputs(const store::Store& store, const std::set<fs::path>& used_inputs, std::vector<Item>& items) {
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(store.root() / "inputs", error), end; !error && it != end; it.increment(error)) {
-    if (it->is_directory() || used_inputs.count(fs::path(it->path()).replace_extension()) > 0) continue;
-    items.push_back({"input", it->path(), "no bank and no job is made of it", calc_bytes(it->path())});
+  const store::OpenFolder inputs = store.open_folder("inputs");
+  for (const std::string& digits : inputs.list()) {
+    const auto kind = inputs.look_at(digits);
+    if (digits.size() != 2 || !kind || !S_ISDIR(kind->st_mode)) continue;
+    const auto shard = inputs.find(digits);
+    for (const std::string& name : shard ? shard->list() : std::vector<std::string>()) {
+      const fs::path path = store.root() / "inputs" / digits / name;
+      const auto info = shard->look_at(name);
+      if (!info || !S_ISREG(info->st_mode) || !is_input_name(digits, name) || used_inputs.count(fs::path(path).replace_extension()) > 0)
+        continue;
+      items.push_back({"input", path, "no bank and no job is made of it", calc_bytes(*shard, name)});
+    }
   }
 }
 
+/// "registry.damaged-3.sqlite", and the same with -wal and -shm.
+bool is_damaged_registry(std::string name) {
+  for (const char* ending : {"-wal", "-shm"}) {
+    if (name.ends_with(ending)) name.resize(name.size() - 4);
+  }
+  constexpr std::string_view kBegin = "registry.damaged-", kEnd = ".sqlite";
+  if (!name.starts_with(kBegin) || !name.ends_with(kEnd) || name.size() <= kBegin.size() + kEnd.size()) return false;
+  const std::string number = name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
+  return number.find_first_not_of("0123456789") == std::string::npos;
+}
+
+/// "<id>-<12 hex digits>"
+bool is_aside_name(const std::string& name) {
+  return name.size() == 64 + 1 + 12 && store::parse_id(name.substr(0, 64)) && name[64] == '-' &&
+         name.find_first_not_of("0123456789abcdef", 65) == std::string::npos;
+}
+
 void add_files(const store::Store& store, std::vector<Item>& items) {
-  std::error_code error;
-  for (fs::directory_iterator it(store.root() / "tmp", error), end; !error && it != end; it.increment(error)) {
-    if (is_owner_gone(it->path().filename().string()))
-      items.push_back({"temporary", it->path(), "the process that made it is gone", calc_bytes(it->path())});
+  const store::OpenFolder temporary = store.open_folder("tmp");
+  for (const std::string& name : temporary.list()) {
+    const auto info = temporary.look_at(name);
+    if (!info || !S_ISDIR(info->st_mode) || !store::Store::is_temporary_name(name) || !is_owner_gone(name)) continue;
+    if (::geteuid() != 0 && info->st_uid != ::geteuid()) continue;  // its owner alone may enter it
+    items.push_back({"temporary", store.root() / "tmp" / name, "the process that made it is gone", calc_bytes(temporary, name)});
   }
-  for (fs::directory_iterator it(store.registry_folder(), error), end; !error && it != end; it.increment(error)) {
-    if (it->path().filename().string().starts_with("registry.damaged-"))
-      items.push_back({"registry", it->path(), "damaged, and made again", calc_bytes(it->path())});
+  if (const auto aside = store::OpenFolder::open(store.root()).find("damaged")) {
+    for (const std::string& name : aside->list()) {
+      if (is_aside_name(name))
+        items.push_back({"damaged", store.root() / "damaged" / name, "damaged, and set aside", calc_bytes(*aside, name)});
+    }
   }
+  const store::OpenFolder folder = store::OpenFolder::open(store.registry_folder());
+  for (const std::string& name : folder.list()) {
+    const auto info = folder.look_at(name);
+    if (info && S_ISREG(info->st_mode) && is_damaged_registry(name))
+      items.push_back({"registry", store.registry_folder() / name, "damaged, and made again", calc_bytes(folder, name)});
+  }
+}
+
+/// Removes a file or a folder of the store that is no bank and no work: its last folder is opened step by step from the root.
+void remove_path(const store::Store& store, const Item& item) {
+  if (item.kind == "registry") return store::OpenFolder::open(item.path.parent_path()).remove(item.path.filename().string());
+  store::OpenFolder folder = store::OpenFolder::open(store.root());
+  for (const fs::path& part : item.path.parent_path().lexically_relative(store.root())) {
+    auto next = folder.find(part.string());
+    if (!next) return;
+    folder = std::move(*next);
+  }
+  folder.remove(item.path.filename().string());
 }
 
 void remove_items(Shared& shared, const References& references, std::vector<Item>& items) {
@@ -178,12 +247,15 @@ void remove_items(Shared& shared, const References& references, std::vector<Item
       else if (item.kind == "job" || item.kind == "work")
         shared.store().remove_work(*item.id);
       else
-        store::remove_tree(item.path);
+        remove_path(shared.store(), item);
       if (item.kind == "bank" || item.kind == "job") forgotten.push_back(*item.id);
     } catch (const SystemError& error) {
       item.error = error.what();
     }
   }
+  // On a full disk the registry could only be read; now there may be room.
+  shared.reopen();
+  if (shared.is_disk_full()) return;
   shared.registry().remove(forgotten);
   shared.registry().keep_submissions(references.submissions);
 }
@@ -241,7 +313,10 @@ void add_gc(CLI::App& app, Shared& shared, Run& run) {
       "what\n"
       "processes that were killed left behind. Removes nothing without --delete, and nothing that is queued, waits or runs.");
   command->add_flag("--delete", *is_deleting, "Remove it");
-  command->callback([&shared, &run, is_deleting] { run = [&shared, is_deleting] { return run_gc(shared, *is_deleting); }; });
+  command->callback([&shared, &run, is_deleting] {
+    shared.works_when_full = true;
+    run = [&shared, is_deleting] { return run_gc(shared, *is_deleting); };
+  });
 }
 
 }  // namespace carillon::cli

@@ -50,21 +50,32 @@ int run_get(Shared& shared, const Options& options) {
   shared.settle();
   const auto [id, job] = find_by_content(shared, options.word);
   const fs::path bank = shared.store().bank_folder(id) / store::kBankFile;
-  const bool is_done = shared.store().has_bank(id);
+  // A copy is for good: every byte is looked at before.
+  const auto fault = shared.store().find_bank_fault(id, options.to.empty() ? store::Look::quick : store::Look::full);
+  const bool is_done = !fault, is_damaged = fault && shared.store().has_bank_folder(id);
+  const std::vector<std::string> warnings = is_done ? store::read_warnings(shared.store().bank_folder(id)) : std::vector<std::string>();
   if (is_done && !options.to.empty()) copy_to(bank, options.to);
-  const std::string state = is_done ? "done" : job ? to_text(job->state) : "new";
+  const bool is_again =
+      job && (job->state == registry::State::queued || job->state == registry::State::running || job->state == registry::State::waiting);
+  const std::string state = is_done ? "done" : is_damaged && !is_again ? "failed" : job ? to_text(job->state) : "new";
+  const std::string why = is_done                   ? ""
+                          : is_damaged && !is_again ? fmt::format("{}; carillon retry {} computes it again", *fault, id.short_text())
+                          : job                     ? find_reason(shared, *job)
+                                                    : "";
   if (shared.json) {
     Json::Value root;
     root["id"] = id.text();
     root["state"] = state;
-    root["reason"] = job && !is_done ? to_json(find_reason(shared, *job)) : Json::Value("");
+    root["reason"] = to_json(why);
+    root["warnings"] = to_json(warnings);
     root["bank"] = is_done ? to_json(bank.string()) : Json::Value();
     root["copy"] = is_done && !options.to.empty() ? to_json(options.to) : Json::Value();
     print_json(root);
   } else if (is_done) {
     fmt::print("{}\n", options.to.empty() ? bank.string() : options.to);
+    for (const std::string& warning : warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
   } else {
-    const std::string reason = job ? show_message(find_reason(shared, *job)) : "carillon submit asks for it";
+    const std::string reason = job || is_damaged ? show_message(why) : "carillon submit asks for it";
     fmt::print(stderr, "carillon: no bank yet: {} is {}{}{}\n", id.short_text(), state, reason.empty() ? "" : "; ", reason);
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");

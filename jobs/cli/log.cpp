@@ -11,6 +11,7 @@
 
 #include "jobs/cli/shared.hpp"
 #include "runtime/config/error.hpp"
+#include "runtime/config/printable.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -24,19 +25,6 @@ struct Options {
   std::string word;
   bool follow = false;
 };
-
-/// What may go to a terminal: line ends and tabs stay, other control characters do not.
-std::string filter(const std::string& bytes) {
-  std::string text;
-  for (const char c : bytes) {
-    const auto code = static_cast<unsigned char>(c);
-    if (code == '\n' || code == '\t' || (code >= 0x20 && code != 0x7F))
-      text += c;
-    else if (code != '\r')
-      text += fmt::format("\\x{:02x}", code);
-  }
-  return text;
-}
 
 /// The bytes from `from` on, at most `most`; `from` moves on. Empty when there are none.
 std::string read_from(const fs::path& file, off_t& from, off_t most) {
@@ -79,7 +67,15 @@ int run_log(Shared& shared, const Options& options) {
   for (;;) {
     const bool is_last = !options.follow || has_ended(job);  // looked at before the log is read: nothing is printed after that
     for (std::string bytes; !(bytes = read_from(shared.store().find_folder(job.id) / store::kLogFile, at, 1 << 20)).empty();) {
-      fmt::print("{}", filter(bytes));
+      // A character may be cut where this piece ends; its other bytes come with the next.
+      std::size_t whole = bytes.size();
+      while (whole > 0 && bytes.size() - whole < 3 && (static_cast<unsigned char>(bytes[whole - 1]) & 0xC0U) == 0x80U) --whole;
+      if (whole > 0 && (static_cast<unsigned char>(bytes[whole - 1]) & 0xC0U) == 0xC0U) --whole;
+      if (bytes.size() == (1 << 20) && whole > 0) {
+        at -= static_cast<off_t>(bytes.size() - whole);
+        bytes.resize(whole);
+      }
+      fmt::print("{}", config::printable_lines(bytes));
     }
     if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
     if (is_last) break;

@@ -90,8 +90,8 @@ int run(int argc, char** argv) {
   app.add_option("--profile", shared.profile_option, "Profile file");
   app.add_flag("--json", shared.json, "One JSON document (of commands that go on: one object a line)");
   app.set_version_flag("--version", version::describe("carillon"));
-  for (const auto add :
-       {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_validate, add_study, add_report})
+  for (const auto add : {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_verify,
+                         add_validate, add_study, add_report})
     add(app, shared, command);
   add_attempt(app, command);
   const bool wants_json = std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });

@@ -23,13 +23,19 @@ fs::path find_self() {
 }
 
 void Shared::settle() {
-  if (!store().may_write()) {
+  if (!store().may_write() || is_disk_full_) {
     registry_.reset();
     return;
   }
-  queue::settle(store(), registry());
-  follow_slurm(*this);
-  if (hands_over) hand_over_to_slurm(*this);
+  registry();
+  if (is_disk_full_) return;
+  try {
+    queue::settle(store(), registry());
+    follow_slurm(*this);
+    if (hands_over) hand_over_to_slurm(*this);
+  } catch (const SystemError& error) {
+    if (!fall_back(error.what())) throw;
+  }
 }
 
 int run_until_done(Shared& shared, const std::vector<store::Id>& ids) {

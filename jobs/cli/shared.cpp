@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "jobs/cli/gather.hpp"
+#include "jobs/store/files.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/error.hpp"
 
@@ -81,9 +82,35 @@ const store::Store& Shared::store() {
 
 registry::Registry& Shared::registry() {
   const auto say = [](const std::string& line) { fmt::print(stderr, "carillon: {}\n", show_message(line)); };
+  if (!registry_ && !is_disk_full_ && store().may_write() && (only_reads || works_when_full)) {
+    try {
+      registry_.emplace(registry::Registry::open(store(), say));
+    } catch (const SystemError& error) {
+      if (!fall_back(error.what())) throw;
+    }
+  }
   if (!registry_)
-    registry_.emplace(store().may_write() ? registry::Registry::open(store(), say) : registry::Registry::open_to_read(store()));
+    registry_.emplace(store().may_write() && !is_disk_full_ ? registry::Registry::open(store(), say)
+                                                            : registry::Registry::open_to_read(store()));
   return *registry_;
+}
+
+bool Shared::fall_back(const std::string& error) {
+  if (!only_reads && !works_when_full) return false;
+  if (!store::is_disk_full(store().root()) && !store::is_disk_full(store().registry_folder())) return false;
+  is_disk_full_ = true;
+  registry_.reset();
+  if (!is_full_told_)
+    fmt::print(stderr, "carillon: the disk is full ({}); states are as the files of the store tell them\n", show_message(error));
+  is_full_told_ = true;
+  return true;
+}
+
+void Shared::reopen() {
+  if (!is_disk_full_) return;
+  is_disk_full_ = false;
+  registry_.reset();
+  registry();
 }
 
 registry::Job find_job(Shared& shared, const std::string& word) {
@@ -134,6 +161,17 @@ std::string find_reason(Shared& shared, const registry::Job& job) {
   return reason;
 }
 
+std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job) {
+  if (job.state != registry::State::done) return {};
+  return store::read_warnings(shared.store().bank_folder(job.id));
+}
+
+Json::Value to_json(const std::vector<std::string>& texts) {
+  Json::Value list(Json::arrayValue);
+  for (const std::string& text : texts) list.append(to_json(text));
+  return list;
+}
+
 Json::Value describe(Shared& shared, const registry::Job& job) {
   Json::Value root;
   root["id"] = job.id.text();
@@ -160,6 +198,7 @@ Json::Value describe(Shared& shared, const registry::Job& job) {
                              ? Json::Value(progress->seconds_left)
                              : Json::Value();
   root["bank"] = is_done ? to_json((shared.store().bank_folder(job.id) / store::kBankFile).string()) : Json::Value();
+  root["warnings"] = to_json(find_warnings(shared, job));
   return root;
 }
 

@@ -36,16 +36,21 @@ struct Profile {
 /// The store and its registry, opened when first asked for.
 class Shared {
  public:
-  std::string store_option;    // --store
-  std::string profile_option;  // --profile
-  bool json = false;           // --json
-  bool only_reads = false;     // what this command does may be done on a store that may only be read
+  std::string store_option;      // --store
+  std::string profile_option;    // --profile
+  bool json = false;             // --json
+  bool only_reads = false;       // what this command does may be done on a store that may only be read
+  bool works_when_full = false;  // and this one, on a full disk, by a registry in memory
 
   const Profile& profile();
   const store::Store& store();
   registry::Registry& registry();
   /// Rows whose process is gone are settled: what every command does that looks at states. A store that may only be read is looked at anew.
   void settle();
+  /// The registry is one in memory because the disk is full: states are as the store's files tell them.
+  bool is_disk_full() const { return is_disk_full_; }
+  /// Opens the registry anew when it is next asked for, with room or without.
+  void reopen();
 
   bool hands_over = false;                      // settle() hands over to Slurm too: for a command that waits for its jobs
   bool has_pictures = true;                     // in the reports of what is handed over to Slurm, where the profile does not say no
@@ -56,6 +61,8 @@ class Shared {
   std::optional<Profile> profile_;
   std::optional<store::Store> store_;
   std::optional<registry::Registry> registry_;
+  bool is_disk_full_ = false, is_full_told_ = false;
+  bool fall_back(const std::string& error);
 };
 
 /// Each adds its command to `app` and sets `run` when it is called; `run` gives the exit code.
@@ -70,6 +77,7 @@ void add_run(CLI::App& app, Shared& shared, Run& run);
 void add_get(CLI::App& app, Shared& shared, Run& run);
 void add_gc(CLI::App& app, Shared& shared, Run& run);
 void add_report(CLI::App& app, Shared& shared, Run& run);
+void add_verify(CLI::App& app, Shared& shared, Run& run);
 void add_validate(CLI::App& app, Shared& shared, Run& run);
 void add_study(CLI::App& app, Shared& shared, Run& run);
 
@@ -105,6 +113,10 @@ bool is_submitted_again(const registry::Job& job, bool has_work);
 
 /// A row with its progress, its bank and its log, under the keys of docs/howto/jobs.md.
 Json::Value describe(Shared& shared, const registry::Job& job);
+/// What the solver warned of, of a job that is done.
+std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job);
+/// A list of texts as JSON.
+Json::Value to_json(const std::vector<std::string>& texts);
 /// The reason of a row with the file that the user named in place of its copy in the store.
 std::string find_reason(Shared& shared, const registry::Job& job);
 

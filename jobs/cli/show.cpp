@@ -54,7 +54,7 @@ void print_json(const Json::Value& root) {
   Json::StreamWriterBuilder writer;
   writer["indentation"] = "  ";
   writer["emitUTF8"] = true;
-  fmt::print("{}\n", Json::writeString(writer, root));
+  fmt::print("{}\n", store::to_plain_json(Json::writeString(writer, root)));
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
 }
 

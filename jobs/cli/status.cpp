@@ -113,9 +113,10 @@ int run_status(Shared& shared, const Options& options) {
     fmt::print("no jobs in {}; carillon submit JOB.json asks for a bank\n", show(shared.store().root().string()));
     return 0;
   }
-  const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 2 + 1 : kMostRows;
+  const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 60 + 1 : kMostRows;
   for (const std::string& line : format_bars(shared, jobs, rows, kWideColumns)) fmt::print("{}\n", line);
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+  if (shared.is_disk_full()) return 0;
   if (!shared.store().may_write()) fmt::print(stderr, "carillon: this store may only be read; states are as its files tell them\n");
   return 0;
 }
@@ -131,12 +132,16 @@ std::vector<std::string> format_bars(Shared& shared, const std::vector<registry:
     const std::string reason = format_reason(shared, job);
     if (lines.size() + (reason.empty() ? 1 : 2) + 2 > rows && jobs.size() > 1 && shown + 1 < jobs.size()) break;
     ++shown;
+    const std::vector<std::string> warnings = find_warnings(shared, job);
     const bool is_open = job.state == registry::State::running || job.state == registry::State::waiting;
     const std::string progress = is_open ? format_progress(shared, job) : "";
     lines.push_back(cut(fmt::format("{}  {:<9}  {}{}{}", job.id.short_text(), to_text(job.state), show(job.name, 40),
                                     progress.empty() ? "" : "  ", progress),
                         columns));
     if (!reason.empty()) lines.push_back(cut(fmt::format("              {}", reason), columns));
+    for (const std::string& warning : warnings) {
+      if (lines.size() + 2 <= rows || jobs.size() == 1) lines.push_back(cut("              warning: " + show_message(warning), columns));
+    }
   }
   if (shown < jobs.size()) lines.push_back(fmt::format("... and {} more; --all shows them", jobs.size() - shown));
   lines.push_back(cut(format_counts(jobs), columns));

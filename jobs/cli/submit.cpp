@@ -34,8 +34,8 @@ struct Answer {
 /// A row that was there: cancelled and lost ones are wanted again, and what was asked for explicitly counts from now on.
 void renew(Shared& shared, const Options& options, const Source& source, bool was_made) {
   shared.registry().update(store::require_id(source.request.id, "request"), [&](registry::Job& job) {
-    if (job.state == registry::State::running || job.state == registry::State::done) return false;
-    const bool is_wanted = is_submitted_again(job, !was_made);
+    if (job.state == registry::State::running || (job.state == registry::State::done && !was_made)) return false;
+    const bool is_wanted = job.state == registry::State::done || is_submitted_again(job, !was_made);
     if (is_wanted) {
       job.state = registry::State::queued;
       job.reason.clear();
@@ -98,6 +98,17 @@ Json::Value describe_answers(Shared& shared, const std::vector<Answer>& answers)
     }
   }
   return root;
+}
+
+void print_warnings(Shared& shared, const std::vector<Answer>& answers) {
+  std::size_t shown = 0;
+  for (const Answer& answer : answers) {
+    if (!answer.job) continue;
+    for (const std::string& warning : find_warnings(shared, *answer.job)) {
+      if (++shown > kMostShown) return;
+      fmt::print(stderr, "carillon: {}: warning: {}\n", show(answer.job->name), show_message(warning));
+    }
+  }
 }
 
 void print_lines(Shared& shared, const std::vector<Answer>& answers) {
@@ -179,8 +190,12 @@ int run_submit(Shared& shared, const Options& options) {
     for (Answer& answer : answers) {
       if (answer.job) answer.job = shared.registry().find(answer.job->id);
     }
-    if (shared.json) print_json(describe_answers(shared, answers));
+    if (shared.json)
+      print_json(describe_answers(shared, answers));
+    else if (!options.run || is_for_slurm)  // the queue has told them
+      print_warnings(shared, answers);
   } else {
+    if (!shared.json) print_warnings(shared, answers);
     for (const Answer& answer : answers) {
       if (code == 0 && answer.job && !is_open(*answer.job) && answer.job->state != registry::State::done) code = kExitSolve;
     }

@@ -13,6 +13,7 @@
 #include "jobs/process/process.hpp"
 #include "jobs/store/records.hpp"
 #include "runtime/config/document.hpp"
+#include "runtime/config/printable.hpp"
 
 namespace carillon::queue {
 namespace {
@@ -25,12 +26,8 @@ int find_columns() {
   return kOtherwiseColumns;
 }
 
-/// The name of a job fit for a terminal: no control characters.
-std::string clean(const std::string& text) {
-  std::string out;
-  for (const char letter : text) out += static_cast<unsigned char>(letter) < 0x20 || letter == 0x7f ? '?' : letter;
-  return out;
-}
+std::string clean(const std::string& text) { return config::printable(text); }
+std::string quote(const std::string& text) { return store::to_plain_json(config::quote(text)); }
 
 std::string format_left(double seconds) {
   if (seconds < 0.0) return "";
@@ -72,24 +69,28 @@ void Display::print(const std::string& line) {
   std::fflush(stdout);
 }
 
-void Display::tell(const std::string& event, const registry::Job& job) {
+void Display::tell(const std::string& event, const registry::Job& job, const std::vector<std::string>& warnings) {
   const bool is_end = event == "done" || event == "failed" || event == "cancelled";
   if (is_end) ++ended_;
   told_percent_.erase(job.id.text());
   if (json_) {
+    std::string list = event == "done" ? ", \"warnings\": [" : "";
+    for (std::size_t i = 0; i < warnings.size(); ++i) list += (i > 0 ? ", " : "") + quote(warnings[i]);
+    if (event == "done") list += "]";
     return print(fmt::format(
         "{{\"event\": \"{}\", \"boot_s\": {:.3f}, \"id\": \"{}\", \"name\": {}, \"ranks\": {}, \"memory_gb\": {:.3f}, \"attempt\": {}, "
-        "\"failures\": {}, \"reason\": {}}}",
-        event, process::find_boot_seconds(), job.id.text(), config::quote(job.name), job.given.ranks, job.given.memory_gb, job.attempts,
-        job.failures, config::quote(job.reason)));
+        "\"failures\": {}, \"reason\": {}{}}}",
+        event, process::find_boot_seconds(), job.id.text(), quote(job.name), job.given.ranks, job.given.memory_gb, job.attempts,
+        job.failures, quote(job.reason), list));
   }
   const bool is_in_bar = (event == "start" && job.reason.empty()) || event == "predict";
   if (is_in_bar) return;
   print(fmt::format("{} {}: {}{}{}", job.id.short_text(), clean(job.name), event, job.reason.empty() ? "" : ": ", clean(job.reason)));
+  for (const std::string& warning : warnings) print("  warning: " + clean(warning));
 }
 
 void Display::say(const std::string& text) {
-  print(json_ ? fmt::format("{{\"event\": \"note\", \"text\": {}}}", config::quote(text)) : clean(text));
+  print(json_ ? fmt::format("{{\"event\": \"note\", \"text\": {}}}", quote(text)) : clean(text));
 }
 
 void Display::show(const store::Store& store, const std::vector<registry::Job>& jobs) {
@@ -109,7 +110,7 @@ void Display::show(const store::Store& store, const std::vector<registry::Job>& 
       print(fmt::format(
           "{{\"event\": \"progress\", \"id\": \"{}\", \"phase\": {}, \"percent\": {:.1f}, \"modes_done\": {}, \"modes_wanted\": {}, "
           "\"seconds_left\": {}}}",
-          job.id.text(), config::quote(progress->phase), progress->percent, progress->modes_done,
+          job.id.text(), quote(progress->phase), progress->percent, progress->modes_done,
           progress->modes_wanted >= 0 ? std::to_string(progress->modes_wanted) : "null",
           progress->seconds_left >= 0 ? fmt::format("{:.1f}", progress->seconds_left) : "null"));
     } else if (first.empty()) {

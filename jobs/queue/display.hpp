@@ -17,7 +17,7 @@ class Display {
 
   /// A job was started, ended, or waits: one line. `event`: "start", "predict", "adopt", "done", "failed", "cancelled", "waiting",
   /// "queued".
-  void tell(const std::string& event, const registry::Job& job);
+  void tell(const std::string& event, const registry::Job& job, const std::vector<std::string>& warnings = {});
   /// Something about the whole run: one line.
   void say(const std::string& text);
   /// How far everything is: the bar, or a line for each job that got further.

@@ -27,6 +27,8 @@
 #include "jobs/queue/settle.hpp"
 #include "jobs/queue/spawn.hpp"
 #include "jobs/registry/registry.hpp"
+#include "jobs/store/files.hpp"
+#include "jobs/store/open_folder.hpp"
 
 namespace carillon::queue {
 namespace {
@@ -64,7 +66,7 @@ class Runner {
         if (is_over) return exit_code_;
       } catch (const SystemError& error) {
         // A full disk passes; whatever else the registry cannot do ends this.
-        if (!attempt::is_disk_full(store_.root()) && !attempt::is_disk_full(store_.registry_folder())) throw;
+        if (!store::is_disk_full(store_.root()) && !store::is_disk_full(store_.registry_folder())) throw;
         if (!is_disk_told_) display_.say(fmt::format("the disk is full ({}); this goes on when there is room", error.what()));
         is_disk_told_ = true;
         if (stops_ > 0 && list_attempts().empty()) return exit_code_;
@@ -157,7 +159,8 @@ class Runner {
   void tell_end(const Job& job) {
     blocked_since_.erase(job.id.text());
     needs_.erase(job.id.text());
-    display_.tell(registry::to_text(job.state), job);
+    display_.tell(registry::to_text(job.state), job,
+                  job.state == State::done ? store::read_warnings(store_.bank_folder(job.id)) : std::vector<std::string>());
   }
 
   void tell_adopted(const std::vector<Job>& jobs) {
@@ -353,7 +356,9 @@ class Runner {
     attempt.has_pictures = options_.has_pictures;
     blocked_since_.erase(job.id.text());
     asked_s_.erase(job.id.text());
-    const pid_t pid = spawn(attempt::make_arguments(options_.program, attempt), attempt.work / store::kLogFile);
+    const store::OpenFolder work = store_.open_work(job.id);
+    attempt::clear_way(work.path(), store::kLogFile);
+    const pid_t pid = spawn(attempt::make_arguments(options_.program, attempt), work.path() / store::kLogFile);
     children_.emplace(pid, job);
     name_worker(job, pid);
     display_.tell(attempt.is_prediction ? "predict" : "start", job);

@@ -11,9 +11,10 @@
 #include <algorithm>
 #include <optional>
 
-#include "jobs/attempt/publish.hpp"
 #include "jobs/outcome/policy.hpp"
 #include "jobs/process/process.hpp"
+#include "jobs/queue/repair.hpp"
+#include "jobs/store/files.hpp"
 
 namespace carillon::queue {
 namespace {
@@ -39,7 +40,7 @@ void wait(Job& job, double delay_s, const std::string& reason) {
 outcome::Outcome find_outcome(const std::filesystem::path& work, const std::string& token) {
   if (std::optional<outcome::Outcome> outcome = outcome::read_outcome(work); outcome && outcome->token == token) return *outcome;
   outcome::Outcome outcome = outcome::make_killed(token);
-  if (attempt::is_disk_full(work)) {
+  if (store::is_disk_full(work)) {
     outcome.cause = outcome::Cause::disk_full;
     outcome.reason = "the disk of the store is full, and how the attempt ended could not be written";
   }
@@ -139,7 +140,7 @@ void settle_unbegun(const store::Store& store, registry::Registry& registry, con
 
 void settle_unstarted(const store::Store& store, registry::Registry& registry, const Job& job, const std::string& refusal) {
   outcome::Outcome outcome = outcome::make_killed(job.token);
-  outcome.cause = attempt::is_disk_full(store.root()) ? outcome::Cause::disk_full : outcome::Cause::system;
+  outcome.cause = store::is_disk_full(store.root()) ? outcome::Cause::disk_full : outcome::Cause::system;
   outcome.reason = refusal;
   change_running(
       registry, job, [&](Job& row) { apply(row, outcome); }, nullptr);
@@ -191,11 +192,15 @@ Said cancel(const store::Store& store, registry::Registry& registry, const store
 
 Said retry(const store::Store& store, registry::Registry& registry, const store::Id& id, const std::function<void(Job&)>& change) {
   Said answer{false, "there is no such job"};
+  const std::optional<Job> known = registry.find(id);
+  if (!known) return answer;
+  if (known->state == State::done && !store.find_bank_fault(id, store::Look::full))
+    return {false, "it is done; there is nothing to do again"};
+  // A job that somebody works on is not touched.
+  if (known->state == State::done || known->state == State::failed || known->state == State::cancelled) {
+    if (const std::optional<std::string> refusal = restore(store, registry, id)) return {false, *refusal};
+  }
   registry.update(id, [&](Job& row) {
-    if (row.state == State::done) {
-      answer = {false, "it is done; there is nothing to do again"};
-      return false;
-    }
     if (row.state == State::running || row.state == State::queued) {
       answer = {false, row.state == State::running ? "it runs already" : "it is queued already"};
       return false;

@@ -21,7 +21,7 @@ pid_t spawn(const std::vector<std::string>& arguments, const std::filesystem::pa
   posix_spawnattr_t attributes;
   ::posix_spawn_file_actions_init(&files);
   ::posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
-  ::posix_spawn_file_actions_addopen(&files, 1, log.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW, 0666);
+  ::posix_spawn_file_actions_addopen(&files, 1, log.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW | O_NONBLOCK, 0666);
   ::posix_spawn_file_actions_adddup2(&files, 1, 2);
   ::posix_spawnattr_init(&attributes);
   // What asks an attempt to stop waits until it is ready to hear it.

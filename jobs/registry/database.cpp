@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include "jobs/store/files.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::registry {
@@ -16,7 +17,11 @@ constexpr int kBusyMs = 60'000;
 }  // namespace
 
 Database::Database(const std::filesystem::path& file) : file_(file) {
-  const int code = sqlite3_open_v2(file.c_str(), &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr);
+  // SQLite refuses a link anywhere in the name; the folder is the user's own matter.
+  std::error_code none;
+  const std::filesystem::path folder = std::filesystem::canonical(file.parent_path(), none);
+  const std::filesystem::path name = none ? file : folder / file.filename();
+  const int code = sqlite3_open_v2(name.c_str(), &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_NOFOLLOW, nullptr);
   try {
     if (code != SQLITE_OK) fail(code);
     sqlite3_extended_result_codes(handle_, 1);
@@ -49,10 +54,15 @@ void Database::run(const char* sql) {
 }
 
 void Database::fail(int code) const {
-  const std::string what = fmt::format("{}: {}", file_.string(), handle_ != nullptr ? sqlite3_errmsg(handle_) : sqlite3_errstr(code));
+  std::string what = fmt::format("{}: {}", file_.string(), handle_ != nullptr ? sqlite3_errmsg(handle_) : sqlite3_errstr(code));
+  // A full disk shows itself in many ways: no log, no shared memory, no journal.
+  const bool is_full = file_.has_parent_path() && store::is_disk_full(file_.parent_path());
+  if (is_full && (code & 0xFF) != SQLITE_FULL && (code & 0xFF) != SQLITE_BUSY && (code & 0xFF) != SQLITE_CORRUPT &&
+      (code & 0xFF) != SQLITE_NOTADB)
+    throw SystemError(what + "; the disk is full: make room on it (carillon gc lists what could go) and try again");
   switch (code & 0xFF) {
     case SQLITE_FULL:
-      throw SystemError(what + "; make room on the disk and try again");
+      throw SystemError(what + "; the disk is full: make room on it (carillon gc lists what could go) and try again");
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       throw SystemError(what + " by another process for a minute; find out what it does, and try again");

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -43,6 +44,9 @@ bool adopt_attempt(Job& job, const fs::path& work) {
   return true;
 }
 
+/// Of a bank that was done.
+std::string describe_fault(const std::string& fault) { return fault + "; carillon retry, or submit, computes it again"; }
+
 /// What a folder of the store says of its job. A damaged record costs what it held, not the job.
 Job make_job(const store::Store& store, const store::Id& id) {
   Job job{id};
@@ -57,8 +61,14 @@ Job make_job(const store::Store& store, const store::Id& id) {
   } catch (const InputError&) {
     job.name = "?";
   }
-  if (store.has_bank(id)) {
+  const std::optional<std::string> fault = store.find_bank_fault(id, store::Look::quick);
+  if (!fault) {
     job.state = State::done;
+    return job;
+  }
+  if (!store.has_work(id)) {
+    job.state = State::failed;
+    job.reason = describe_fault(*fault);
     return job;
   }
   try {
@@ -99,14 +109,16 @@ Differences find_differences(Database& database, const store::Store& store) {
       if (rows.count(id) == 0) found.unknown.push_back(id);
     }
   }
-  for (const store::Id& id : banks) {
+  std::vector<store::Id> whole;
+  std::copy_if(banks.begin(), banks.end(), std::back_inserter(whole), [&](const store::Id& id) { return store.has_bank(id); });
+  for (const store::Id& id : whole) {
     const auto at = rows.find(id);
     if (at != rows.end() && at->second != State::done && at->second != State::running) found.finished.push_back(id);
   }
   for (const auto& [id, state] : rows) {
     Job probe{id};
     if ((state == State::queued || state == State::waiting) && adopt_attempt(probe, store.work_folder(id))) found.alive.push_back(id);
-    if (state == State::running || state == State::failed || std::binary_search(banks.begin(), banks.end(), id)) continue;
+    if (state == State::running || state == State::failed || std::binary_search(whole.begin(), whole.end(), id)) continue;
     if (state == State::done || !std::binary_search(work.begin(), work.end(), id)) found.missing.push_back(id);
   }
   return found;
@@ -114,14 +126,16 @@ Differences find_differences(Database& database, const store::Store& store) {
 
 /// False when there is nothing to change any more.
 bool settle_missing(Job& job, const store::Store& store) {
-  if (store.has_bank(job.id) || job.state == State::running || job.state == State::failed) return false;
+  const std::optional<std::string> fault = store.find_bank_fault(job.id, store::Look::quick);
+  if (!fault || job.state == State::running || job.state == State::failed) return false;
   if (store.has_work(job.id)) {
     if (job.state != State::done) return false;
     job.state = State::queued;
     return true;
   }
-  job.reason = job.state == State::done ? "its bank is no longer in the store; submit the job again"
-                                        : "its folder is no longer in the store; submit the job again";
+  job.reason = store.has_bank_folder(job.id) ? describe_fault(*fault)
+               : job.state == State::done    ? "its bank is no longer in the store; submit the job again"
+                                             : "its folder is no longer in the store; submit the job again";
   job.state = State::failed;
   return true;
 }
@@ -158,7 +172,11 @@ void append_submissions(const store::Store& store, const std::vector<Submission>
   if (fd < 0) store::throw_errno(file, "write", errno);
   struct stat info {};
   char last = '\n';
-  if (::fstat(fd, &info) == 0 && info.st_size > 0) [[maybe_unused]]
+  if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
+    ::close(fd);
+    throw SystemError(fmt::format("{}: the log of submissions must be a regular file; remove what is there", file.string()));
+  }
+  if (info.st_size > 0) [[maybe_unused]]
     const ssize_t got = ::pread(fd, &last, 1, info.st_size - 1);
   if (last != '\n') text.insert(0, "\n");  // behind a line that was cut
   int error = 0;
@@ -244,7 +262,7 @@ void reconcile(Database& database, const store::Store& store, const Say& say) {
   }
   transaction.commit();
   if (missing > 0)
-    say(fmt::format("{} job{} of the registry had lost folders in the store; carillon status names them", missing,
+    say(fmt::format("{} job{} of the registry had lost folders in the store, or damaged banks; carillon status names them", missing,
                     missing == 1 ? "" : "s"));
 }
 

@@ -51,7 +51,7 @@ void make_file(const fs::path& file) {
 class Gate {
  public:
   explicit Gate(const fs::path& folder)
-      : descriptor_(::open((folder / "registry.lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0664)) {
+      : descriptor_(::open((folder / "registry.lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0664)) {
     if (descriptor_ < 0) store::throw_errno(folder / "registry.lock", "open", errno);
     while (::flock(descriptor_, LOCK_EX) != 0) {
       if (errno != EINTR) store::throw_errno(folder / "registry.lock", "lock", errno);
@@ -70,7 +70,12 @@ store::Standing make_standing(const Job& job) { return {to_text(job.state), job.
 /// Beside the job, for a registry that has to be made again.
 void write_standing(const store::Store& store, const Job& job) {
   if (job.state == State::running || job.state == State::done || !store.has_work(job.id)) return;
-  store::write_standing(store.work_folder(job.id), make_standing(job));
+  const store::OpenFolder work = store.open_work(job.id);
+  try {
+    store::write_standing(work.path(), make_standing(job));
+  } catch (const SystemError& error) {
+    throw SystemError(store::show_names(work, error.what()));
+  }
 }
 
 bool is_ready(const Job& job, const std::string& boot, double now_s) {

@@ -8,13 +8,14 @@
 #include <time.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <set>
 #include <tuple>
 
 #include "jobs/process/process.hpp"
 #include "jobs/queue/settle.hpp"
+#include "jobs/store/files.hpp"
+#include "jobs/store/open_folder.hpp"
 
 namespace carillon::slurm {
 namespace {
@@ -42,9 +43,13 @@ void make_queued(Job& row, const std::string& reason) {
 void append_output(const fs::path& root, const fs::path& work, const Handed& handed) {
   const std::string output = read_output(root, handed);
   if (output.empty()) return;
-  std::ofstream(work / store::kLogFile, std::ios::app | std::ios::binary) << output << (output.ends_with('\n') ? "" : "\n");
+  store::append_text(work / store::kLogFile, output + (output.ends_with('\n') ? "" : "\n"));
   std::error_code error;
   fs::remove(make_output_file(root, handed.batch, std::max(handed.task, 0)), error);
+}
+
+void remove_handed(const store::Store& store, const store::Id& id) {
+  if (store.has_work(id)) slurm::remove_handed(store.open_work(id).path());
 }
 
 /// As queue::apply(). Memory that the user named is not raised behind his back; memory that was predicted is, beyond what was given.
@@ -137,7 +142,7 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
   };
   const auto give_up = [&](State state, const std::string& reason) {
     for (const Job& job : jobs) {
-      remove_handed(store_.work_folder(job.id));
+      remove_handed(store_, job.id);
       change(job, [&](Job& row) {
         make_queued(row, reason);
         row.state = row.cancel_wanted ? State::cancelled : state;
@@ -151,7 +156,8 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
     const std::string script = make_script(batch, site_.settings());
     std::vector<store::Id> ids;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
-      const fs::path work = store_.work_folder(jobs[i].id);
+      const store::OpenFolder opened = store_.open_work(jobs[i].id);
+      const fs::path work = opened.path();
       ids.push_back(jobs[i].id);
       write_failures(work, jobs[i].failures);
       const std::optional<outcome::Attempt> before = outcome::read_attempt(work);
@@ -226,7 +232,7 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
       if (number != "none") write_number(store_.root(), handed->batch, number);
     }
     if (!handed && !is_claimed) continue;  // waits to be handed over
-    if (handed && number == "none") remove_handed(store_.work_folder(job.id));
+    if (handed && number == "none") remove_handed(store_, job.id);
     registry.update(job.id, [&](Job& row) {
       if (!row.slurm_job.empty() || row.state != job.state || row.token != job.token) return false;
       make_queued(row, "");
@@ -269,12 +275,12 @@ void Engine::settle(registry::Registry& registry, const Job& job, const std::opt
   if (!is_done) {
     judgement = judge(store_, job.id, handed, seen);
     failures = read_failures(work);
-    append_output(store_.root(), work, handed);
+    if (store_.has_work(job.id)) append_output(store_.root(), store_.open_work(job.id).path(), handed);
     has_asked_memory = find_asked(work).memory_gb > 0.0;
   }
   registry.update(job.id, [&](Job& row) {
     if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
-    remove_handed(work);
+    remove_handed(store_, job.id);
     row.slurm_job.clear();
     row.attempts += seen ? seen->restarts : 0;
     row.ended_unix_s = registry::find_unix_seconds();
@@ -335,7 +341,7 @@ void Engine::cancel_left(registry::Registry& registry) {
   for (const Job& job : registry.list({State::cancelled})) {
     if (job.engine != "slurm" || job.slurm_job.empty()) continue;
     site_.cancel({job.slurm_job});
-    remove_handed(store_.work_folder(job.id));
+    remove_handed(store_, job.id);
     registry.update(job.id, [&](Job& row) {
       if (row.state != State::cancelled || row.slurm_job != job.slurm_job) return false;
       row.slurm_job.clear();

@@ -6,7 +6,6 @@
 #include <fmt/core.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <optional>
 #include <string>
 
@@ -14,6 +13,8 @@
 #include "jobs/outcome/policy.hpp"
 #include "jobs/slurm/records.hpp"
 #include "jobs/slurm/site.hpp"
+#include "jobs/store/files.hpp"
+#include "jobs/store/open_folder.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::slurm {
@@ -32,9 +33,15 @@ outcome::Outcome explain_stop(outcome::Outcome outcome) {
   return outcome;
 }
 
-int end_attempt(const std::filesystem::path& work, int exit_code) {
+int end_attempt(const std::filesystem::path& named, int exit_code) {
   const char* job = std::getenv("SLURM_JOB_ID");
   if (job == nullptr || exit_code != attempt::kExitGoesOn) return exit_code;
+  // work/ab/<id>: each opened in the one above.
+  const std::filesystem::path shard = named.parent_path();
+  const auto opened = store::OpenFolder::open(shard.parent_path()).find(shard.filename().string());
+  const auto folder = opened ? opened->find(named.filename().string()) : std::nullopt;
+  if (!folder) return exit_code;
+  const std::filesystem::path work = folder->path();
   const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
   if (!left || is_for_outside(left->cause)) return exit_code;
   const Site site{Settings{}};
@@ -46,7 +53,7 @@ int end_attempt(const std::filesystem::path& work, int exit_code) {
     const outcome::Decision decision = outcome::decide(outcome.cause, failures, outcome.is_further);
     if (decision.next == outcome::Next::failed) return kExitSystem;
     write_failures(work, decision.failures);
-    std::ofstream(work / store::kLogFile, std::ios::app) << "carillon: " << outcome.reason << "; queued again in Slurm\n";
+    store::append_text(work / store::kLogFile, "carillon: " + outcome.reason + "; queued again in Slurm\n");
     site.requeue(job, decision.delay_s);
   } catch (const SystemError& error) {
     fmt::print(stderr, "carillon: {}\n", error.what());

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "jobs/slurm/script.hpp"
+#include "jobs/store/open_folder.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/file.hpp"
 
@@ -69,15 +70,12 @@ int read_failures(const fs::path& work) {
 }
 
 void make_batch_folder(const store::Store& store, const std::string& batch, const std::string& script, const std::vector<store::Id>& jobs) {
-  const fs::path temporary = store.make_temporary(), folder = store.root() / "slurm" / batch;
+  const store::Temporary temporary = store.make_temporary();
   std::string ids;
   for (const store::Id& id : jobs) ids += id.text() + "\n";
   config::write_file(temporary / kJobsFile, ids);
   config::write_file(temporary / "job.sh", script);
-  std::error_code error;
-  fs::create_directories(folder.parent_path(), error);
-  if (!error) fs::rename(temporary, folder, error);
-  if (error) throw SystemError(fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
+  store.publish_batch(batch, temporary);
 }
 
 std::vector<store::Id> read_jobs(const fs::path& root, const std::string& batch) {
@@ -90,7 +88,9 @@ std::vector<store::Id> read_jobs(const fs::path& root, const std::string& batch)
 }
 
 void write_number(const fs::path& root, const std::string& batch, const std::string& number) {
-  config::write_file(root / "slurm" / batch / kNumberFile, number + "\n");
+  const auto all = store::OpenFolder::open(root).find("slurm");
+  const auto folder = all && is_name(batch) ? all->find(batch) : std::nullopt;
+  if (folder) config::write_file(folder->path() / kNumberFile, number + "\n");
 }
 
 std::string read_number(const fs::path& root, const std::string& batch) {
@@ -101,8 +101,11 @@ std::string read_number(const fs::path& root, const std::string& batch) {
 }
 
 void remove_batch_folder(const fs::path& root, const std::string& batch) {
-  std::error_code error;
-  if (is_name(batch)) fs::remove_all(root / "slurm" / batch, error);
+  try {
+    const auto all = store::OpenFolder::open(root).find("slurm");
+    if (all && is_name(batch)) all->remove(batch);
+  } catch (const SystemError&) {  // its owner removes it
+  }
 }
 
 std::string read_output(const fs::path& root, const Handed& handed) {

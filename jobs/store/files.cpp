@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -28,26 +29,34 @@ void sync_path(const fs::path& path, int flags, int (*sync)(int)) {
 
 void sync_file(const fs::path& file) { sync_path(file, 0, ::fsync); }
 void sync_folder(const fs::path& folder) { sync_path(folder, O_DIRECTORY, ::fsync); }
-void sync_file_system(const fs::path& folder) { sync_path(folder, O_DIRECTORY, ::syncfs); }
 
 void make_folder(const fs::path& folder) {
   if (::mkdir(folder.c_str(), 0777) != 0 && errno != EEXIST) throw_errno(folder, "make this folder", errno);
 }
 
 void throw_errno(const fs::path& path, const std::string& verb, int error) {
-  const char* mend = error == ENOSPC || error == EDQUOT                    ? "make room on the disk and try again"
+  const char* mend = error == ENOSPC || error == EDQUOT
+                         ? "the disk is full: make room on it (carillon gc lists what could go) and try again"
                      : error == EACCES || error == EPERM || error == EROFS ? "check owner, group and rights"
                                                                            : "check the disk";
   throw SystemError(fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), mend));
 }
 
-void remove_tree(const fs::path& folder) {
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, fs::directory_options::none, error), end; !error && it != end; it.increment(error)) {
-    if (it->is_directory(error) && !it->is_symlink(error)) ::chmod(it->path().c_str(), 0700);
-  }
-  fs::remove_all(folder, error);
-  if (error) throw_errno(folder, "remove", error.value());
+bool append_text(const fs::path& file, const std::string& text) {
+  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
+  if (fd < 0) return false;
+  struct stat info {};
+  const bool is_ours = ::fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && info.st_nlink == 1;
+  const bool is_written = is_ours && ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  ::close(fd);
+  return is_written;
+}
+
+bool is_disk_full(const fs::path& folder) {
+  constexpr double kFullBytes = 1 << 20;
+  struct statvfs info {};
+  if (::statvfs(folder.c_str(), &info) != 0) return false;
+  return static_cast<double>(info.f_bavail) * static_cast<double>(info.f_frsize) < kFullBytes;
 }
 
 }  // namespace carillon::store

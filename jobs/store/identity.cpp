@@ -16,8 +16,11 @@
 #include <chrono>
 #include <cstring>
 #include <fstream>
+#include <map>
+#include <set>
 #include <sstream>
 
+#include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/config/file.hpp"
@@ -28,6 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kHeadBytes = 4096;
+constexpr std::uint64_t kMostJobBytes = 64 << 20;
 constexpr const char* kScheme = "carillon identity 1";
 
 Json::Value parse_json(const std::string& text) {
@@ -86,7 +90,7 @@ const fs::path& get_input(const spec::JobSpec& job) { return job.body ? job.body
 
 /// Copies a file to `target` while it is hashed.
 Id copy_hashed(const fs::path& file, const char* what, const fs::path& target) {
-  const int fd = ::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0444);
+  const int fd = ::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0444);
   if (fd < 0) throw_errno(target, "write", errno);
   int error = 0;
   const auto write_all = [&](std::string_view bytes) {
@@ -108,35 +112,43 @@ Id copy_hashed(const fs::path& file, const char* what, const fs::path& target) {
   }
 }
 
-/// Puts files into inputs/ under the names that follow from their hash.
-void take_snapshot(const Store& store, const spec::JobSpec& job, const Request& request) {
-  if (request.input_kind == "shape") return;
+/// Puts the files of an input into inputs/ under the names that follow from their hash.
+void take_snapshot(const Store& store, const fs::path& input, const Request& request) {
   const Id wanted = require_id(request.input_sha256, "the input's hash");
   const fs::path target = store.input_file(wanted, request.input_format);
   const bool is_pair = request.input_format == "tetgen";
-  std::error_code none;
-  if (fs::exists(target, none) && (!is_pair || fs::exists(fs::path(target).replace_extension("ele"), none))) return;
-  const fs::path temporary = store.make_temporary();
-  try {
-    const auto pair = find_tetgen_pair(get_input(job));
-    const char* what = job.body ? "surface" : "mesh";
-    Id found = copy_hashed(is_pair ? pair[0] : get_input(job), what, temporary / "first");
-    if (is_pair) found = hash_pair(found, copy_hashed(pair[1], what, temporary / "second"));
-    if (found != wanted)
-      throw InputError(fmt::format("{}: this {} changes while it is read; submit the job when it is whole", get_input(job).string(), what));
-    make_folder(target.parent_path());
-    const auto name = [&](const char* from, const fs::path& to) {
-      if (::rename((temporary / from).c_str(), to.c_str()) != 0) throw_errno(to, "write", errno);
-    };
-    if (is_pair) name("second", fs::path(target).replace_extension("ele"));
-    name("first", target);
-    sync_folder(target.parent_path());
-    sync_folder(target.parent_path().parent_path());
-  } catch (...) {
-    fs::remove_all(temporary, none);
-    throw;
+  const Temporary temporary = store.make_temporary();
+  const auto pair = find_tetgen_pair(input);
+  const char* what = request.input_kind.c_str();
+  Id found = copy_hashed(is_pair ? pair[0] : input, what, temporary / "first");
+  if (is_pair) found = hash_pair(found, copy_hashed(pair[1], what, temporary / "second"));
+  if (found != wanted)
+    throw InputError(fmt::format("{}: this {} changes while it is read; submit the job when it is whole", input.string(), what));
+  const OpenFolder shard = store.open_inputs(wanted);
+  const auto name = [&](const char* from, const fs::path& to) {
+    const std::string last = to.filename().string();
+    if (::renameat(temporary.content().get(), from, shard.get(), last.c_str()) == 0) return;
+    if (errno != EISDIR) throw_errno(to, "write", errno);
+    shard.remove(last);  // a folder where an input belongs
+    if (::renameat(temporary.content().get(), from, shard.get(), last.c_str()) != 0) throw_errno(to, "write", errno);
+  };
+  if (is_pair) name("second", fs::path(target).replace_extension("ele"));
+  name("first", target);
+  shard.sync();
+}
+
+/// Inputs that were found whole, and those that were copied, by hash and format.
+using Inputs = std::map<std::string, bool>;
+
+/// True when the input was not there, or damaged, and is whole now.
+bool ensure_input(const Store& store, const spec::JobSpec& job, const Request& request, Inputs& known) {
+  if (request.input_kind == "shape") return false;
+  const auto [entry, is_new] = known.try_emplace(request.input_sha256 + "." + request.input_format, false);
+  if (is_new && find_input_fault(store, request)) {
+    take_snapshot(store, get_input(job), request);
+    entry->second = true;
   }
-  fs::remove_all(temporary, none);
+  return entry->second;
 }
 
 /// What is not synced yet: publish_work() does that.
@@ -149,17 +161,42 @@ void write_unsynced(const fs::path& file, const std::string& text) {
 }
 
 /// Writes the files of a job into its folder, which is to become work/ab/<id>.
-void fill_work(const Store& store, const spec::JobSpec& job, const Request& request, const Store::Prepared& place) {
+void fill_work(const Store& store, const spec::JobSpec& job, const Request& request, const Id& id, const fs::path& folder) {
   spec::JobSpec inner = job;
-  const fs::path work = store.work_folder(place.id);
+  const fs::path work = store.work_folder(id);
   if (request.input_kind != "shape") {
     const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
     (job.body ? inner.body->surface : inner.mesh) = input;
   }
   inner.bank = work / kBankFile;
-  write_unsynced(place.folder / kJobFile, spec::resolved_json(inner, work, ""));
-  write_unsynced(place.folder / kRequestFile, format_request(request));
-  write_unsynced(place.folder / kStandingFile, format_standing({}));
+  write_unsynced(folder / kJobFile, spec::resolved_json(inner, work, ""));
+  write_unsynced(folder / kRequestFile, format_request(request));
+  write_unsynced(folder / kStandingFile, format_standing({}));
+}
+
+/// The job of a request, with its input in the store and its bank where carillon-precompute is to write it.
+spec::JobSpec make_job(const Store& store, const Request& request, const Id& id) {
+  Json::Value root = parse_json(request.job);
+  const fs::path work = store.work_folder(id);
+  if (request.input_kind != "shape") {
+    const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
+    (request.input_kind == "surface" ? root["body"]["surface"] : root["mesh"]) = input.string();
+  }
+  root["bank"] = (work / kBankFile).string();
+  Json::StreamWriterBuilder writer;
+  writer["precision"] = 17;
+  writer["emitUTF8"] = true;
+  return spec::parse_job(Json::writeString(writer, root), work / kJobFile);
+}
+
+/// A folder of work that nobody works in and that is not what was submitted.
+bool is_spoilt(const Store& store, const Id& id) {
+  try {
+    const OpenFolder work = store.open_work(id);
+    return find_job_fault(store, id, work.path()) && !process::Lock::is_held(work.path() / "lock");
+  } catch (const SystemError&) {
+    return false;
+  }
 }
 
 }  // namespace
@@ -215,34 +252,124 @@ Request RequestMaker::make(const spec::JobSpec& job) {
     request.input_sha256 = known.sha256.text();
   }
   request.job_file = to_text(fs::absolute(job.file).lexically_normal());
-  request.id = hash_text(fmt::format("{}\njob {}\ninput {} {} {}\nsolver {}\n", kScheme, request.job, request.input_kind,
-                                     to_text(request.input_format), request.input_sha256, solver_))
-                   .text();
+  request.id = calc_id(request).text();
   return request;
+}
+
+Id calc_id(const Request& request) {
+  return hash_text(fmt::format("{}\njob {}\ninput {} {} {}\nsolver {}\n", kScheme, request.job, request.input_kind,
+                               to_text(request.input_format), request.input_sha256, request.solver));
+}
+
+std::optional<std::string> find_input_fault(const Store& store, const Request& request) {
+  if (request.input_kind == "shape") return std::nullopt;
+  const Id wanted = require_id(request.input_sha256, "the request");
+  const fs::path file = store.input_file(wanted, request.input_format);
+  const std::string what =
+      fmt::format("the copy of its {} in the store, {},", request.input_kind, file.lexically_relative(store.root()).string());
+  try {
+    const auto inputs = OpenFolder::open(store.root()).find("inputs");
+    const auto shard = inputs ? inputs->find(wanted.text().substr(0, 2)) : std::nullopt;
+    const auto hash = [&](const fs::path& name) -> std::optional<Id> {
+      const auto info = shard ? shard->look_at(name.filename().string()) : std::nullopt;
+      if (!info || !S_ISREG(info->st_mode)) return std::nullopt;
+      return hash_file(shard->path() / name.filename(), request.input_kind);
+    };
+    std::optional<Id> found = hash(file);
+    if (found && request.input_format == "tetgen") {
+      const std::optional<Id> other = hash(fs::path(file).replace_extension("ele"));
+      found = other ? std::optional(hash_pair(*found, *other)) : std::nullopt;
+    }
+    if (!found) return what + " is missing";
+    if (*found != wanted) return what + " is damaged: its bytes are not those that were submitted";
+    return std::nullopt;
+  } catch (const SystemError& error) {
+    return error.what();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+std::optional<std::string> find_job_fault(const Store& store, const Id& id, const fs::path& folder) {
+  try {
+    const std::optional<Request> request = read_request(folder);
+    if (!request) return "its request.json is missing";
+    if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
+    const spec::JobSpec job =
+        spec::parse_job(config::read_file(folder / kJobFile, "job file", kMostJobBytes), store.work_folder(id) / kJobFile);
+    if (make_canonical_job(job) != request->job) return "its job.json asks for something else than was submitted";
+    if (job.bank != store.work_folder(id) / kBankFile) return "its job.json names another bank than was submitted";
+    const fs::path wanted = request->input_kind == "shape"
+                                ? fs::path()
+                                : store.input_file(require_id(request->input_sha256, "the request"), request->input_format);
+    if (get_input(job) != wanted) return fmt::format("its job.json names another {} than was submitted", request->input_kind);
+    return std::nullopt;
+  } catch (const InputError& error) {
+    return fmt::format("its files cannot be read: {}", error.what());
+  }
+}
+
+std::optional<std::string> find_origin_fault(const std::string& provenance, const Request& request) {
+  try {
+    const spec::JobSpec job = spec::parse_job(provenance, "/the record in the bank");
+    if (make_canonical_job(job) != request.job) return "the bank was made of another job than this one";
+    const std::string name = get_input(job).stem().string();
+    if (request.input_kind != "shape" && name != request.input_sha256)
+      return fmt::format("the bank was made of another {} than this job's", request.input_kind);
+    return std::nullopt;
+  } catch (const InputError&) {
+    return "the bank does not tell which job it was made of";
+  }
+}
+
+bool restore_input(const Store& store, const Request& request) {
+  if (!find_input_fault(store, request)) return true;
+  if (request.input_file.empty()) return false;
+  try {
+    take_snapshot(store, from_text(request.input_file), request);
+    return true;
+  } catch (const InputError&) {  // gone, or another by now
+    return false;
+  }
+}
+
+bool restore_work(const Store& store, const Request& request) {
+  const Id id = calc_id(request);
+  const Temporary temporary = store.make_temporary();
+  const OpenFolder folder = temporary.content().make(id.text());
+  fill_work(store, make_job(store, request, id), request, id, folder.path());
+  if (is_spoilt(store, id)) store.remove_work(id);
+  return store.publish_work(temporary, {{id, id.text()}}).front();
 }
 
 std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& asked) {
   std::vector<bool> was_made(asked.size(), false);
   std::vector<std::size_t> index;  // of what lies in `folders`
   std::vector<Store::Prepared> folders;
-  try {
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-      const Id id = require_id(asked[i].request->id, "the request");
-      if (store.has_bank(id) || store.has_work(id)) continue;
-      take_snapshot(store, *asked[i].job, *asked[i].request);
-      folders.push_back({id, store.make_temporary()});
-      index.push_back(i);
-      fill_work(store, *asked[i].job, *asked[i].request, folders.back());
+  std::set<Id> seen;
+  Inputs inputs;
+  std::optional<Temporary> temporary;
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    const Id id = require_id(asked[i].request->id, "the request");
+    if (!seen.insert(id).second) continue;
+    if (!store.find_bank_fault(id, Look::full)) continue;
+    if (store.has_bank_folder(id)) store.set_bank_aside(id);
+    const bool is_copied = ensure_input(store, *asked[i].job, *asked[i].request, inputs);
+    if (store.has_work(id)) {
+      was_made[i] = is_copied;
+      if (!is_spoilt(store, id)) continue;
+      store.remove_work(id);
     }
-    if (folders.empty()) return was_made;
-    const std::vector<bool> was_published = store.publish_work(folders);
-    for (std::size_t i = 0; i < index.size(); ++i) was_made[index[i]] = was_published[i];
-    return was_made;
-  } catch (...) {
-    std::error_code none;
-    for (const Store::Prepared& work : folders) fs::remove_all(work.folder, none);
-    throw;
+    if (!temporary) temporary.emplace(store.make_temporary());
+    folders.push_back({id, id.text()});
+    index.push_back(i);
+    const OpenFolder folder = temporary->content().make(id.text());
+    fill_work(store, *asked[i].job, *asked[i].request, id, folder.path());
   }
+  if (folders.empty()) return was_made;
+  const std::vector<bool> was_published = store.publish_work(*temporary, folders);
+  for (std::size_t i = 0; i < index.size(); ++i) was_made[index[i]] = was_published[i];
+  return was_made;
 }
 
 }  // namespace carillon::store

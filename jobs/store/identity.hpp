@@ -42,9 +42,30 @@ struct Asked {
   const Request* request = nullptr;
 };
 
-/// Copies the inputs into the store unless they are there, and makes work/ab/<id> with job.json and request.json unless it is there, with
-/// one sync for all of them. Per job: true when this call made it. Throws InputError when an input is no longer what was hashed,
-/// SystemError when the disk refuses.
+/// Copies the inputs into the store unless they are there and whole, and makes work/ab/<id> with job.json and request.json unless it is
+/// there, with one sync for all of them. A bank or a folder of work that is damaged is set aside, or removed, and made again. Per job: true
+/// when this call made it, or made its input whole. Throws InputError when an input is no longer what was hashed, SystemError when the disk
+/// refuses.
 std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& asked);
+
+/// The id that follows from the parts in a request.
+Id calc_id(const Request& request);
+
+/// Why the input of a request in inputs/ is not what was submitted, in one sentence; none when it is. Reads all of it.
+std::optional<std::string> find_input_fault(const Store& store, const Request& request);
+
+/// Why work/ab/<id> is not what was submitted: its request gives another id, its job.json asks for something else. None when it is.
+/// `folder` is that folder (a link to its descriptor will do).
+std::optional<std::string> find_job_fault(const Store& store, const Id& id, const std::filesystem::path& folder);
+
+/// Why a bank with this record of its making (JSON) was not made of that request; none when it was.
+std::optional<std::string> find_origin_fault(const std::string& provenance, const Request& request);
+
+/// Copies a damaged or missing input again from where it was submitted from. False when that is gone or another by now.
+bool restore_input(const Store& store, const Request& request);
+
+/// Makes work/ab/<id> again from a request alone, in place of one that is damaged; its input has to be in the store. False when there is
+/// one by now.
+bool restore_work(const Store& store, const Request& request);
 
 }  // namespace carillon::store

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "jobs/store/store.hpp"
@@ -59,7 +60,7 @@ Request read_request_root(config::Object root, const std::string& where) {
 /// The last `most` bytes of a regular file; empty when there is none.
 std::string read_tail(const fs::path& file, off_t most) {
   std::string text;
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
   if (fd < 0) return text;
   struct stat info {};
   if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode)) {
@@ -150,6 +151,26 @@ std::string format_standing(const Standing& standing) {
 
 void write_standing(const fs::path& folder, const Standing& standing) {
   config::write_file(folder / kStandingFile, format_standing(standing));
+}
+
+std::vector<std::string> read_warnings(const fs::path& folder) {
+  constexpr std::uint64_t kMostBytes = 64 << 20;
+  constexpr std::size_t kMostTexts = 50;
+  std::vector<std::string> texts;
+  try {
+    Json::Value root;
+    std::string errors;
+    std::istringstream stream(config::read_file(folder / kJobFile, "record", kMostBytes));
+    if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) || !root.isObject() || !root["run"].isObject()) return {};
+    const Json::Value& list = root["run"]["warnings"];
+    for (Json::ArrayIndex i = 0; list.isArray() && i < list.size() && texts.size() < kMostTexts; ++i) {
+      if (list[i].isString() && std::find(texts.begin(), texts.end(), list[i].asString()) == texts.end())
+        texts.push_back(list[i].asString());
+    }
+  } catch (const InputError&) {
+  } catch (const Json::Exception&) {
+  }
+  return texts;
 }
 
 std::optional<Progress> read_progress(const fs::path& folder) {

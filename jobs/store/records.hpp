@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "jobs/spec/job_spec.hpp"
 #include "jobs/store/id.hpp"
@@ -54,6 +55,10 @@ std::optional<Standing> read_standing(const std::filesystem::path& folder);
 /// Reads only the end of the file; a line that is cut or no JSON is passed over. Never throws for content.
 std::optional<Progress> read_progress(const std::filesystem::path& folder);
 
+/// What the solver warned of, from the record beside a bank (member "run" of job.json): each text once, at most fifty. Never throws for
+/// content.
+std::vector<std::string> read_warnings(const std::filesystem::path& folder);
+
 /// `folder`/request.json and so on. SystemError when the disk refuses.
 void write_request(const std::filesystem::path& folder, const Request& request);
 /// The text of request.json, or of one line of submissions.jsonl; and back.
@@ -65,6 +70,9 @@ void write_standing(const std::filesystem::path& folder, const Standing& standin
 /// Bytes of a path as text that JSON and SQLite take: valid UTF-8 stays, any other byte (and a backslash before an x) becomes "\xNN".
 std::string to_text(const std::filesystem::path& path);
 std::filesystem::path from_text(const std::string& text);
+
+/// JSON whose strings hold characters that move the cursor, colour, or turn the direction of writing only as "\uNNNN".
+std::string to_plain_json(const std::string& json);
 
 /// The file name of a request's mesh or surface as it was named; empty for a shape.
 std::string find_input_name(const Request& request);

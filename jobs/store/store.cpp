@@ -14,7 +14,11 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <map>
 #include <set>
+#include <sstream>
+#include <string_view>
+#include <utility>
 
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
@@ -28,6 +32,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kVersionText = "carillon store 1\n";
 constexpr std::uint64_t kMostVersionBytes = 1000;
+constexpr std::size_t kHeadBytes = 4096;  // the seal of a bank
+constexpr const char* kContentName = "content";
 constexpr off_t kMostCopiedBytes = 16 << 20;
 constexpr std::size_t kMostHostLength = 64;
 constexpr std::size_t kFewFolders = 8;  // are synced one by one; of more, the whole file system once
@@ -103,10 +109,26 @@ bool is_only_readable(const fs::path& root) {
 void make_content(const fs::path& root) {
   check_empty(root);
   for (const std::string& name : kFolders) make_folder(root / name);
-  const int fd = ::open((root / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0664);
+  const int fd = ::open((root / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0664);
   if (fd < 0) throw_errno(root / "lock", "make this file", errno);
   ::close(fd);
   config::write_file(root / "VERSION", kVersionText);
+}
+
+/// Throws where something else than a folder, or a regular file, lies under a name of the store's own.
+void check_own_names(const fs::path& root) {
+  constexpr std::pair<const char*, bool> kOwn[] = {
+      {"banks", false},           {"inputs", false}, {"work", false}, {"tmp", false},          {"damaged", false},
+      {"slurm", false},           {"VERSION", true}, {"lock", true},  {"registry.lock", true}, {"registry.sqlite", true},
+      {"submissions.jsonl", true}};
+  for (const auto& [name, is_file] : kOwn) {
+    struct stat info {};
+    if (::lstat((root / name).c_str(), &info) != 0) continue;
+    if (is_file ? S_ISREG(info.st_mode) : S_ISDIR(info.st_mode)) continue;
+    throw InputError(fmt::format("{}: {}, and the store keeps a {} of its own here; find out who put it there, and remove it",
+                                 (root / name).string(), S_ISLNK(info.st_mode) ? "this is a link" : "this is something else",
+                                 is_file ? "file" : "folder"));
+  }
 }
 
 bool is_there(const fs::path& path) {
@@ -114,61 +136,140 @@ bool is_there(const fs::path& path) {
   return ::lstat(path.c_str(), &info) == 0 && S_ISDIR(info.st_mode);
 }
 
-std::vector<Id> list_ids(const fs::path& folder) {
+std::vector<Id> list_ids(const fs::path& root, const char* folder) {
   std::vector<Id> ids;
-  std::error_code error;
-  for (fs::directory_iterator shard(folder, error), end; !error && shard != end; shard.increment(error)) {
-    std::error_code none;
-    for (fs::directory_iterator it(shard->path(), none); !none && it != end; it.increment(none)) {
-      const auto id = parse_id(it->path().filename().string());
-      if (id && shard->path().filename().string() == id->text().substr(0, 2)) ids.push_back(*id);
+  try {
+    const OpenFolder top = OpenFolder::open(root);
+    const auto opened = top.find(folder);
+    for (const std::string& name : opened ? opened->list() : std::vector<std::string>()) {
+      const auto info = opened->look_at(name);
+      if (name.size() != 2 || !info || !S_ISDIR(info->st_mode)) continue;
+      const auto shard = opened->find(name);
+      for (const std::string& entry : shard ? shard->list() : std::vector<std::string>()) {
+        const auto id = parse_id(entry);
+        const auto kind = id && name == entry.substr(0, 2) ? shard->look_at(entry) : std::nullopt;
+        if (kind && S_ISDIR(kind->st_mode)) ids.push_back(*id);
+      }
     }
+  } catch (const SystemError&) {  // what cannot be read, or was replaced meanwhile
   }
-  std::sort(ids.begin(), ids.end());
   return ids;
 }
 
 fs::path sharded(const fs::path& folder, const Id& id) { return folder / id.text().substr(0, 2) / id.text(); }
 
-/// Makes a file read-only; one that another user of the store owns, and a small one that has another name elsewhere, which has to stay
-/// writable, is replaced by a copy.
-void seal_file(const fs::path& file) {
+/// A file by descriptor.
+struct File {
+  int value = -1;
+  ~File() {
+    if (value >= 0) ::close(value);
+  }
+};
+
+/// A regular file in a folder; its value is below 0, and errno set, when it cannot be opened. Never waits, follows no link.
+int open_regular(const OpenFolder& folder, const char* name) {
+  const int file = ::openat(folder.get(), name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   struct stat info {};
-  const bool is_shared = ::lstat(file.c_str(), &info) == 0 && info.st_nlink > 1 && info.st_size < kMostCopiedBytes;
-  if (!is_shared && ::chmod(file.c_str(), 0444) == 0) return;
-  if (!is_shared && errno != EPERM) throw_errno(file, "make read-only", errno);
-  const fs::path copy = fs::path(file) += ".copy";
-  std::error_code error;
-  fs::copy_file(file, copy, fs::copy_options::overwrite_existing, error);
-  if (!error) fs::rename(copy, file, error);
-  if (error) throw_errno(file, "copy", error.value());
-  if (::chmod(file.c_str(), 0444) != 0) throw_errno(file, "make read-only", errno);
+  if (file < 0 || (::fstat(file, &info) == 0 && S_ISREG(info.st_mode))) return file;
+  ::close(file);
+  errno = EINVAL;
+  return -1;
+}
+
+/// Makes a file read-only and syncs it; one that another user of the store owns, and one that has more names than it should have, is
+/// replaced by a copy: no file elsewhere changes its rights.
+void seal_file(const OpenFolder& folder, const std::string& name) {
+  File file{open_regular(folder, name.c_str())};
+  if (file.value < 0) throw_errno(folder.name() / name, "read", errno);
+  struct stat info {};
+  if (::fstat(file.value, &info) != 0) throw_errno(folder.name() / name, "read", errno);
+  const bool is_shared = info.st_nlink > 2 || (info.st_nlink > 1 && info.st_size < kMostCopiedBytes) || info.st_uid != ::geteuid();
+  if (is_shared || ::fchmod(file.value, 0444) != 0) {
+    const std::string copy = name.substr(0, 200) + ".copy";
+    folder.remove(copy);
+    const File target{::openat(folder.get(), copy.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
+    if (target.value < 0) throw_errno(folder.name() / name, "copy", errno);
+    std::string piece(1 << 20, '\0');
+    for (ssize_t got = 0; (got = ::read(file.value, piece.data(), piece.size())) != 0;) {
+      if (got < 0) throw_errno(folder.name() / name, "read", errno);
+      for (ssize_t done = 0; done < got;) {
+        const ssize_t put = ::write(target.value, piece.data() + done, static_cast<std::size_t>(got - done));
+        if (put <= 0) throw_errno(folder.name() / name, "copy", put < 0 ? errno : ENOSPC);
+        done += put;
+      }
+    }
+    if (::fchmod(target.value, 0444) != 0 || ::fsync(target.value) != 0 ||
+        ::renameat(folder.get(), copy.c_str(), folder.get(), name.c_str()) != 0)
+      throw_errno(folder.name() / name, "copy", errno);
+    return;
+  }
+  if (::fsync(file.value) != 0 && errno != EINVAL) throw_errno(folder.name() / name, "write", errno);
 }
 
 /// Syncs the folder and all in it; with `seal`, makes files and inner folders read-only. The folder itself stays writable: only then may
 /// it be renamed.
-void sync_tree(const fs::path& folder, bool seal) {
-  std::vector<fs::path> folders{folder};
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_symlink()) throw SystemError(fmt::format("{}: a link among the results; remove it", entry.path().string()));
-    if (entry.is_directory()) {
-      folders.push_back(entry.path());
-      continue;
+void sync_tree(const OpenFolder& folder, bool seal) {
+  for (const std::string& name : folder.list()) {
+    const auto info = folder.look_at(name);
+    if (info && S_ISDIR(info->st_mode)) {
+      const auto inner = folder.find(name);
+      sync_tree(*inner, seal);
+      if (seal) ::fchmod(inner->get(), 0555);
+    } else if (!info || !S_ISREG(info->st_mode)) {
+      throw SystemError(fmt::format("{}: no regular file among the results; remove it", (folder.name() / name).string()));
+    } else if (seal) {
+      seal_file(folder, name);
+    } else {
+      sync_file(folder.path() / name);
     }
-    if (seal) seal_file(entry.path());
-    sync_file(entry.path());
   }
-  for (auto it = folders.rbegin(); it != folders.rend(); ++it) {
-    sync_folder(*it);
-    if (seal && *it != folder) ::chmod(it->c_str(), 0555);
-  }
+  folder.sync();
 }
 
-/// False when there is a folder of that name already.
-bool rename_into(const fs::path& from, const fs::path& to) {
-  if (::rename(from.c_str(), to.c_str()) == 0) return true;
-  if (errno == EEXIST || errno == ENOTEMPTY) return false;
-  throw_errno(to, "rename", errno);
+/// False when there is a folder of that name already. What else has the name goes: nothing but folders belongs there.
+bool rename_into(const OpenFolder& from, const std::string& name, const OpenFolder& shard, const Id& id) {
+  for (int round = 0; round < 2; ++round) {
+    if (::renameat(from.get(), name.c_str(), shard.get(), id.text().c_str()) == 0) return true;
+    if (errno == EEXIST || errno == ENOTEMPTY) return false;
+    if (errno != ENOTDIR || ::unlinkat(shard.get(), id.text().c_str(), 0) != 0) break;
+  }
+  throw_errno(shard.name() / id.text(), "rename", errno);
+}
+
+/// bank.sum: what a bank was when it was published.
+struct Sum {
+  std::string id, sha256, head;  // head: SHA-256 of the first bytes
+  long long bytes = 0, written_ns = 0;
+};
+constexpr const char* kSumWord = "carillon-bank-sum-1";
+
+std::string read_head(int file, std::size_t most) {
+  std::string head(most, '\0');
+  const ssize_t got = ::pread(file, head.data(), head.size(), 0);
+  head.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+  return head;
+}
+
+long long find_written_ns(const struct stat& info) { return info.st_mtim.tv_sec * 1'000'000'000LL + info.st_mtim.tv_nsec; }
+
+std::optional<Sum> read_sum(const OpenFolder& folder) {
+  const File file{open_regular(folder, kSumFile)};
+  if (file.value < 0) return std::nullopt;
+  std::istringstream stream(read_head(file.value, 1000));
+  std::string word;
+  Sum sum;
+  if (stream >> word >> sum.id >> sum.sha256 >> sum.head >> sum.bytes >> sum.written_ns && word == kSumWord) return sum;
+  return Sum{};  // damaged itself: fits nothing
+}
+
+void write_sum(const OpenFolder& folder, const Id& id) {
+  const File bank{open_regular(folder, kBankFile)};
+  struct stat info {};
+  if (bank.value < 0 || ::fstat(bank.value, &info) != 0) throw_errno(folder.name() / kBankFile, "read", errno);
+  const Id sha256 = hash_file(folder.path() / kBankFile, "bank");
+  config::write_file(folder.path() / kSumFile, fmt::format("{} {} {} {} {} {}\n", kSumWord, id.text(), sha256.text(),
+                                                           hash_text(read_head(bank.value, kHeadBytes)).text(),
+                                                           static_cast<long long>(info.st_size), find_written_ns(info)));
 }
 
 }  // namespace
@@ -182,6 +283,7 @@ Lock::~Lock() {
 Store Store::open(const fs::path& folder) {
   const fs::path root = find_root(folder);
   make_root(root);
+  check_own_names(root);
   follow_group(root);
   check_rights(root);
   if (::access((root / "VERSION").c_str(), F_OK) != 0) make_content(root);
@@ -190,12 +292,14 @@ Store Store::open(const fs::path& folder) {
     if (!is_there(root / name)) make_folder(root / name);
     check_rights(root / name);
   }
+  check_own_names(root);  // what was made meanwhile
   return Store(root);
 }
 
 Store Store::open_to_read(const fs::path& folder) {
   const fs::path root = find_root(folder);
   if (!is_only_readable(root)) return open(folder);
+  check_own_names(root);
   check_version(root);
   Store store(root);
   store.may_write_ = false;
@@ -204,11 +308,97 @@ Store Store::open_to_read(const fs::path& folder) {
 
 fs::path Store::bank_folder(const Id& id) const { return sharded(root_ / "banks", id); }
 fs::path Store::work_folder(const Id& id) const { return sharded(root_ / "work", id); }
-bool Store::has_bank(const Id& id) const { return is_there(bank_folder(id)); }
-bool Store::has_work(const Id& id) const { return is_there(work_folder(id)); }
-fs::path Store::find_folder(const Id& id) const { return has_bank(id) ? bank_folder(id) : work_folder(id); }
-std::vector<Id> Store::list_banks() const { return list_ids(root_ / "banks"); }
-std::vector<Id> Store::list_work() const { return list_ids(root_ / "work"); }
+
+std::optional<OpenFolder> Store::find_shard(const char* folder, const Id& id) const {
+  const auto opened = OpenFolder::open(root_).find(folder);
+  return opened ? opened->find(id.text().substr(0, 2)) : std::nullopt;
+}
+
+bool Store::has_bank_folder(const Id& id) const {
+  try {
+    const auto shard = find_shard("banks", id);
+    return shard && shard->find(id.text());
+  } catch (const SystemError&) {
+    return false;
+  }
+}
+
+bool Store::has_work(const Id& id) const {
+  try {
+    const auto shard = find_shard("work", id);
+    return shard && shard->find(id.text());
+  } catch (const SystemError&) {
+    return false;
+  }
+}
+
+std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const {
+  try {
+    const auto shard = find_shard("banks", id);
+    const auto folder = shard ? shard->find(id.text()) : std::nullopt;
+    if (!folder) return "there is no bank";
+    const File file{open_regular(*folder, kBankFile)};
+    if (file.value < 0 && (errno == EACCES || errno == EPERM)) return std::nullopt;  // what may not be read is not damaged
+    if (file.value < 0 && errno == ENOENT) return "its bank is missing";
+    struct stat info {};
+    if (file.value < 0 || ::fstat(file.value, &info) != 0) return "its bank is no regular file";
+    if (info.st_size == 0) return "its bank is empty";
+    const auto sum = read_sum(*folder);
+    if (!sum) return std::nullopt;  // of an earlier version: carillon verify reads it
+    if (sum->id != id.text()) return "its folder is that of another bank";
+    if (info.st_size < sum->bytes) return fmt::format("its bank is cut: {} bytes of {}", info.st_size, sum->bytes);
+    if (info.st_size != sum->bytes) return fmt::format("its bank has {} bytes instead of {}", info.st_size, sum->bytes);
+    if (hash_text(read_head(file.value, kHeadBytes)).text() != sum->head)
+      return "its bank is another one than was computed, or its seal is damaged";
+    if (look == Look::quick && find_written_ns(info) == sum->written_ns) return std::nullopt;
+    if (hash_file(fmt::format("/proc/self/fd/{}", file.value), "bank").text() != sum->sha256) {
+      // Every later look reads all of it, as its time is another.
+      const File own{::openat(folder->get(), kBankFile, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)};
+      if (own.value >= 0) (void)!::futimens(own.value, nullptr);
+      return "its bank is damaged: its bytes are no longer those that were computed";
+    }
+    return std::nullopt;
+  } catch (const SystemError& error) {
+    return error.what();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+std::string Store::set_bank_aside(const Id& id) const {
+  const auto shard = find_shard("banks", id);
+  const auto info = shard ? shard->look_at(id.text()) : std::nullopt;
+  if (!info) return "";
+  const OpenFolder aside = open_folder("damaged");
+  if (S_ISDIR(info->st_mode) && (info->st_mode & S_IWUSR) == 0) {
+    if (const auto folder = shard->find(id.text())) ::fchmod(folder->get(), 0755);
+  }
+  for (;;) {
+    const std::string name = fmt::format("{}-{}", id.text(), make_random_name().substr(0, 12));
+    if (::renameat(shard->get(), id.text().c_str(), aside.get(), name.c_str()) == 0) {
+      shard->sync();
+      aside.sync();
+      return "damaged/" + name;
+    }
+    if (errno == ENOENT) return "";
+    if (errno != EEXIST && errno != ENOTEMPTY) throw_errno(shard->name() / id.text(), "set aside", errno);
+  }
+}
+
+OpenFolder Store::open_folder(const std::string& name) const { return OpenFolder::open(root_).make(name); }
+
+OpenFolder Store::open_work(const Id& id) const {
+  const auto shard = find_shard("work", id);
+  auto folder = shard ? shard->find(id.text()) : std::nullopt;
+  if (!folder) throw_errno(work_folder(id), "open this folder", ENOENT);
+  return std::move(*folder);
+}
+
+fs::path Store::find_folder(const Id& id) const {
+  return has_bank(id) || (has_bank_folder(id) && !has_work(id)) ? bank_folder(id) : work_folder(id);
+}
+std::vector<Id> Store::list_banks() const { return list_ids(root_, "banks"); }
+std::vector<Id> Store::list_work() const { return list_ids(root_, "work"); }
 
 fs::path Store::input_file(const Id& sha256, const std::string& format) const {
   fs::path file = sharded(root_ / "inputs", sha256);
@@ -218,76 +408,119 @@ fs::path Store::input_file(const Id& sha256, const std::string& format) const {
   return file;
 }
 
-fs::path Store::make_temporary() const {
+Temporary Store::make_temporary() const {
   const process::Identity self = process::find_self();
   std::string host = self.host.substr(0, kMostHostLength);
   std::replace(host.begin(), host.end(), '/', '_');
   std::replace(host.begin(), host.end(), ',', '_');
-  const fs::path folder =
-      root_ / "tmp" / fmt::format("{},{},{},{},{}", host, self.boot, self.pid, self.start_ticks, make_random_name().substr(0, 12));
-  if (::mkdir(folder.c_str(), 0777) != 0) throw_errno(folder, "make this folder", errno);
-  return folder;
+  const std::string name = fmt::format("{},{},{},{},{}", host, self.boot, self.pid, self.start_ticks, make_random_name().substr(0, 12));
+  OpenFolder parent = open_folder("tmp");
+  OpenFolder own = parent.make_private(name);
+  OpenFolder content = own.make(kContentName);
+  return {std::move(parent), name, std::move(own), std::move(content)};
 }
 
-bool Store::publish(const Id& id, const fs::path& folder) const {
-  const fs::path target = bank_folder(id);
-  const bool is_known = has_bank(id);
-  if (!is_known) {
-    sync_tree(folder, true);
-    make_folder(target.parent_path());
-    sync_folder(target.parent_path().parent_path());
-  }
-  if (is_known || !rename_into(folder, target)) {
-    remove_tree(folder);
-    return false;
-  }
-  if (::chmod(target.c_str(), 0555) != 0) throw_errno(target, "make read-only", errno);
-  sync_folder(target);
-  sync_folder(target.parent_path());
-  return true;
+bool Store::is_temporary_name(const std::string& name) {
+  std::vector<std::string> parts;
+  std::istringstream stream(name);
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  const auto is_of = [](const std::string& text, const char* letters) {
+    return !text.empty() && text.find_first_not_of(letters) == std::string::npos;
+  };
+  return parts.size() == 5 && is_of(parts[1], "0123456789abcdef-:") && is_of(parts[2], "0123456789") && is_of(parts[3], "0123456789") &&
+         is_of(parts[4], "0123456789abcdef") && parts[4].size() == 12 && !name.ends_with(',');
 }
 
-std::vector<bool> Store::publish_work(const std::vector<Prepared>& prepared) const {
-  if (prepared.size() > kFewFolders) {
-    sync_file_system(root_ / "tmp");
-  } else {
-    for (const Prepared& work : prepared) sync_tree(work.folder, false);
+Temporary::~Temporary() {
+  if (own_.get() < 0) return;
+  try {
+    parent_.remove(name_);
+  } catch (const SystemError&) {  // gc does later
   }
+}
+
+bool Store::publish(const Id& id, const Temporary& folder) const {
+  const auto end = [&](bool is_published) {
+    folder.parent_.remove(folder.name_);
+    return is_published;
+  };
+  for (int round = 0; round < 2; ++round) {
+    if (has_bank(id)) return end(false);
+    if (round == 0) {
+      sync_tree(folder.content(), true);
+      write_sum(folder.content(), id);
+      seal_file(folder.content(), kSumFile);
+      folder.content().sync();
+    }
+    const OpenFolder banks = open_folder("banks"), shard = banks.make(id.text().substr(0, 2));
+    banks.sync();
+    if (!rename_into(folder.own_, kContentName, shard, id)) {
+      if (has_bank(id)) return end(false);
+      set_bank_aside(id);
+      continue;
+    }
+    if (::fchmod(folder.content().get(), 0555) != 0) throw_errno(bank_folder(id), "make read-only", errno);
+    folder.content().sync();
+    shard.sync();
+    return end(true);
+  }
+  return end(false);
+}
+
+std::vector<bool> Store::publish_work(const Temporary& folder, const std::vector<Prepared>& prepared) const {
+  if (prepared.size() <= kFewFolders)
+    sync_tree(folder.content(), false);
+  else if (::syncfs(folder.content().get()) != 0)
+    throw_errno(folder.content().name(), "write", errno);
   std::vector<bool> was_made;
-  std::set<fs::path> parents;
-  for (const Prepared& work : prepared) {
-    const fs::path target = work_folder(work.id);
-    make_folder(target.parent_path());
-    parents.insert(target.parent_path());
-    was_made.push_back(rename_into(work.folder, target));
-    if (!was_made.back()) remove_tree(work.folder);
+  std::map<std::string, OpenFolder> shards;
+  const OpenFolder work = open_folder("work");
+  for (const Prepared& entry : prepared) {
+    const std::string digits = entry.id.text().substr(0, 2);
+    if (shards.count(digits) == 0) shards.emplace(digits, work.make(digits));
+    was_made.push_back(rename_into(folder.content(), entry.name, shards.at(digits), entry.id));
   }
-  for (const fs::path& parent : parents) sync_folder(parent);
-  sync_folder(root_ / "work");
+  for (const auto& [digits, shard] : shards) shard.sync();
+  work.sync();
   return was_made;
 }
 
-void Store::remove_folder(const fs::path& folder) const {
-  if (!is_there(folder)) return;
-  const fs::path temporary = make_temporary();
-  struct stat info {};
-  if (::lstat(folder.c_str(), &info) == 0 && (info.st_mode & S_IWUSR) == 0) ::chmod(folder.c_str(), 0755);
-  if (::rename(folder.c_str(), (temporary / "removed").c_str()) != 0 && errno != ENOENT) {
-    const int error = errno;
-    ::chmod(folder.c_str(), info.st_mode & 07777U);
-    ::rmdir(temporary.c_str());
-    throw_errno(folder, "remove", error);
-  }
-  sync_folder(folder.parent_path());
-  remove_tree(temporary);
+void Store::publish_batch(const std::string& batch, const Temporary& folder) const {
+  const OpenFolder all = open_folder("slurm");
+  if (::renameat(folder.own_.get(), kContentName, all.get(), batch.c_str()) != 0)
+    throw_errno(all.name() / batch, "make this folder", errno);
 }
 
-void Store::remove_work(const Id& id) const { remove_folder(work_folder(id)); }
-void Store::remove_bank(const Id& id) const { remove_folder(bank_folder(id)); }
+void Store::remove_folder(const char* folder, const Id& id) const {
+  const auto shard = find_shard(folder, id);
+  const auto info = shard ? shard->look_at(id.text()) : std::nullopt;
+  if (!info) return;
+  if (S_ISDIR(info->st_mode) && (info->st_mode & S_IWUSR) == 0) {
+    if (const auto opened = shard->find(id.text())) ::fchmod(opened->get(), 0755);
+  }
+  std::optional<Temporary> temporary;
+  try {
+    temporary.emplace(make_temporary());
+  } catch (const SystemError&) {
+    if (!is_disk_full(root_)) throw;
+  }
+  // A full disk may have no room for another folder: what is left in the middle of this is no whole bank and no job, and is seen as such.
+  if (!temporary) return shard->remove(id.text());
+  if (::renameat(shard->get(), id.text().c_str(), temporary->content().get(), "removed") != 0 && errno != ENOENT) {
+    const int error = errno;
+    if (const auto opened = S_ISDIR(info->st_mode) ? shard->find(id.text()) : std::nullopt) ::fchmod(opened->get(), info->st_mode & 07777U);
+    throw_errno(shard->name() / id.text(), "remove", error);
+  }
+  shard->sync();
+  temporary->content().remove("removed");
+}
+
+void Store::remove_work(const Id& id) const { remove_folder("work", id); }
+void Store::remove_bank(const Id& id) const { remove_folder("banks", id); }
 
 Lock Store::take_lock(int operation) const {
   const fs::path file = root_ / "lock";
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0664);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0664);
   if (fd < 0) throw_errno(file, "open", errno);
   Lock lock(fd);
   while (::flock(fd, operation) != 0) {

@@ -7,20 +7,25 @@
 //   work/ab/<id>/              job.json (for carillon-precompute: mesh in inputs/, bank "bank.hdf"), request.json, attempt.json,
 //   outcome.json,
 //                              log, progress.jsonl, checkpoint.hdf, bank.hdf
-//   tmp/                       what will get its name when it is whole
+//   tmp/                       what will get its name when it is whole; each entry belongs to one process and to its user alone (0700)
+//   damaged/                   banks that were set aside
 //   submissions.jsonl          which job file asked for which id, appended
 //   lock                       shared by those who add, exclusive for gc
 //   registry.sqlite            jobs/registry (elsewhere when the store is on a network file system)
 //
 // work/ and banks/ have the same depth: relative paths inside job.json stay right when a folder moves from one to the other.
-// Truth on disk: banks/ab/<id>/ exists <=> the job is done. Any number of processes may use a store at once.
+// Truth on disk: banks/ab/<id>/ holds a whole bank <=> the job is done. Any number of processes may use a store at once.
+// The members of a group may all write to a store, and one of them may put a link where a folder or a file was. Folders are opened by
+// descriptor (open_folder.hpp) and no link inside the store is followed.
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "jobs/store/id.hpp"
+#include "jobs/store/open_folder.hpp"
 #include "jobs/store/records.hpp"
 
 namespace carillon::store {
@@ -33,6 +38,7 @@ inline constexpr const char* kStandingFile = "state.json";
 inline constexpr const char* kProgressFile = "progress.jsonl";
 inline constexpr const char* kCheckpointFile = "checkpoint.hdf";
 inline constexpr const char* kReportFile = "report.html";
+inline constexpr const char* kSumFile = "bank.sum";  // what the bank was when it was published
 
 /// Holds the store's lock while it lives.
 class Lock {
@@ -48,9 +54,34 @@ class Lock {
   int descriptor_ = -1;
 };
 
+/// A new folder in tmp/ of this process, which no other user may enter; goes with what is left in it.
+class Temporary {
+ public:
+  Temporary(Temporary&&) noexcept = default;
+  Temporary& operator=(Temporary&&) = delete;
+  ~Temporary();
+  /// Where to write, for this process: rights as those of the store. What is in it is published or lost.
+  std::filesystem::path path() const { return content_.path(); }
+  std::filesystem::path operator/(const std::string& name) const { return path() / name; }
+  const OpenFolder& content() const { return content_; }
+
+ private:
+  friend class Store;
+  Temporary(OpenFolder parent, std::string name, OpenFolder own, OpenFolder content)
+      : parent_(std::move(parent)), name_(std::move(name)), own_(std::move(own)), content_(std::move(content)) {}
+  OpenFolder parent_;  // tmp/
+  std::string name_;
+  OpenFolder own_, content_;
+};
+
+/// How thoroughly a bank is looked at: by its size, its first bytes (they hold the hash of the rest) and the time it was written; or by
+/// all its bytes.
+enum class Look { quick, full };
+
 class Store {
  public:
   /// Opens the store in `folder`, which is made when there is none. Throws InputError: the folder holds something else, or a newer store;
+  /// one of its own folders is a link or a file;
   /// no right to write there (names owner, group and mend). SystemError: the disk refuses. Where the folder is writable by its group, all
   /// that this process makes from then on is too (umask).
   static Store open(const std::filesystem::path& folder);
@@ -65,29 +96,47 @@ class Store {
   std::filesystem::path bank_folder(const Id& id) const;
   std::filesystem::path work_folder(const Id& id) const;
   std::filesystem::path input_file(const Id& sha256, const std::string& format) const;
-  bool has_bank(const Id& id) const;
+  /// A bank that a quick look finds whole; a folder for it, whatever is in it; a folder of work. Links count for nothing.
+  bool has_bank(const Id& id) const { return !find_bank_fault(id, Look::quick); }
+  bool has_bank_folder(const Id& id) const;
   bool has_work(const Id& id) const;
+  /// Why the bank of `id` is not what was published, in one sentence; none when it is.
+  std::optional<std::string> find_bank_fault(const Id& id, Look look) const;
+  /// Sets a bank aside into damaged/; the folder's new name there. Empty when there was none.
+  std::string set_bank_aside(const Id& id) const;
+  /// The folder of work by descriptor, to write in. SystemError when it is not there, or a link.
+  OpenFolder open_work(const Id& id) const;
+  /// "tmp", "inputs" ... by descriptor; made when it is not there. SystemError when it is a link.
+  OpenFolder open_folder(const std::string& name) const;
+  /// inputs/ab, made when it is not there.
+  OpenFolder open_inputs(const Id& sha256) const { return open_folder("inputs").make(sha256.text().substr(0, 2)); }
   /// bank_folder() when the job is done, else work_folder().
   std::filesystem::path find_folder(const Id& id) const;
   /// All ids with a folder there, sorted. Names that are no ids are passed over.
   std::vector<Id> list_banks() const;
   std::vector<Id> list_work() const;
 
-  /// A new empty folder in tmp/, on the file system of the rest, whose name tells the process it belongs to.
-  std::filesystem::path make_temporary() const;
+  /// Its name tells the process it belongs to.
+  Temporary make_temporary() const;
+  /// Whether a name in tmp/ is one that make_temporary() gives.
+  static bool is_temporary_name(const std::string& name);
 
   /// Makes a folder whose content is whole the bank of `id`: files 0444, fsync of all, rename into banks/, folder 0555, fsync. A lost race
-  /// is no error: false, and `folder` is removed. What is left of work/ab/<id> is removed by remove_work(). SystemError when the disk
-  /// refuses; `folder` stays then.
-  bool publish(const Id& id, const std::filesystem::path& folder) const;
-  /// The same into work/ for any number at once, with one sync for all; nothing is made read-only. Per folder: true when it got its name.
+  /// is no error: false. A damaged bank of that id is set aside. What is left of work/ab/<id> is removed by remove_work(). SystemError when
+  /// the disk refuses; `folder` stays then.
+  bool publish(const Id& id, const Temporary& folder) const;
+  /// The same into work/ for any number of folders in `folder` at once, with one sync for all; nothing is made read-only. Per folder: true
+  /// when it got its name.
   struct Prepared {
     Id id;
-    std::filesystem::path folder;
+    std::string name;
   };
-  std::vector<bool> publish_work(const std::vector<Prepared>& prepared) const;
+  std::vector<bool> publish_work(const Temporary& folder, const std::vector<Prepared>& prepared) const;
 
-  /// Removes work/ab/<id> or banks/ab/<id>: renamed into tmp/ first, so that it is there whole or not at all.
+  /// Gives a temporary folder the name slurm/<batch>, 32 hex digits. SystemError when there is one.
+  void publish_batch(const std::string& batch, const Temporary& folder) const;
+
+  /// Removes work/ab/<id> or banks/ab/<id>: renamed into tmp/ first, so that it is there whole or not at all; on a full disk in place.
   void remove_work(const Id& id) const;
   void remove_bank(const Id& id) const;
 
@@ -96,7 +145,8 @@ class Store {
 
  private:
   Lock take_lock(int operation) const;
-  void remove_folder(const std::filesystem::path& folder) const;
+  std::optional<OpenFolder> find_shard(const char* folder, const Id& id) const;
+  void remove_folder(const char* folder, const Id& id) const;
   explicit Store(std::filesystem::path root) : root_(std::move(root)) {}
   std::filesystem::path root_;  // absolute
   bool may_write_ = true;

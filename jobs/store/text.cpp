@@ -1,6 +1,8 @@
 // Paths as text.
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "jobs/store/records.hpp"
 
 namespace carillon::store {
@@ -25,6 +27,19 @@ std::size_t find_character(std::string_view text, std::size_t at) {
       (first == 0xF4 && second > 0x8F))
     return 0;
   return length;
+}
+
+/// Characters that move the cursor, colour, or turn the direction of writing: C0, DEL, C1 (U+0080 - U+009F), U+061C, U+200E, U+200F,
+/// U+2028 - U+202E, U+2066 - U+2069. Length in bytes at `at`, 0 for others.
+std::size_t find_control(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  const unsigned a = byte(at), b = byte(at + 1), c = byte(at + 2);
+  if (a < 0x20 || a == 0x7F) return 1;
+  if (a == 0xC2 && b < 0xA0) return 2;
+  if (a == 0xD8 && b == 0x9C) return 2;
+  if (a == 0xE2 && b == 0x80 && (c == 0x8E || c == 0x8F || (c >= 0xA8 && c <= 0xAE))) return 3;
+  if (a == 0xE2 && b == 0x81 && c >= 0xA6 && c <= 0xA9) return 3;
+  return 0;
 }
 
 int find_digit(char c) {
@@ -62,6 +77,24 @@ std::filesystem::path from_text(const std::string& text) {
     at += 3;
   }
   return bytes;
+}
+
+std::string to_plain_json(const std::string& json) {
+  std::string result;
+  for (std::size_t at = 0; at < json.size();) {
+    const std::size_t control = find_control(json, at);
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(json[at + i]); };
+    if (control < 2 && byte(0) != 0x7F) {
+      result += json[at++];
+      continue;
+    }
+    const unsigned code = control == 1   ? 0x7FU
+                          : control == 2 ? (byte(0) & 0x1FU) << 6U | (byte(1) & 0x3FU)
+                                         : (byte(0) & 0xFU) << 12U | (byte(1) & 0x3FU) << 6U | (byte(2) & 0x3FU);
+    result += fmt::format("\\u{:04x}", code);
+    at += control;
+  }
+  return result;
 }
 
 std::string find_input_name(const Request& request) { return from_text(request.input_file).filename().string(); }

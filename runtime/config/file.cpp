@@ -214,7 +214,8 @@ void check_writable(const fs::path& file, std::string_view what) {
     throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose another name", file.string(), what, std::strerror(errno)));
   }
   const fs::path probe = make_temporary_name(file);
-  const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600));
+  ::unlink(probe.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
+  const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
   if (fd.get() < 0) {
     throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", file.string(), what,
                                  std::strerror(errno)));

@@ -61,8 +61,12 @@ class Path(Bench):
         job.unlink()
         self.assertEqual(self.ask("gc", "--delete")["items"], [])
         self.assertEqual(self.ask("status")["counts"]["queued"], 1)
+        # Only names that Carillon gives are taken away.
         (self.store / "tmp" / "rubbish").mkdir()
+        (self.store / "tmp" / f"{os.uname().nodename},0-1:2,999999999,1,0123456789ab").mkdir()
+        (self.store / "inputs" / "thesis.tex").write_text("important")
         self.assertEqual([item["kind"] for item in self.ask("gc", "--delete")["items"]], ["temporary"])
+        self.assertTrue((self.store / "tmp" / "rubbish").is_dir() and (self.store / "inputs" / "thesis.tex").is_file())
 
     def test_a_mesh_that_goes_after_the_submission_changes_nothing(self):
         mesh = self.folder / "bar.msh"

@@ -27,15 +27,16 @@ inline registry::Submission make_submission(int number) {
 
 /// A folder in work/, as carillon submit makes it.
 inline void make_work(const store::Store& store, const registry::Submission& submission) {
-  const auto folder = store.make_temporary();
-  store::write_request(folder, submission.request);
-  store::write_standing(folder, {});
-  store.publish_work({{store::require_id(submission.request.id, "test"), folder}});
+  const auto temporary = store.make_temporary();
+  const auto folder = temporary.content().make("0");
+  store::write_request(folder.path(), submission.request);
+  store::write_standing(folder.path(), {});
+  store.publish_work(temporary, {{store::require_id(submission.request.id, "test"), "0"}});
 }
 
 inline void make_bank(const store::Store& store, const registry::Submission& submission) {
   const auto folder = store.make_temporary();
-  store::write_request(folder, submission.request);
+  store::write_request(folder.path(), submission.request);
   std::ofstream(folder / store::kBankFile) << "bank";
   store.publish(store::require_id(submission.request.id, "test"), folder);
 }

@@ -74,7 +74,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
-SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dlfcn|signal|pthread|poll|termios|errno|limits|stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|pwd|malloc)\.h$")
+SYSTEM = re.compile(r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|termios|errno|limits|stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|pwd|malloc)\.h$")
 
 
 def library_of(path):

@@ -1,0 +1,162 @@
+// carillon verify: is every bank, every input and every folder of work what it was, and what can be made again of what is not.
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <map>
+#include <set>
+
+#include "jobs/attempt/publish.hpp"
+#include "jobs/cli/shared.hpp"
+#include "jobs/process/process.hpp"
+#include "jobs/queue/repair.hpp"
+#include "jobs/store/identity.hpp"
+#include "runtime/config/error.hpp"
+
+namespace carillon::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> words;
+  bool repairs = false;
+};
+
+struct Finding {
+  std::string kind;  // "bank", "work", "input"
+  store::Id id;      // of the job
+  std::string fault;
+  std::string repair;  // what was done, or why it could not be; empty: nothing was tried
+  bool is_repaired = false;
+};
+
+/// How far it is, on a terminal.
+class Progress {
+ public:
+  Progress(std::size_t total, bool quiet) : total_(total), is_shown_(!quiet && ::isatty(STDERR_FILENO) == 1) {}
+  ~Progress() {
+    if (is_shown_ && done_ > 0) fmt::print(stderr, "\r\033[K");
+  }
+  void advance() {
+    if (is_shown_) fmt::print(stderr, "\r\033[Kverifying {} of {}", ++done_, total_);
+  }
+
+ private:
+  std::size_t total_, done_ = 0;
+  bool is_shown_;
+};
+
+bool is_worked_on(const store::Store& store, const store::Id& id) {
+  try {
+    return process::Lock::is_held(store.open_work(id).path() / "lock");
+  } catch (const SystemError&) {
+    return false;
+  }
+}
+
+void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::optional<std::string>>& inputs,
+               std::vector<Finding>& findings) {
+  const store::Store& store = shared.store();
+  if (store.has_bank_folder(id)) {
+    if (const auto fault = attempt::find_published_fault(store, id)) findings.push_back({"bank", id, *fault, "", false});
+  }
+  if (store.has_work(id) && !is_worked_on(store, id)) {
+    if (const auto fault = store::find_job_fault(store, id, store.work_folder(id))) findings.push_back({"work", id, *fault, "", false});
+  }
+  const auto request = queue::find_request(store, shared.registry(), id);
+  if (!request || request->input_kind == "shape") return;
+  const auto [entry, is_new] = inputs.try_emplace(request->input_sha256 + "." + request->input_format);
+  if (is_new) entry->second = store::find_input_fault(store, *request);
+  // Of a bank that is whole the input is not needed; one that gc took away is no damage.
+  const bool is_gone = entry->second && entry->second->ends_with("is missing");
+  if (entry->second && is_new && !(is_gone && store.has_bank(id))) findings.push_back({"input", id, *entry->second, "", false});
+}
+
+/// Puts a job back into the queue, or says in its row what is damaged.
+void repair(Shared& shared, Finding& finding) {
+  const auto refusal = queue::restore(shared.store(), shared.registry(), finding.id);
+  shared.registry().update(finding.id, [&](registry::Job& row) {
+    if (row.state == registry::State::running || row.state == registry::State::cancelled) return false;
+    row.state = refusal ? registry::State::failed : registry::State::queued;
+    row.reason = refusal ? finding.fault + "; " + *refusal : "";
+    row.failures = 0;
+    return true;
+  });
+  finding.is_repaired = !refusal;
+  finding.repair = refusal ? *refusal : "queued again; carillon run computes it";
+}
+
+/// An input alone: what is done stays done.
+void repair_input(Shared& shared, Finding& finding) {
+  const auto request = queue::find_request(shared.store(), shared.registry(), finding.id);
+  finding.is_repaired = request && store::restore_input(shared.store(), *request);
+  finding.repair = finding.is_repaired ? "copied again from where it was submitted from"
+                                       : "the file that it was copied from is gone or another by now; submit a job with that file again";
+}
+
+int run_verify(Shared& shared, const Options& options) {
+  shared.settle();
+  const store::Store& store = shared.store();
+  std::set<store::Id> ids;
+  for (const registry::Job& job : find_jobs(shared, options.words)) ids.insert(job.id);
+  if (options.words.empty()) {
+    for (const store::Id& id : store.list_banks()) ids.insert(id);
+    for (const store::Id& id : store.list_work()) ids.insert(id);
+    for (const registry::Job& job : shared.registry().list({registry::State::done})) ids.insert(job.id);
+  }
+  std::optional<store::Lock> lock;
+  if (options.repairs) lock.emplace(store.lock_shared());  // gc waits
+  std::vector<Finding> findings;
+  std::map<std::string, std::optional<std::string>> inputs;
+  {
+    Progress progress(ids.size(), shared.json);
+    for (const store::Id& id : ids) {
+      check_job(shared, id, inputs, findings);
+      progress.advance();
+    }
+  }
+  bool is_whole = true;
+  Json::Value root;
+  root["store"] = to_json(store.root().string());
+  root["checked"] = Json::UInt64(ids.size());
+  root["damaged"] = Json::arrayValue;
+  for (Finding& finding : findings) {
+    if (options.repairs) finding.kind == "input" ? repair_input(shared, finding) : repair(shared, finding);
+    is_whole = is_whole && finding.is_repaired;
+    Json::Value entry;
+    entry["kind"] = finding.kind;
+    entry["id"] = finding.id.text();
+    entry["fault"] = to_json(finding.fault);
+    entry["repaired"] = finding.is_repaired;
+    entry["repair"] = finding.repair.empty() ? Json::Value() : to_json(finding.repair);
+    root["damaged"].append(entry);
+    if (shared.json) continue;
+    fmt::print("{}  {:<5}  {}\n", finding.id.short_text(), finding.kind, show_message(finding.fault));
+    if (!finding.repair.empty()) fmt::print("              {}\n", show_message(finding.repair));
+  }
+  if (shared.json)
+    print_json(root);
+  else
+    fmt::print("{} job{} verified, {} thing{} damaged{}\n", ids.size(), ids.size() == 1 ? "" : "s", findings.size(),
+               findings.size() == 1 ? "" : "s", findings.empty() || options.repairs ? "" : "; carillon verify --repair makes them again");
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+  return is_whole ? 0 : kExitSolve;
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "verify",
+      "Reads every bank, input and folder of work of the store, or of the jobs named, and compares them with what was computed and "
+      "submitted. "
+      "Exit code 3:\n"
+      "something is damaged. With --repair, damaged banks are set aside and queued again, and damaged inputs copied again.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, the whole store");
+  command->add_flag("--repair", options->repairs, "Make again what is damaged");
+  command->callback([&shared, &run, options] {
+    shared.only_reads = !options->repairs;
+    run = [&shared, options] { return run_verify(shared, *options); };
+  });
+}
+
+}  // namespace carillon::cli

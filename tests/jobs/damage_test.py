@@ -1,0 +1,217 @@
+#!/usr/bin/python3
+"""What happens to a store that is damaged, full, or shared with somebody who puts links into it.
+
+usage: damage_test.py BIN_DIR
+"""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from bench import BIN, Bench, make_job
+
+
+class Damage(Bench):
+    def run_queue(self):
+        return self.run_it("run", "--quiet", "--no-pictures")
+
+    def make_done(self, **changes):
+        job = self.write("bar.json", make_job(**changes))
+        self.run_it("submit", job)
+        self.run_queue()
+        bank = pathlib.Path(self.run_it("get", job).stdout.strip())
+        for path in (bank.parent.parent, bank.parent, bank):
+            path.chmod(0o755)
+        return job, bank
+
+    def make_mesh_job(self):
+        mesh = self.folder / "bar.msh"
+        subprocess.run([BIN / "carillon-mesh", "--shape", "bar", "--length", "0.2", "--width", "0.02", "--thickness", "0.005", "--nodes", "300", "-o", mesh], check=True,
+                       stdout=subprocess.DEVNULL)
+        job = make_job(mesh="bar.msh")
+        del job["body"]
+        return self.write("mesh.json", job), mesh
+
+    def test_a_job_that_was_edited_in_the_store_is_not_solved(self):
+        job = self.write("bar.json", make_job())
+        self.run_it("submit", job)
+        file, = self.store.glob("work/*/*/job.json")
+        file.write_text(file.read_text().replace("7800", "2800"))
+        self.run_queue()
+        state = self.ask("status")["jobs"][0]
+        self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
+        self.assertIn("job.json", state["reason"])
+        self.assertIn("submit the job again", state["reason"])
+        self.run_it("submit", job)
+        self.run_queue()
+        self.run_it("get", job)
+        record = json.loads((pathlib.Path(self.run_it("get", job).stdout.strip()).parent / "job.json").read_text())
+        self.assertEqual(record["material"]["density_kg_m3"], 7800)
+
+    def test_the_bank_goes_nowhere_else(self):
+        job = self.write("bar.json", make_job())
+        self.run_it("submit", job)
+        victim = self.write("victim", "important")
+        file, = self.store.glob("work/*/*/job.json")
+        file.write_text(file.read_text().replace('"bank.hdf"', json.dumps(str(victim))))
+        self.run_queue()
+        self.assertEqual(victim.read_text(), "important")
+        self.assertFalse(pathlib.Path(str(victim) + ".resolved.json").exists())
+        self.assertEqual(self.ask("status")["jobs"][0]["state"], "failed")
+
+    def test_links_and_pipes_in_a_folder_of_work_are_not_followed(self):
+        job = self.write("bar.json", make_job())
+        self.run_it("submit", job)
+        work, = self.store.glob("work/*/*")
+        victims = {}
+        for name in ("progress.jsonl", "log", "reserve", "outcome.json", "attempt.json", "checkpoint.hdf", "bank.hdf", "bank.hdf.resolved.json", "prediction.new"):
+            victims[name] = self.write("victim-" + name, "important")
+            (work / name).symlink_to(victims[name])
+        self.run_queue()
+        self.assertEqual({name: file.read_text() for name, file in victims.items()}, dict.fromkeys(victims, "important"))
+        self.assertEqual(self.ask("status")["jobs"][0]["state"], "done")
+        # Pipes and other names of a file.
+        other = self.write("other.json", make_job(max_modes=2))
+        self.run_it("submit", other)
+        work, = self.store.glob("work/*/*")
+        victim = self.write("victim", "important")
+        for name in ("log", "checkpoint.hdf"):
+            os.mkfifo(work / name)
+        for name in ("progress.jsonl", "reserve"):
+            os.link(victim, work / name)
+        self.run_queue()
+        self.assertEqual(self.ask("status")["counts"]["done"], 2)
+        self.assertEqual(victim.read_text(), "important")
+
+    def test_a_linked_folder_of_work_is_not_written_to(self):
+        job = self.write("bar.json", make_job())
+        self.run_it("submit", job)
+        work, = self.store.glob("work/*/*")
+        victim = self.folder / "victim"
+        shutil.copytree(work, victim)
+        before = sorted(path.name for path in victim.iterdir())
+        shutil.rmtree(work)
+        work.symlink_to(victim)
+        self.run_it("run", "--quiet", "--no-pictures", timeout=30)
+        self.assertEqual(sorted(path.name for path in victim.iterdir()), before)
+        self.assertEqual(self.ask("status")["jobs"][0]["state"], "failed")
+        self.run_it("submit", job)
+        self.run_queue()
+        self.run_it("get", job)
+        self.assertEqual(sorted(path.name for path in victim.iterdir()), before)
+
+    def test_gc_empties_no_folder_that_is_linked(self):
+        self.make_done()
+        for name in ("tmp", "work", "inputs", "banks"):
+            victim = self.folder / "victim"
+            (victim / ".ssh").mkdir(parents=True, exist_ok=True)
+            (victim / "thesis.tex").write_text("important")
+            (self.store / name).rename(self.folder / "aside")
+            (self.store / name).symlink_to(victim)
+            self.refuse("gc", "--delete", says=[name, "link"])
+            self.assertEqual((victim / "thesis.tex").read_text(), "important")
+            self.assertTrue((victim / ".ssh").is_dir())
+            (self.store / name).unlink()
+            (self.folder / "aside").rename(self.store / name)
+
+    def test_a_damaged_input_is_not_solved_and_copied_again(self):
+        job, mesh = self.make_mesh_job()
+        self.run_it("submit", job)
+        copy, = self.store.glob("inputs/*/*.msh")
+        copy.chmod(0o644)
+        whole = copy.read_bytes()
+        copy.write_bytes(whole.replace(b"1", b"2", 1))
+        self.run_queue()
+        state = self.ask("status")["jobs"][0]
+        self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
+        self.assertIn("damaged", state["reason"])
+        self.assertEqual([entry["kind"] for entry in self.ask("verify", code=3)["damaged"]], ["input"])
+        self.run_it("submit", job)
+        self.assertEqual(copy.read_bytes(), whole)
+        self.run_queue()
+        self.run_it("get", job)
+
+    def test_a_damaged_bank_is_not_done_and_can_be_computed_again(self):
+        job, bank = self.make_done()
+        whole = bank.read_bytes()
+        other = self.write("other.json", make_job(max_modes=2))
+        self.run_it("submit", other)
+        self.run_queue()
+        second = pathlib.Path(self.run_it("get", other).stdout.strip()).read_bytes()
+        damages = {"missing": None, "cut": whole[:-1], "empty": b"", "flipped": whole[:9000] + bytes([whole[9000] ^ 1]) + whole[9001:], "swapped": second}
+        for number, (name, content) in enumerate(damages.items()):
+            for path in (bank.parent, bank):
+                path.chmod(0o755)
+            bank.unlink() if content is None else bank.write_bytes(content)
+            with self.subTest(name):
+                done = self.run_it("get", job, code=1)
+                self.assertEqual(done.stdout, "")
+                self.assertIn("computes it again", done.stderr)
+                self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1)
+                self.assertFalse((self.folder / "copy.hdf").exists())
+                self.assertEqual([entry["state"] for entry in self.ask("status", job)["jobs"]], ["failed"])
+                self.assertTrue(self.ask("explain", job)["would_run"])
+                self.assertEqual([entry["kind"] for entry in self.ask("verify", code=3)["damaged"]], ["bank"])
+                self.run_it(*(("submit", job), ("retry", job), ("verify", "--repair"))[number % 3])
+                self.run_queue()
+                self.assertEqual(pathlib.Path(self.run_it("get", job).stdout.strip()), bank)
+                subprocess.run([BIN / "carillon-bank", "check", bank], check=True, stdout=subprocess.DEVNULL)
+                self.assertEqual(self.ask("verify")["damaged"], [])
+        # A bit that no clock tells of.
+        for path in (bank.parent, bank):
+            path.chmod(0o755)
+        time = bank.stat()
+        content = bytearray(bank.read_bytes())
+        content[9000] ^= 1
+        bank.write_bytes(content)
+        os.utime(bank, ns=(time.st_atime_ns, time.st_mtime_ns))
+        self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1)
+        self.assertEqual([entry["state"] for entry in self.ask("status", job)["jobs"]], ["failed"])
+        self.assertTrue(all(item["kind"] == "damaged" for item in self.ask("gc")["items"]))
+
+    def test_warnings_reach_who_asks(self):
+        job = self.write("silent.json", make_job(band_hz=[20, 21]))
+        said = self.ask("submit", job, "--run")
+        self.assertIn("silent", said["jobs"][0]["warnings"][0])
+        self.assertIn("silent", self.ask("status", job)["jobs"][0]["warnings"][0])
+        self.assertIn("silent", self.ask("get", job)["warnings"][0])
+        self.assertIn("warning", self.run_it("get", job).stderr)
+        self.assertIn("warning", self.run_it("status").stdout)
+        self.assertIn("warning", self.run_it("submit", job, "--run").stderr + self.run_it("submit", job).stderr)
+
+    def test_a_full_disk_can_be_read_and_cleaned(self):
+        disk = self.folder / "disk"
+        disk.mkdir()
+        if os.geteuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", disk], stderr=subprocess.DEVNULL).returncode != 0:
+            self.skipTest("no disk can be mounted here")
+        self.addCleanup(subprocess.run, ["umount", disk])
+        self.store = disk / "store"
+        job, bank = self.make_done()
+        other = self.write("other.json", make_job(max_modes=2))
+        self.run_it("submit", other)
+        self.run_queue()
+        other.unlink()
+        fill = os.open(disk / "fill", os.O_WRONLY | os.O_CREAT)
+        try:
+            while True:
+                os.write(fill, bytes(4096))
+        except OSError:
+            os.close(fill)
+        self.assertEqual(os.statvfs(disk).f_bavail, 0)
+        for words in (("get", job), ("status",), ("log", job), ("explain", job), ("report", job), ("verify",), ("gc",)):
+            with self.subTest(words[0]):
+                self.run_it(*words)
+        self.assertIn("full", self.run_it("submit", self.write("third.json", make_job(max_modes=3)), code=4).stderr)
+        self.assertEqual(pathlib.Path(self.run_it("get", job).stdout.strip()), bank)
+        self.assertEqual([item["kind"] for item in self.ask("gc", "--delete")["items"]], ["bank"])
+        self.assertGreater(os.statvfs(disk).f_bavail, 0)
+        self.assertEqual(len(self.ask("status")["jobs"]), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
