@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -113,7 +114,19 @@ mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fi
   if (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == 0) return mesh::read_mesh(file);
   const std::string text = fmt::format("{}: the body cannot be meshed: {}", body.place, ended.errors);
   if (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == kExitInput) throw InputError(text);
-  throw SystemError(WIFSIGNALED(ended.status) ? fmt::format("{} (ended by signal {})", text, WTERMSIG(ended.status)) : text);
+  if (!WIFSIGNALED(ended.status)) throw SystemError(text);
+  const int signal = WTERMSIG(ended.status);
+  const char* name = sigdescr_np(signal);
+  const std::string what =
+      fmt::format("{}{}signal {} ({})", text, ended.errors.empty() ? "" : "; ", signal, name != nullptr ? name : "unknown");
+  // A signal of its own making comes from what it read, and comes again; others come from outside.
+  for (const int own : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSYS, SIGTRAP}) {
+    if (signal == own)
+      throw InputError(what +
+                       " ended carillon-mesh: this surface is malformed in a way that it does not withstand; repair the surface, "
+                       "or write it from another program as STL, OBJ, OFF or PLY");
+  }
+  throw SystemError(what + " ended carillon-mesh");
 }
 
 }  // namespace
