@@ -80,6 +80,7 @@ struct CommandLine {
     app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
+    app.add_option("--bank", options.bank, "write the bank to this file, whatever the job says")->check(named);
     CLI::Option* matrices =
         app.add_option("--matrices", options.matrices, "write K and M to this folder too, as Matrix Market files")->check(named);
     CLI::Option* validate =

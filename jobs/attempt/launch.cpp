@@ -194,7 +194,7 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   if (options.is_prediction) {
     add({"--validate", "--json", "--patience", "1000000"});  // what is reserved rests on the mesh, not on an estimate
   } else {
-    add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
+    add({"--bank", store::kBankFile, "--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
   }
   return launch;
 }

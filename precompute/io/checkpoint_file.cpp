@@ -90,7 +90,7 @@ std::string describe_error(int code) {
 
 /// Opens, does, closes. Throws SystemError with errno's words.
 void with_descriptor(const fs::path& file, int flags, const std::function<bool(int)>& work) {
-  const int descriptor = ::open(file.c_str(), flags | O_CLOEXEC, 0666);
+  const int descriptor = ::open(file.c_str(), flags | O_CLOEXEC | ((flags & O_DIRECTORY) != 0 ? 0 : O_NOFOLLOW), 0666);
   const bool ok = descriptor >= 0 && work(descriptor);
   const int error = errno;
   if (descriptor >= 0) ::close(descriptor);

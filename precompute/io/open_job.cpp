@@ -48,7 +48,8 @@ void check_job(const Run& run) {
 }  // namespace
 
 void open_job(Run& run, const fs::path& file, spec::BankKey bank) {
-  run.job = read_shared_job(run, file, bank);
+  run.job = read_shared_job(run, file, run.options.bank.empty() ? bank : spec::BankKey::optional);
+  if (!run.options.bank.empty()) run.job.bank = fs::absolute(run.options.bank).lexically_normal();
   check_job(run);
   for (const std::string& warning : run.job.warnings) run.stations.warn(warning);
 }

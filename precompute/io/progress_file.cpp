@@ -24,7 +24,9 @@ int open_to_append(const std::filesystem::path& file) {
     return InputError(fmt::format("{}: the progress file cannot be written: {}; give another with --progress", file.string(), why));
   };
   // A pipe without a reader would keep a plain open() waiting.
-  const int handle = open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666);
+  // A name without a folder is a file of this folder: somebody else may have put a link there.
+  const int own = file.has_parent_path() ? 0 : O_NOFOLLOW;
+  const int handle = open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY | own, 0666);
   if (handle < 0) throw refuse(std::strerror(errno));
   struct stat kind {};
   if (fstat(handle, &kind) == 0 && (S_ISREG(kind.st_mode) || S_ISCHR(kind.st_mode))) return handle;

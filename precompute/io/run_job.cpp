@@ -97,6 +97,19 @@ std::string describe_result(const bank::Bank& bank) {
   return text;
 }
 
+/// Frequencies that are off by more than this are heard as another pitch (a quarter tone).
+constexpr double kWideCents = 50.0;
+
+void warn_of_wide_bars(Run& run, const bank::Bank& bank) {
+  const auto& cents = bank.discretisation_error_cents;
+  const auto widest = std::max_element(cents.begin(), cents.end());
+  if (widest == cents.end() || !(*widest > kWideCents)) return;
+  run.stations.warn(
+      fmt::format("error bars reach {:.0f} cents (the mode at {:.1f} Hz): the mesh is too coarse for this band; refine it, or give "
+                  "\"accuracy_cents\" in the job",
+                  *widest, bank.freq_hz(static_cast<std::size_t>(widest - cents.begin()))));
+}
+
 /// The record in the bank cannot tell what writing the bank takes; the one beside it does.
 RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   RunSummary summary;
@@ -110,19 +123,22 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
     return spec::resolved_json(run.job, folder, write_json(record));
   };
+  // A name without a folder stays one: it means the folder that this process is in, whatever has become of that folder's name.
+  const fs::path written = run.options.bank.empty() ? run.job.bank : run.options.bank;
+  if (run.rank == 0) warn_of_wide_bars(run, bank);
   run.stations.begin("write", summary.bank.string());
   Measured measured = measure(run.comm);
   petsc::run_agreed(run.comm, [&] {
     if (run.rank != 0) return;
     bank.provenance = make_record(measured);
-    bank::write_bank(bank, summary.bank);
-    run.stations.say(fmt::format("{} bytes", fs::file_size(summary.bank)));
+    bank::write_bank(bank, written);
+    run.stations.say(fmt::format("{} bytes", fs::file_size(written)));
     summary.result = describe_result(bank);
   });
   run.stations.end();
   measured = measure(run.comm);
   petsc::run_agreed(run.comm, [&] {
-    if (run.rank == 0) config::write_file(summary.resolved, make_record(measured));
+    if (run.rank == 0) config::write_file(spec::find_resolved_path(written), make_record(measured));
   });
   return summary;
 }

@@ -13,6 +13,7 @@ struct RunOptions {
   std::filesystem::path checkpoint;         // resumed from where it fits, and saved to; empty: none
   double checkpoint_every_s = 300;          // seconds between two saves of it
   std::filesystem::path progress;           // progress as JSON lines is appended here; empty: nowhere
+  std::filesystem::path bank;               // where the bank goes, whatever the job says; empty: as it says
   std::filesystem::path matrices;           // folder for K and M as files; empty: none
   bool validate = false;                    // check and predict, do not solve
   double patience_s = 6;                    // of --validate: a surface that takes longer to mesh is estimated

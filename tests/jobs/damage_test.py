@@ -174,6 +174,38 @@ class Damage(Bench):
         self.assertEqual([entry["state"] for entry in self.ask("status", job)["jobs"]], ["failed"])
         self.assertTrue(all(item["kind"] == "damaged" for item in self.ask("gc")["items"]))
 
+    def test_a_mesher_that_crashes_is_not_started_again(self):
+        programs = self.folder / "bin"
+        programs.mkdir()
+        for name in ("carillon", "carillon-precompute"):
+            try:
+                os.link(BIN / name, programs / name)
+            except OSError:
+                shutil.copy(BIN / name, programs / name)
+        (programs / "carillon-mesh").write_text("#!/bin/sh\nkill -SEGV $$\n")
+        (programs / "carillon-mesh").chmod(0o755)
+        self.write("body.off", "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
+        job = self.write("body.json", make_job(body={"surface": "body.off", "nodes": 300}))
+        command = [programs / "carillon", "--store", self.store]
+        subprocess.run([*command, "submit", job], check=True, stdout=subprocess.DEVNULL, env=self.environment)
+        subprocess.run([*command, "run", "--quiet", "--no-pictures"], check=True, env=self.environment, timeout=60)
+        state = self.ask("status")["jobs"][0]
+        self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
+        self.assertIn("Segmentation fault", state["reason"])
+        self.assertIn("repair the surface", state["reason"])
+
+    def test_two_ranks_write_into_the_folder_that_was_opened(self):
+        job = self.write("bar.json", {**make_job(), "resources": {"ranks": 2}})
+        self.run_it("submit", job, "--run")
+        self.run_it("get", job)
+        self.assertEqual(list(self.store.glob("work/*/*")), [])
+
+    def test_characters_that_steer_a_terminal_do_not_reach_it(self):
+        job = self.write("a\u009b31mb\u202ec.json", make_job(max_modes=1))
+        done = self.run_it("submit", job, "--run")
+        text = done.stdout + done.stderr + self.run_it("status").stdout + self.run_it("log", job).stdout + self.run_it("get", job, "--json").stdout
+        self.assertFalse([letter for letter in "\u009b\u202e\x1b" if letter in text], repr(text))
+
     def test_warnings_reach_who_asks(self):
         job = self.write("silent.json", make_job(band_hz=[20, 21]))
         said = self.ask("submit", job, "--run")
