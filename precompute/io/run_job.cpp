@@ -97,19 +97,6 @@ std::string describe_result(const bank::Bank& bank) {
   return text;
 }
 
-/// Frequencies that are off by more than this are heard as another pitch (a quarter tone).
-constexpr double kWideCents = 50.0;
-
-void warn_of_wide_bars(Run& run, const bank::Bank& bank) {
-  const auto& cents = bank.discretisation_error_cents;
-  const auto widest = std::max_element(cents.begin(), cents.end());
-  if (widest == cents.end() || !(*widest > kWideCents)) return;
-  run.stations.warn(
-      fmt::format("error bars reach {:.0f} cents (the mode at {:.1f} Hz): the mesh is too coarse for this band; refine it, or give "
-                  "\"accuracy_cents\" in the job",
-                  *widest, bank.freq_hz(static_cast<std::size_t>(widest - cents.begin()))));
-}
-
 /// The record in the bank cannot tell what writing the bank takes; the one beside it does.
 RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   RunSummary summary;
@@ -125,7 +112,6 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   };
   // A name without a folder stays one: it means the folder that this process is in, whatever has become of that folder's name.
   const fs::path written = run.options.bank.empty() ? run.job.bank : run.options.bank;
-  if (run.rank == 0) warn_of_wide_bars(run, bank);
   run.stations.begin("write", summary.bank.string());
   Measured measured = measure(run.comm);
   petsc::run_agreed(run.comm, [&] {
