@@ -82,14 +82,16 @@ std::string describe_result(const bank::Bank& bank) {
 /// Frequencies that are off by more than this are heard as another pitch (a quarter tone).
 constexpr double kWideCents = 50.0;
 
-void warn_of_wide_bars(Run& run, const bank::Bank& bank) {
+/// For the record's warnings; what is printed has the error bars in its result already. Empty when they are narrow enough.
+std::string describe_wide_bars(const bank::Bank& bank) {
   const auto& cents = bank.discretisation_error_cents;
   const auto widest = std::max_element(cents.begin(), cents.end());
-  if (widest == cents.end() || !(*widest > kWideCents)) return;
-  run.stations.warn(
-      fmt::format("error bars reach {:.0f} cents (the mode at {:.1f} Hz): the mesh is too coarse for this band; refine it, or give "
-                  "\"accuracy_cents\" in the job",
-                  *widest, bank.freq_hz(static_cast<std::size_t>(widest - cents.begin()))));
+  if (widest == cents.end() || !(*widest > kWideCents)) return "";
+  return fmt::format(
+      "error bars reach {:.0f} cents (the mode at {:.1f} Hz): the mesh is too coarse for this band; refine it, or give \"accuracy_cents\" "
+      "in "
+      "the job",
+      *widest, bank.freq_hz(static_cast<std::size_t>(widest - cents.begin())));
 }
 
 /// The record in the bank cannot tell what writing the bank takes; the one beside it does.
@@ -98,14 +100,15 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   summary.bank = run.job.bank;
   summary.resolved = spec::find_resolved_path(run.job.bank);
   const fs::path folder = fs::absolute(summary.bank).parent_path();
+  const std::string wide = run.rank == 0 ? describe_wide_bars(bank) : "";
   const auto make_record = [&](const Measured& measured) {
     Json::Value record = describe_run(run, found.setting, found.body, found.solved, measured);
+    if (!wide.empty()) record["warnings"].append(wide);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
     return spec::resolved_json(run.job, folder, write_json(record));
   };
   // A name without a folder stays one: it means the folder that this process is in, whatever has become of that folder's name.
   const fs::path written = run.options.bank.empty() ? run.job.bank : run.options.bank;
-  if (run.rank == 0) warn_of_wide_bars(run, bank);
   run.stations.begin("write", summary.bank.string());
   Measured measured = measure(run.comm);
   petsc::run_agreed(run.comm, [&] {
