@@ -206,6 +206,11 @@ class Damage(Bench):
         text = done.stdout + done.stderr + self.run_it("status").stdout + self.run_it("log", job).stdout + self.run_it("get", job, "--json").stdout
         self.assertFalse([letter for letter in "\u009b\u202e\x1b" if letter in text], repr(text))
 
+    def test_wide_error_bars_are_a_warning(self):
+        job = self.write("wide.json", make_job(band_hz=[20, 20000]))
+        self.assertTrue([text for text in self.ask("submit", job, "--run")["jobs"][0]["warnings"] if "error bars reach" in text])
+        self.assertIn("error bars reach", self.run_it("status").stdout)
+
     def test_warnings_reach_who_asks(self):
         job = self.write("silent.json", make_job(band_hz=[20, 21]))
         said = self.ask("submit", job, "--run")
