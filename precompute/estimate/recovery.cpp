@@ -350,7 +350,7 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
   const std::vector<std::int32_t> order = order_elements(local), place = find_places(local, order, false),
                                   vertex_place = find_places(local, order, true);
   Recovery recovery{
-      {}, order, place, vertex_place, {}, {}, {}, {}, {}, NodeExchange(comm, local, place), NodeExchange(comm, local, vertex_place)};
+      {}, order, place, vertex_place, {}, {}, {}, {}, {}, {}, NodeExchange(comm, local, place), NodeExchange(comm, local, vertex_place)};
   Elements& elements = recovery.elements;
   elements.nodes = local.nodes_per_tet();
   elements.samples = local.order == 1 ? 1 : 4;

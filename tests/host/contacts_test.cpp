@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "runtime/host/render.hpp"
+#include "tests/host/heard.hpp"
 #include "tests/synth/cube_bank.hpp"
 
 namespace carillon::host {
@@ -40,7 +41,7 @@ struct Stage {
     }
   }
   std::vector<const bank::Bank*> list_banks() const { return std::vector<const bank::Bank*>(scene.bodies.size(), &bank); }
-  Sound play_all(const std::vector<stream::Event>& events) const {
+  Heard play_all(const std::vector<stream::Event>& events) const {
     Scene all = scene;
     all.effects = synth::EffectSet::all();
     return calc_sound(all, list_banks(), events, {});
@@ -52,7 +53,7 @@ struct Difference {
   double share_db = 0.0, loudest_pa = 0.0, whole_pa2_s = 0.0;
 };
 
-Difference compare(const Sound& a, const Sound& b) {
+Difference compare(const Heard& a, const Heard& b) {
   double difference = 0.0, whole = 0.0, loudest = 0.0, window = 0.0;
   for (std::size_t c = 0; c < b.pressure_pa.size(); ++c) {
     for (std::size_t n = 0; n < b.pressure_pa[c].size(); ++n) {
@@ -118,8 +119,8 @@ TEST(PlannedContacts, KeepTheRingUntilItIsNotHeard) {
   for (const Case& of : kCases) {
     const Stage stage;
     const std::vector<stream::Event> events = of.list_events();
-    const Plan plan = make_plan(make_facts(stage.scene, make_microphones(stage.scene), true), events, {});
-    const Sound all = stage.play_all(events), planned = calc_sound(stage.scene, stage.list_banks(), events, {.plan = &plan});
+    const Plan plan = make_plan(make_facts(stage.scene, make_microphones(stage.scene), true), make_events(events), {});
+    const Heard all = stage.play_all(events), planned = calc_sound(stage.scene, stage.list_banks(), events, {.plan = &plan});
     const Difference difference = compare(planned, all);
     EXPECT_GT(difference.whole_pa2_s, 0.2 * std::pow(10.0, 4.0) * kReferencePa * kReferencePa) << of.name << ": 40 dB are not to be heard";
     EXPECT_LT(difference.share_db, -50.0) << of.name;
@@ -151,11 +152,11 @@ TEST(Superposition, OfBodiesThatNeverMeetIsTheSumOfEachAlone) {
     std::stable_sort(a.begin(), a.end(), [](const auto& x, const auto& y) { return stream::get_time_s(x) < stream::get_time_s(y); });
     return a;
   };
-  const Sound one = bar.play_all(list_events(0, 41, 0.3)), two = plate.play_all(list_events(0, 42, 0.4));
-  Sound sum = one;
+  const Heard one = bar.play_all(list_events(0, 41, 0.3)), two = plate.play_all(list_events(0, 42, 0.4));
+  Heard sum = one;
   for (std::size_t c = 0; c < 2; ++c)
     for (std::size_t n = 0; n < sum.pressure_pa[c].size(); ++n) sum.pressure_pa[c][n] += two.pressure_pa[c][n];
-  const Sound together = both.play_all(join(list_events(0, 41, 0.3), list_events(1, 42, 0.4)));
+  const Heard together = both.play_all(join(list_events(0, 41, 0.3), list_events(1, 42, 0.4)));
   EXPECT_LT(compare(together, sum).share_db, -130.0);
   EXPECT_LT(compare(turned.play_all(join(list_events(1, 41, 0.3), list_events(0, 42, 0.4))), together).share_db, -130.0);
   EXPECT_GT(compare(two, one).share_db, -20.0);

@@ -14,33 +14,13 @@
 
 #include "runtime/host/report.hpp"
 #include "runtime/host/sound_file.hpp"
+#include "tests/host/heard.hpp"
 #include "tests/synth/cube_bank.hpp"
 
 namespace carillon::host {
 namespace {
 
 using std::numbers::pi;
-
-/// A sound with all its samples by channel, for looking at.
-struct Heard : Sound {
-  std::vector<std::vector<double>> pressure_pa;
-};
-
-Heard read_all(const Sound& sound, const SoundStore& store) {
-  Heard heard{sound, {}};
-  heard.pressure_pa.resize(store.get_channels());
-  store.for_each_piece([&](std::uint64_t, std::span<const float> frames) {
-    for (std::size_t i = 0; i < frames.size(); ++i) heard.pressure_pa[i % store.get_channels()].push_back(static_cast<double>(frames[i]));
-  });
-  return heard;
-}
-
-Heard calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const std::vector<stream::Event>& events,
-                 const RenderOptions& options) {
-  SoundStore store(options.rate_hz, count_channels(scene));
-  const Sound sound = host::calc_sound(scene, banks, make_events(events), options, store);
-  return read_all(sound, store);
-}
 
 /// Back into a store, all channels of the same length.
 SoundStore keep(const std::vector<std::vector<double>>& pressure_pa, int rate_hz) {

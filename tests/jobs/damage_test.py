@@ -208,8 +208,8 @@ class Damage(Bench):
 
     def test_wide_error_bars_are_a_warning(self):
         job = self.write("wide.json", make_job(band_hz=[20, 20000]))
-        self.assertTrue([text for text in self.ask("submit", job, "--run")["jobs"][0]["warnings"] if "error bars reach" in text])
-        self.assertIn("error bars reach", self.run_it("status").stdout)
+        self.assertTrue([text for text in self.ask("submit", job, "--run")["jobs"][0]["warnings"] if "frequencies can be wrong by" in text])
+        self.assertIn("frequencies can be wrong by", self.run_it("status").stdout)
 
     def test_warnings_reach_who_asks(self):
         job = self.write("silent.json", make_job(band_hz=[20, 21]))
