@@ -398,7 +398,9 @@ bool GmshReader::read_doubt() {
   for (std::size_t i = 0; i < count; ++i) {
     if (!binary_) cursor_.skip_space();
     const std::size_t place = cursor_.place();
-    const Vec3 way = (doubt_m_[cursor_.int32("the number of a node")] = read_point());
+    const auto tag = cursor_.int32("the number of a node");
+    const Vec3 way = read_point();
+    doubt_m_[tag] = way;
     for (const double x : way)
       if (!std::isfinite(x)) cursor_.fail(place, "a way between two surfaces is not finite; write the mesh again");
   }

@@ -25,7 +25,7 @@ constexpr double kResidualLimit = 1e-4;
 constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by the same formula
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
 // Bounds that no body reaches. Lengths: from an atom's to an asteroid's. Frequency and damping: what a job may ask for at most.
-constexpr double kLeastLengthM = 1e-9, kMostLengthM = 1e7;
+constexpr double kLeastLengthM = 1e-9, kMostLengthM = 1e7, kFarthestM = 1e12;  // sizes; how far from the origin
 constexpr double kMostHz = 1e12;
 constexpr double kMostDecayPerS = 1e32;  // alpha1 of 1e6 s at that frequency
 constexpr double kMostAlpha1S = 1e6, kMostAlpha2PerS = 1e12;
@@ -332,7 +332,7 @@ Check check_rigid_body(const Bank& bank) {
       high = std::max(high, vertex[k] - rigid.centre_m[k]);
     }
     const double reach = std::max(-low, high);
-    if (!(high - low >= kLeastLengthM && high - low <= kMostLengthM) || !(std::abs(rigid.centre_m[k]) <= kMostLengthM)) {
+    if (!(high - low >= kLeastLengthM && high - low <= kMostLengthM) || !(std::abs(rigid.centre_m[k]) <= kFarthestM)) {
       faults.add("the body measures {:.3g} m along axis {} about {:.3g} m; bodies have {:.0e} to {:.0e} m", high - low, k,
                  rigid.centre_m[k], kLeastLengthM, kMostLengthM);
     }

@@ -43,7 +43,7 @@ def read_hits(file):
 def write_scene(file, **body):
     file.write_text(json.dumps({
         "duration_s": 1.5, "ground": {"height_m": 0.0, "restitution": RESTITUTION, "friction": 0.6}, "listener": {"position_m": [0, -1, 0.2]},
-        "effects": ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"], "output": {"format": "float", "gain": 1e-3},
+        "effects": ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"], "output": {"format": "float", "gain": 1e-3, "fade_end": False},
         "bodies": [{"name": "body", "bank": "cube.h5", "restitution": RESTITUTION, "friction": 0.6, **body}]}))
 
 

@@ -608,7 +608,7 @@ class RenderProgram(unittest.TestCase):
         silent = self.scene("still.json", bodies=[{"name": "cube", "bank": "cube.h5", "fixed": True, "position_m": [0, 0, 1]}])
         runs = {}
         for scene in (raw, faded, silent):
-            runs[scene.stem] = render(scene, "-o", scene.with_suffix(".wav"), "--report", scene.with_suffix(".report"), "-q")
+            runs[scene.stem] = render(scene, "-o", scene.with_suffix(".wav"), "--report", scene.with_suffix(".report"))
             self.assertEqual(runs[scene.stem].returncode, 0, runs[scene.stem].stderr)
         (_, _, a), (_, _, b) = read_wav(raw.with_suffix(".wav")), read_wav(faded.with_suffix(".wav"))
         report = {name: json.loads((self.root / f"{name}.report").read_text()) for name in runs}

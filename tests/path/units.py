@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Units: a mesh in millimetres with "mesh_scale" is the body in metres, on one rank and in the parallel format, free and held; what is likely given in another unit is asked about.
+"""Units: a mesh in millimetres with "mesh_scale" is the body in metres, on one rank and in the parallel format, free and fixed; what is likely given in another unit is asked about.
 
 usage: units.py BIN_DIR
 """
@@ -38,6 +38,8 @@ def expect_close(found, wanted, what):
 
 def check_scale(folder):
     nodes, tets = make_box((8, 3, 2), (0.1, 0.033, 0.021))
+    turned = numpy.linalg.det(nodes[tets[:, 1:4]] - nodes[tets[:, :1]]) < 0  # none is to be inside out, which would be said
+    tets[turned, :2] = tets[turned, 1::-1]
     side = (nodes[:, 0] == 0).astype("i4")
     meshio.Mesh(nodes, [("tetra", tets)], point_data={"side": side}).write(folder / "metres.vtu")
     meshio.Mesh(1000 * nodes, [("tetra", tets)], point_data={"side": side}).write(folder / "millimetres.vtu")

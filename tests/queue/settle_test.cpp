@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "jobs/store/identity.hpp"
 #include "tests/registry/jobs.hpp"
 
 namespace carillon::tests {
@@ -44,12 +45,27 @@ TEST_F(Settle, a_cancelled_job_says_what_it_was_and_why) {
 }
 
 TEST_F(Settle, a_retry_and_what_is_asked_with_it_are_one_change) {
-  put(State::failed, 4, "rank 1 was killed");
-  EXPECT_TRUE(queue::retry(store_, registry_, make_id(1), [](Job& job) { job.resources.ranks = 7; }).is_done);
-  EXPECT_EQ(registry_.find(make_id(1))->state, State::queued);
-  EXPECT_EQ(registry_.find(make_id(1))->resources.ranks, 7);
-  EXPECT_FALSE(queue::retry(store_, registry_, make_id(1), [](Job& job) { job.resources.ranks = 9; }).is_done);
-  EXPECT_EQ(registry_.find(make_id(1))->resources.ranks, 7);
+  // A job whose id follows from what it asks for: retry looks.
+  const spec::JobSpec job = spec::parse_job(
+      R"({"body": {"shape": "bar", "length_m": 0.2, "width_m": 0.03, "thickness_m": 0.01, "nodes": 600},
+          "material": {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"internal_friction": {"tan_phi": 1e-3}}}})",
+      "bar.json", spec::BankKey::optional);
+  const store::Request request = store::RequestMaker("solver").make(job);
+  store::prepare_work(store_, {{&job, &request}});
+  registry_.submit({{"/jobs/bar.json", request}});
+  const store::Id id = store::require_id(request.id, "test");
+  registry_.update(id, [](Job& row) { return row.state = State::failed, row.attempts = 4, row.reason = "rank 1 was killed", true; });
+  EXPECT_TRUE(queue::retry(store_, registry_, id, [](Job& row) { row.resources.ranks = 7; }).is_done);
+  EXPECT_EQ(registry_.find(id)->state, State::queued);
+  EXPECT_EQ(registry_.find(id)->resources.ranks, 7);
+  EXPECT_FALSE(queue::retry(store_, registry_, id, [](Job& row) { row.resources.ranks = 9; }).is_done);
+  EXPECT_EQ(registry_.find(id)->resources.ranks, 7);
+}
+
+TEST_F(Settle, a_job_whose_folder_is_of_another_is_not_retried) {
+  put(State::failed, 4, "rank 1 was killed");  // its id is that of no request
+  EXPECT_FALSE(queue::retry(store_, registry_, make_id(1)).is_done);
+  EXPECT_EQ(registry_.find(make_id(1))->state, State::failed);
 }
 
 }  // namespace
