@@ -129,6 +129,8 @@ int carry_out(const petsc::Session& session, const CommandLine& words) {
     if (speaks) fmt::print(stderr, "carillon-precompute: {}\n", config::printable(summary.result));
     return kExitCheckpointed;
   }
+  if (speaks && words.options.quiet && !summary.warning.empty())
+    fmt::print(stderr, "carillon-precompute: warning: {}\n", config::printable(summary.warning));
   if (speaks && !words.options.quiet) {
     if (!summary.warning.empty()) fmt::print("warning: {}\n", config::printable(summary.warning));
     fmt::print("{}\n{}\n", config::printable(summary.bank.string()), config::printable_lines(summary.result));

@@ -89,7 +89,7 @@ void repair_input(Shared& shared, Finding& finding) {
   const auto request = queue::find_request(shared.store(), shared.registry(), finding.id);
   finding.is_repaired = request && store::restore_input(shared.store(), *request);
   finding.repair = finding.is_repaired ? "copied again from where it was submitted from"
-                                       : "the file that it was copied from is gone or another by now; submit a job with that file again";
+                                       : "the file that it was copied from has been removed or changed; submit a job with that file again";
 }
 
 int run_verify(Shared& shared, const Options& options) {
@@ -136,7 +136,7 @@ int run_verify(Shared& shared, const Options& options) {
     print_json(root);
   else
     fmt::print("{} job{} verified, {} thing{} damaged{}\n", ids.size(), ids.size() == 1 ? "" : "s", findings.size(),
-               findings.size() == 1 ? "" : "s", findings.empty() || options.repairs ? "" : "; carillon verify --repair makes them again");
+               findings.size() == 1 ? "" : "s", findings.empty() || options.repairs ? "" : "; carillon verify --repair restores them");
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return is_whole ? 0 : kExitSolve;
 }

@@ -21,7 +21,7 @@ constexpr double kMostPower = 8;
 
 [[noreturn]] void fail_unit(const config::Object& object, std::string_view key, double value) {
   const bool is_density = key == "density_kg_m3";
-  object.fail(key, fmt::format("must be from {:g} to {:g} as no solid is outside, and is {:g}; check the unit{}",
+  object.fail(key, fmt::format("must be from {:g} to {:g}, a range that covers every solid, and is {:g}; check the unit{}",
                                is_density ? kLeastDensityKgM3 : kLeastStiffnessPa, is_density ? kMostDensityKgM3 : kMostStiffnessPa, value,
                                is_density && value < kLeastDensityKgM3 ? " (steel is 7850 kg/m^3, or 7.85e-9 t/mm^3)" : ""));
 }
@@ -300,7 +300,7 @@ void ask_about_damping(config::Object& material, const Material& result, const s
     warnings.push_back(fmt::format(
         "{}: \"damping\" is zero: what is struck rings for ever; steel has \"internal_friction\" {{\"tan_phi\": 1e-4}}", place));
   } else if (2 * swinging < kSteps + 1) {
-    warnings.push_back(fmt::format("{}: \"damping\" is so strong that {} of the band of {:g} to {:g} Hz swings: check the units{}", place,
+    warnings.push_back(fmt::format("{}: \"damping\" is so strong that {} of the band of {:g} to {:g} Hz rings: check the units{}", place,
                                    swinging == 0 ? "nothing" : "less than half", band_hz[0], band_hz[1],
                                    result.law == DampingLaw::rayleigh && result.alpha1_s > 1e-3
                                        ? fmt::format(" (alpha1_s is {:g} s; 1e-8 to 1e-6 s is usual)", result.alpha1_s)

@@ -92,9 +92,9 @@ OpenFolder OpenFolder::make_private(const std::string& name) const {
   if (::mkdirat(descriptor_, name.c_str(), 0700) != 0) throw_errno(name_ / name, "make this folder", errno);
   auto made = find(name);
   struct stat info {};
-  // Another may have put a folder of his in its place.
+  // Someone else may have put a folder of their own in its place.
   if (!made || ::fstat(made->get(), &info) != 0 || info.st_uid != ::geteuid())
-    throw SystemError(fmt::format("{}: somebody replaces folders of the store while they are made", (name_ / name).string()));
+    throw SystemError(fmt::format("{}: another user replaced this folder of the store while it was being made", (name_ / name).string()));
   ::fchmod(made->get(), 0700);
   return std::move(*made);
 }

@@ -279,7 +279,7 @@ Decision Search::decide() {
     return {1, last.setting};  // twice none: there is none
   if (const double doubt = calc_doubt(current_.solved.bars); doubt > asked_)
     give_up(fmt::format(
-        "{:.3g} cents of it no mesh makes smaller: the facets of the surface are so coarse that they may be planes or samples of "
+        "{:.3g} cents of it cannot be reduced by any mesh: the facets of the surface are so coarse that they may be planes or samples of "
         "a smooth surface; give a surface in finer facets, or, if the facets are the body, mesh it with carillon-mesh --facets "
         "and give the mesh",
         doubt));

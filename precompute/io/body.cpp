@@ -63,9 +63,8 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Pa
   warn_of_mesh(run, body);
   if (!mesh.doubt_m.empty())
     run.stations.warn(
-        "facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars contain "
-        "both: a "
-        "surface in finer facets settles it, and carillon-mesh --facets if they are the body");
+        "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars "
+        "contain both: a surface in finer facets settles it, or carillon-mesh --facets if the facets are the body");
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);

@@ -182,10 +182,10 @@ mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fi
   const std::string said = ended.errors.empty() ? "" : fmt::format(" after it wrote '{}'", ended.errors);
   if (is_own)
     throw InputError(
-        fmt::format("{}: carillon-mesh broke down on {}, by signal {} ({}){}; ask for another number of nodes, try \"method\": "
+        fmt::format("{}: carillon-mesh crashed on {}, by signal {} ({}){}; ask for another number of nodes, try \"method\": "
                     "\"stuffing\", or repair the surface in a modeller",
                     failed, body.surface.string(), signal, ::strsignal(signal), said));
-  throw SystemError(fmt::format("{}: carillon-mesh was ended from outside, by signal {} ({}){}; was memory short?", failed, signal,
+  throw SystemError(fmt::format("{}: carillon-mesh was ended from outside, by signal {} ({}){}; did memory run out?", failed, signal,
                                 ::strsignal(signal), said));
 }
 

@@ -84,9 +84,8 @@ std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, b
   if (!(*worst > kAudibleCents)) return {};
   const auto wide = std::count_if(cents.begin(), cents.end(), [](double c) { return c > kAudibleCents; });
   return fmt::format(
-      "frequencies can be wrong by {:.0f} cent (estimate, mode {}; {} of {} modes by more than {:g}): {}a finer mesh, or "
-      "\"accuracy_cents\" "
-      "in the job, makes them better",
+      "frequencies can be wrong by {:.0f} cents (estimate, mode {}; {} of {} modes by more than {:g}): {}a finer mesh, or "
+      "\"accuracy_cents\" in the job, improves them",
       *worst, worst - cents.begin() + 1, wide, cents.size(), kAudibleCents,
       setting.element == spec::Element::T4 ? "\"element\": \"T10\" (--order 2), " : "");
 }

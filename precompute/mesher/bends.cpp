@@ -1,5 +1,5 @@
 // Method: coplanar triangles are joined to panes. From every edge that turns by less than 50 degrees a row of panes is followed to both
-// sides:
+//   sides:
 //   through a pane with four corners to the opposite side, through others straight on. The row ends at a sharp edge, at a pane more than
 //   three times wider or a polygon, and where the turn changes its sign or its size by more than a factor. Its length tells an arc cut into
 //   facets from a bevel.

@@ -1,6 +1,5 @@
 // Method: a node of the skin gets the way from its nearest point on the triangles to the point of the smooth surface that belongs to it.
-// The
-//   inner skin of a shell moves as the outer one does there. The ways are short: of the order of the height of an arc over one of the
+//   The inner skin of a shell moves as the outer one does there. The ways are short: of the order of the height of an arc over one of the
 //   triangles.
 // Source: our own.
 // Deviations: none.

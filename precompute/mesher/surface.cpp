@@ -358,7 +358,7 @@ void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& op
   if (report.doubt_m > 0)
     report.notes.push_back(fmt::format(
         "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart: the error "
-        "bars contain both; a surface in finer facets settles it, and --facets if they are the body.",
+        "bars contain both: a surface in finer facets settles it, or --facets if the facets are the body.",
         report.doubt_m));
   if (mesh.order == 1) {
     report.volume_m3 = measure(mesh).volume_m3;

@@ -65,8 +65,7 @@ TriangleSurface parse_surface(std::string_view bytes, const std::string& name, c
 /// duplicate and degenerate triangles, orients, fills holes up to the size that options.close_holes allows; where that does not lead to a
 /// closed manifold, wraps it (CGAL alpha wrap).
 /// `offset_m` is how far the returned surface lies outside the true one: 0 unless it was wrapped; the distance field adds it.
-/// `clean` is true if no two triangles of it intersect. Throws InputError if it encloses nothing or
-/// has too large a hole.
+/// `clean` is true if no two triangles of it intersect. Throws InputError if it encloses nothing or has too large a hole.
 struct MendedSurface {
   TriangleSurface surface;
   double offset_m = 0;

@@ -1,6 +1,5 @@
 // Method: the volume by tetrahedra against the one by the divergence theorem or the distance field; distances of the boundary's nodes by
-// the
-//   exact nearest point; the mesh's shells by walking its boundary. The body's shells: of a clean solid the parts of its surface; otherwise
+//   exact nearest points; the mesh's shells by walking its boundary. The body's shells: of a clean solid the parts of its surface; else
 //   the parts of the body and of the space around it, found in the distance field by rows of samples, are one more than the surfaces
 //   between them (in space, each closed surface parts one region in two).
 // Source: our own; the last is the tree of regions that nested surfaces make (Alexander duality).

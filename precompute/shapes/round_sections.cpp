@@ -1,8 +1,7 @@
 // The bodies with a round section: cylinder, disc, cone and ring.
 //
 // Method: The disc is a lattice of six sectors (of five, seven or eight where another count is asked for) whose ring i, of 6 i points,
-// goes
-//   to a circle; its triangles are nearly regular. It is swept along the axis (round the circle for the ring) in layers of prisms. The
+//   goes to a circle; its triangles are nearly regular. It is swept along the axis (round the circle for the ring) in layers of prisms. The
 //   layers of a cone that is cut off grow with its radius, so that they stay as long as wide. A pointed cone is six tetrahedra round its
 //   axis, each refined, so that the section at level i has i rings; layers of prisms may follow, so that levels and rings are chosen apart.
 //   Mid-side nodes lie at the mean radius of their corners about the axis of the section: exactly on the surface where both corners do, the

@@ -301,7 +301,7 @@ carillon_status carillon_bank_nearest_point(const carillon_bank* bank, const dou
   if (bank == nullptr || point_m == nullptr || triangle == nullptr || barycentric == nullptr) return CARILLON_BAD_ARGUMENT;
   return run(nullptr, 0, [&] {
     const bank::NearestPlace place = bank->get_tree().find(to_vector(point_m));
-    if (place.triangle < 0) throw InputError("no place");
+    if (place.triangle < 0) throw InputError("the point is not finite or too far away");
     *triangle = place.triangle;
     std::copy(place.barycentric.begin(), place.barycentric.end(), barycentric);
     if (closest_m != nullptr) std::copy(place.point_m.begin(), place.point_m.end(), closest_m);

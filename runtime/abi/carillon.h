@@ -59,7 +59,7 @@ CARILLON_API int32_t carillon_bank_triangle_count(const carillon_bank* bank);
 /* The undamped frequency [Hz] of a mode, 0 when there is no such mode. */
 CARILLON_API double carillon_bank_frequency_hz(const carillon_bank* bank, int32_t mode);
 
-/* The surface, in the frame of the body's mesh, in which blows are given. It belongs to the bank and stays until it is closed. NULL for a
+/* The surface, in the frame of the body's mesh, in which strikes are given. It belongs to the bank and stays until it is closed. NULL for a
  * NULL bank. */
 CARILLON_API int32_t carillon_bank_vertex_count(const carillon_bank* bank);
 /* x y z [m] of one vertex after the other: 3 * carillon_bank_vertex_count numbers. */

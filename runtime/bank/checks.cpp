@@ -24,7 +24,7 @@ namespace {
 constexpr double kResidualLimit = 1e-4;
 constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by the same formula
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
-// Bounds that no body reaches. Lengths: from an atom's to an asteroid's. Frequency and damping: what a job may ask for at most.
+// Bounds that no body reaches. Lengths: from a nanometre to a small planet. Frequency and damping: what a job may ask for at most.
 constexpr double kLeastLengthM = 1e-9, kMostLengthM = 1e7, kFarthestM = 1e12;  // sizes; how far from the origin
 constexpr double kMostHz = 1e12;
 constexpr double kMostDecayPerS = 1e32;  // alpha1 of 1e6 s at that frequency

@@ -127,7 +127,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     edited.eigenvalue_rad2_s2[m] *= eigenvalue_scale;
     edited.decay_per_s[m] = calc_decay(edited.damping, edited.material, edited.eigenvalue_rad2_s2[m]);
     if (!(edited.decay_per_s[m] >= 0.0) || !std::isfinite(edited.decay_per_s[m]))
-      throw InputError(fmt::format("the damping makes mode {} ({:.5g} Hz) decay by {:.3g} 1/s, which is none; check its numbers", m + 1,
+      throw InputError(fmt::format("the damping makes mode {} ({:.5g} Hz) decay by {:.3g} 1/s, which is no decay; check its numbers", m + 1,
                                    edited.freq_hz(m), edited.decay_per_s[m]));
     edited.shape_scale[m] *= shape_scale;
     edited.radiation_gain[m] *= shape_scale * g * g * calc_frequency_factor(std::sqrt(edited.eigenvalue_rad2_s2[m]), radius * g) /

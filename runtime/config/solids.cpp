@@ -70,8 +70,8 @@ std::optional<std::string> ask_about_solid(double young_modulus_pa, double densi
     }
   }
   return fmt::format(
-      "{} of {:g} and {} of {:g} make a speed of sound of {:.3g} m/s, which no solid has (stiffness from a gel's {:g} to a diamond's "
-      "{:g} Pa, density from {:g} to {:g} kg/m^3): check the units",
+      "{} of {:g} and {} of {:g} give a speed of sound of {:.3g} m/s; together these belong to no known solid (stiffness {:g} to "
+      "{:g} Pa, density {:g} to {:g} kg/m^3): check the units",
       stiffness_key, stiffness, density_key, density_kg_m3, std::sqrt(young_modulus_pa / density_kg_m3), kSoftestPa, kStiffestPa,
       kLightestKgM3, kHeaviestKgM3);
 }

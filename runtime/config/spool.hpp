@@ -14,9 +14,9 @@
 
 namespace carillon::config {
 
-/// Bytes, written once and in order. The first `memory` of them stay in memory; more go to a file in `folder` (empty: where temporary files
-/// go) that has no name, so that nothing is left behind however the program ends. All throw SystemError, which names `what` and the folder,
-/// when the disk refuses.
+/// Bytes, written once and in order. Up to `memory` of them stay in memory; once there are more, all go to a file in `folder` (empty:
+/// where temporary files go) that has no name, so that nothing is left behind however the program ends. All throw SystemError, which names
+/// `what` and the folder, when the disk refuses.
 class Spool {
  public:
   static constexpr std::size_t kMemory = 4 << 20;

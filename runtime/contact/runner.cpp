@@ -33,7 +33,7 @@ constexpr double kEarliest = 1e-4;    // s; an impact found in a window may have
 constexpr double kSlackMoved = 1e-5;  // m
 constexpr double kKeep = 0.02;        // of the smaller size: bodies stay together until they are this far apart
 
-/// Of this thread: sound that plays on another is none of ours.
+/// CPU time of this thread alone: sound rendered on another thread is not counted.
 double get_cpu_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

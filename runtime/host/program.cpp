@@ -5,12 +5,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <cstring>
 #include <ctime>
 #include <memory>
 
@@ -82,16 +80,6 @@ void check_room(const Scene& scene, const fs::path& wav) {
       fmt::format("{}: {:.3g} GB are free, and the sound needs {:.3g} GB: {:.3g} GB for the WAV file and {:.3g} GB while it is "
                   "made; make room or choose another place",
                   folder.string(), 1e-9 * static_cast<double>(space.available), 1e-9 * (kept + whole), 1e-9 * whole, 1e-9 * kept));
-}
-
-/// Throws SystemError when whoever reads standard output is gone.
-void write_standard_output(std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t put = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
-    if (put < 0 && errno == EINTR) continue;
-    if (put <= 0) throw SystemError(fmt::format("standard output: cannot write the sound: {}", std::strerror(put < 0 ? errno : ENOSPC)));
-    bytes.remove_prefix(static_cast<std::size_t>(put));
-  }
 }
 
 /// Files that appear together, when all of them are whole.
@@ -220,10 +208,7 @@ void run(const ProgramOptions& options) {
     throw InputError("--plan makes no sound and writes no files; leave the options that name files away");
   }
   const bool to_standard_output = is_standard_output(options.wav);
-  if (to_standard_output && isatty(STDOUT_FILENO) != 0) {
-    throw InputError(
-        "-o -: standard output is a terminal; lead the sound into a program or a file, as in  carillon-render SCENE -o - | aplay");
-  }
+  if (to_standard_output) config::check_standard_output("sound");
   std::FILE* notes = to_standard_output ? stderr : stdout;
   check_outputs(options, scene);
   if (!options.plan) check_room(scene, options.wav);
@@ -287,7 +272,7 @@ void run(const ProgramOptions& options) {
   print_warnings(scene, sound, figures);
   if (to_standard_output) {
     std::signal(SIGPIPE, SIG_IGN);  // a reader that goes is an error with a name
-    write_wav(store, figures.gain.per_pa, scene.output.format, write_standard_output);
+    write_wav(store, figures.gain.per_pa, scene.output.format, config::write_standard_output);
   }
   outputs.commit(options.quiet ? nullptr : notes);
 }

@@ -173,7 +173,7 @@ contact::GroundSpec parse_ground(config::Object& object, std::vector<std::string
   ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1.0, 3e4);
   const auto question = config::ask_about_solid(ground.young_modulus_pa, ground.density_kg_m3);
   if (!(ground.young_modulus_pa >= kSoftestGroundPa && ground.young_modulus_pa <= kStiffestGroundPa)) {
-    object.fail("young_modulus_pa", fmt::format("{:g} Pa is the stiffness of no ground; give {:g} to {:g}{}", ground.young_modulus_pa,
+    object.fail("young_modulus_pa", fmt::format("{:g} Pa is no plausible ground stiffness; give {:g} to {:g}{}", ground.young_modulus_pa,
                                                 kSoftestGroundPa, kStiffestGroundPa, question ? ": " + *question : ""));
   }
   if (question) warnings.push_back(fmt::format("{}: \"ground\": {}", object.find_place("young_modulus_pa"), *question));

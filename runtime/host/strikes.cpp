@@ -67,7 +67,7 @@ class Finder {
 /// The triangle and the place on it that are nearest to the strike's point.
 void find_nearest_place(const Finder& finder, const SceneStrike& strike, const std::string& name, contact::Impulse& impulse) {
   const bank::NearestPlace nearest = finder.find(*strike.point_m);
-  if (nearest.triangle < 0) throw InputError(fmt::format("{}: \"point_m\" is no place; its numbers are too large", strike.place));
+  if (nearest.triangle < 0) throw InputError(fmt::format("{}: \"point_m\" is too far away; its numbers are too large", strike.place));
   if (!(nearest.distance_m <= kFarthestShare * finder.get_extent_m())) {
     throw InputError(
         fmt::format("{}: \"point_m\" is {:.4g} m away from \"{}\"; its nearest point is [{:.6g}, {:.6g}, {:.6g}] in metres of the mesh",

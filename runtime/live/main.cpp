@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
                  "Share of one core that the sound may take, 0.01 to 1; the least audible modes fade out for it")
       ->check(CLI::Range(0.01, 1.0))
       ->option_text("SHARE");
-  app.add_flag("-q,--quiet", options.quiet, "Print nothing but errors");
+  app.add_flag("-q,--quiet", options.quiet, "Print nothing but warnings and errors");
   try {
     app.parse(argc, argv);
     if (!lists && scene->empty()) throw CLI::RequiredError("scene");

@@ -30,7 +30,7 @@ std::string describe(const Reason& r) {
       return "no mode between 20 Hz and half the sample rate";
     case Rule::kTooQuiet:
       if (!std::isfinite(r.value) || !std::isfinite(r.limit)) return "makes no sound";
-      return fmt::format("{}, below {} nobody hears it", format_level(r.value), format_level(r.limit));
+      return fmt::format("{}, inaudible below {}", format_level(r.value), format_level(r.limit));
     case Rule::kHeard:
       return fmt::format("heard with {} at {:.2f} m", format_level(r.value), r.distance_m);
     case Rule::kSilent:
@@ -41,7 +41,7 @@ std::string describe(const Reason& r) {
                          r.limit);
     case Rule::kThump:
       if (!std::isfinite(r.value)) return "makes no thump in the sound of so large a body";
-      return fmt::format("a thump of {:.1f} dB in the sound of so large a body, told from it above {:.1f} dB", r.value, r.limit);
+      return fmt::format("a thump of {:.1f} dB in the sound of so large a body, audible above {:.1f} dB", r.value, r.limit);
     case Rule::kFixed:
       return "a body that cannot move has none";
     case Rule::kOneMicrophone:

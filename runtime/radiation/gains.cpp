@@ -2,8 +2,8 @@
 //             volume. U_lm = (1 / a^2) sum over triangles of (phi . n) A Y_lm, phi the mean of its corners; a sphere that moves with
 //             U_lm Y_lm sends the far pressure rho0 c0 U_lm Y_lm / (k |h_l'(ka)| r), and different (l, m) are orthogonal over directions,
 //             so that g^2 = (rho0 c0)^2 / 4 pi  sum_l U_l^2 / (k |h_l'(ka)|)^2 with U_l^2 = sum_m U_lm^2. What Parseval's sum leaves of
-//             (phi . n)^2 goes to the next order. All modes are summed at once, a block of
-//             triangles as a product of matrices.
+//             (phi . n)^2 goes to the next order. All modes are summed at once, a block of triangles as a product of
+//             matrices.
 // Source:     Morse & Ingard, Theoretical Acoustics (1968), 7.2; Pierce, Acoustics (1981), 4.1-4.2.
 // Deviations: exact for spheres; any other body radiates as if its surface lay on one. The monopole is the true flow of volume, for every
 //             body, and so is the level of what it sends at wavelengths long against it.

@@ -13,8 +13,8 @@
 
 namespace carillon::stream {
 
-/// What tells one surface from another, in metres of the mesh: its extent along each axis, and the mean of its triangles' middles, triangle
-/// i weighed by i + 1, so that another numbering gives another place.
+/// What tells one surface from another, in metres of the mesh: its extent along each axis, and the mean of its triangles' centroids,
+/// triangle i weighted by i + 1, so that another numbering gives another place.
 struct SurfaceMark {
   Vec3 size_m{};
   Vec3 order_m{};

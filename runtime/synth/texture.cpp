@@ -9,9 +9,8 @@
 //             q^-(1 + 2 H). Roughness is measured with a cut-off of 0.8 mm (ISO 4288:1996, for Ra from 0.1 to 2 um). A patch of radius a
 //             lets heights of wave number q through as 1 / sqrt(1 + pi/4 (q a)^3): P. Remington, J. Sound Vib. 46 (1976) 419, for wheels on
 //             rails.
-// Deviations: the standard measures rougher surfaces with a longer cut-off and smoother ones with a shorter; a surface whose long waves
-// grow
-//             so would sound louder with the power 0.5 of its roughness only, where 0.8 to 1.2 is measured: here one cut-off is for all.
+// Deviations: the standard measures rougher surfaces with a longer cut-off and smoother ones with a shorter; with a cut-off that
+//             grows so, level would follow only the power 0.5 of roughness, where 0.8 to 1.16 is measured: here one cut-off serves all.
 //             Filters are taken at the middle of each octave, and without their phase.
 #include "runtime/synth/texture.hpp"
 

@@ -83,8 +83,8 @@ int main(int argc, char** argv) {
   strike.body = body;
   strike.time_s = 0.01;
   strike.duration_s = 1e-4;
-  if (make_strike(bank, &at, click_m, 0.01, &strike) != CARILLON_OK) return fail("the click is nowhere");
-  if (carillon_push_impulse(synth, &strike) != CARILLON_OK) return fail("the blow cannot be played");
+  if (make_strike(bank, &at, click_m, 0.01, &strike) != CARILLON_OK) return fail("the clicked point is not finite or too far away");
+  if (carillon_push_impulse(synth, &strike) != CARILLON_OK) return fail("the strike cannot be played");
 
   out[0] = left;
   out[1] = right;

@@ -1,12 +1,12 @@
 // Error bars against known frequencies: a table on the screen and, on request, every mode as CSV.
 //
 //   error_bars [--modes FILE.csv] [--body NAME]... [--element "T4"|"T4 lumped"|"T10"|"T10 curved"|"T10 lumped"]...
-//   error_bars [--modes FILE.csv] --body NAME --mesh FILE.msh [--mesh FILE.msh]...      meshes of that body, its lower x face fixed if it
-//   is fixed error_bars [--modes FILE.csv] --body NAME --element KIND --mesh FILE.msh [--mesh FILE.msh]... error_bars [--modes FILE.csv]
-//   --finest FINEST.msh [--mesh COARSER.msh]... [--count 30]
+//   error_bars [--modes FILE.csv] --body NAME --element KIND --mesh FILE.msh [--mesh FILE.msh]...
+//   error_bars [--modes FILE.csv] --finest FINEST.msh [--mesh COARSER.msh]... [--count 30]
 //
-// The second form: meshes of a known body from elsewhere, in its place and in metres. The third: the ceramic of OSG02's bunny in any shape;
-// the modes of the finest mesh stand for the truth, within their own bars.
+// The second form: meshes of a known body from elsewhere, at the same position and in metres; a body with a fixed face has its face of
+// lowest x fixed. The third: the ceramic of OSG02's bunny in any shape; the modes of the finest mesh stand for the truth, within their own
+// bars.
 #include <fmt/core.h>
 
 #include <algorithm>
