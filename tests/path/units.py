@@ -47,11 +47,11 @@ def check_scale(folder):
     holds = ({}, {"fixed": "side:1"}, {"fixed": {"box_m": {"min": [-1, -1, -1], "max": [1e-6, 1, 1]}}})
     for hold in holds:
         wanted, record, said = solve(folder, mesh="metres.vtu", **hold)
-        assert "mesh_scale" not in record and "warning" not in said, said
+        assert "mesh_scale" not in record and "millimetres" not in said, said
         for mesh, ranks in (("millimetres.vtu", 1), ("millimetres.vtkhdf", 1), ("millimetres.vtkhdf", 2)):
             found, record, said = solve(folder, ranks, mesh=mesh, mesh_scale=0.001, **hold)
             expect_close(found, wanted, f"{mesh}, {hold}, {ranks} ranks")
-            assert record["mesh_scale"] == 0.001 and "warning" not in said, said
+            assert record["mesh_scale"] == 0.001 and "millimetres" not in said, said
         # The record is a job that gives the same again.
         (folder / "again.json").write_text(json.dumps({key: value for key, value in record.items() if key != "run"}))
         assert run(folder, "-q", "again.json").returncode == 0
