@@ -81,6 +81,8 @@ report::Options find_report_options(const Options& attempt) {
 /// Others look at the lock for a moment now and then.
 std::optional<process::Lock> take_lock(const store::OpenFolder& work) {
   try {
+    // A link or a folder of this name is no lock of anybody's.
+    if (const auto found = work.look_at("lock"); found && !S_ISREG(found->st_mode)) work.remove("lock");
     for (int round = 0; round < 20; ++round) {
       if (std::optional<process::Lock> lock = process::Lock::take(work.path() / "lock")) return lock;
       std::this_thread::sleep_for(std::chrono::milliseconds(50));

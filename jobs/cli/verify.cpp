@@ -58,6 +58,7 @@ void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::o
   if (store.has_bank_folder(id)) {
     if (const auto fault = attempt::find_published_fault(store, id)) findings.push_back({"bank", id, *fault, "", false});
   }
+  if (!store.has_bank_folder(id) && !store.has_work(id)) findings.push_back({"bank", id, "its bank is missing", "", false});
   if (store.has_work(id) && !is_worked_on(store, id)) {
     if (const auto fault = store::find_job_fault(store, id, store.work_folder(id))) findings.push_back({"work", id, *fault, "", false});
   }
@@ -101,6 +102,10 @@ int run_verify(Shared& shared, const Options& options) {
     for (const store::Id& id : store.list_banks()) ids.insert(id);
     for (const store::Id& id : store.list_work()) ids.insert(id);
     for (const registry::Job& job : shared.registry().list({registry::State::done})) ids.insert(job.id);
+    // A job that was done and whose folder is gone.
+    for (const registry::Job& job : shared.registry().list({registry::State::failed})) {
+      if (!store.has_work(job.id)) ids.insert(job.id);
+    }
   }
   std::optional<store::Lock> lock;
   if (options.repairs) lock.emplace(store.lock_shared());  // gc waits

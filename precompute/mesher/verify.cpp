@@ -140,6 +140,8 @@ Shells count_shells(const Body& body, double edge_m) {
     }
     --shells.most;
     --shells.least;
+    // Who asks for a wall has a hollow, however small.
+    if (body.wall_m > 0 && shells.most >= 2) shells.least = std::max<std::int64_t>(shells.least, 2);
   }
   shells.least = std::max<std::int64_t>(shells.least, 1);
   shells.most = std::max(shells.most, shells.least);

@@ -123,7 +123,6 @@ void check_sound_name(const fs::path& file) {
 /// Every output: can be written, is none of the inputs, and is not named twice.
 void check_outputs(const ProgramOptions& options, const Scene& scene) {
   std::vector<std::pair<fs::path, std::string>> outputs;
-  if (!options.plan && !fs::is_directory(options.wav)) check_sound_name(options.wav);
   if (!options.plan && !is_standard_output(options.wav)) outputs.emplace_back(options.wav, "WAV file");
   if (options.spectrogram) outputs.emplace_back(*options.spectrogram, "spectrogram");
   if (options.trajectory) outputs.emplace_back(*options.trajectory, "trajectory");
@@ -141,6 +140,7 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
     config::check_writable(file, what);
     taken.emplace_back(file, what);
   }
+  if (!options.plan) check_sound_name(options.wav);
 }
 
 /// A line for each body whose bank leaves out some of what is heard.

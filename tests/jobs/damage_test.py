@@ -69,7 +69,7 @@ class Damage(Bench):
         self.run_it("submit", job)
         work, = self.store.glob("work/*/*")
         victims = {}
-        for name in ("progress.jsonl", "log", "reserve", "outcome.json", "attempt.json", "checkpoint.hdf", "bank.hdf", "bank.hdf.resolved.json", "prediction.new"):
+        for name in ("lock", "progress.jsonl", "log", "reserve", "outcome.json", "attempt.json", "checkpoint.hdf", "bank.hdf", "bank.hdf.resolved.json", "prediction.new"):
             victims[name] = self.write("victim-" + name, "important")
             (work / name).symlink_to(victims[name])
         self.run_queue()
@@ -173,6 +173,15 @@ class Damage(Bench):
         self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1)
         self.assertEqual([entry["state"] for entry in self.ask("status", job)["jobs"]], ["failed"])
         self.assertTrue(all(item["kind"] == "damaged" for item in self.ask("gc")["items"]))
+
+    def test_a_bank_whose_folder_is_gone_is_found_and_queued_again(self):
+        self.make_done()
+        folder, = self.store.glob("banks/*/*")
+        folder.chmod(0o755)
+        shutil.rmtree(folder)
+        self.assertIn("missing", self.run_it("verify", code=3).stdout)
+        self.run_it("verify", "--repair")
+        self.assertEqual(self.ask("status")["jobs"][0]["state"], "queued")
 
     def test_a_mesher_that_crashes_is_not_started_again(self):
         programs = self.folder / "bin"
