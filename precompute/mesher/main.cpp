@@ -271,9 +271,10 @@ std::string format_report(const Order& order, const Result& result, const mesh::
 void make_mesh(const Order& order) {
   const auto start = Clock::now();
   const mesher::Progress progress = [&](std::string_view phase) {
-    if (order.estimate && phase.starts_with("estimate ")) {
-      fmt::print(stderr, "{}\n", phase);
+    if (phase.starts_with("estimate ")) {  // for programs
+      if (order.estimate) fmt::print(stderr, "{}\n", phase);
       std::fflush(stderr);
+      return;
     }
     if (order.quiet) return;
     fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), config::printable(phase));
