@@ -28,6 +28,11 @@ def read_frequencies(folder, bank):
         return file["modes/frequency_hz"][:]
 
 
+def heed(text):
+    """Without what is said of the body: that it has no damping, and that its mesh is coarse."""
+    return "\n".join(line for line in text.splitlines() if '"damping" is zero' not in line and "frequencies can be wrong by" not in line)
+
+
 def check_bank(folder, bank, expected, name):
     checked = subprocess.run([folder.bin / "carillon-bank", "check", bank], cwd=folder.path, capture_output=True, text=True)
     check(checked.returncode == 0, f"{name}: {checked.stdout}{checked.stderr}")
@@ -119,7 +124,7 @@ def stops(folder):
         has_saved = (folder / "state").exists()
         resumed, worst = body.resume(then, f"{name}, then {then}")
         check(not has_saved or "goes on from state" in resumed, f"{name}: the checkpoint was not used:\n{resumed}")
-        check("warning" not in resumed, resumed)
+        check("warning" not in heed(resumed), resumed)
         print(f"{name}, then {then}: {'gone on with' if has_saved else 'from the start'}, frequencies equal to {worst:.1e}")
     check(was_stopped >= 6, f"only {was_stopped} runs were stopped")
     # Several times on the way to one bank, on all numbers of ranks; a single process without mpirun, by SIGTERM.
@@ -156,7 +161,7 @@ def slices(folder):
     for turn in range(12):
         text, code = body.stop(1 + turn % 3, "modes     ", generator.uniform(0.1, 0.15 * body.seconds))
         check(code in (STOPPED, 0), text)
-        check("warning" not in text, text)
+        check("warning" not in heed(text), text)
         if code == 0:
             break
         stops_made += 1
@@ -177,7 +182,7 @@ def kills(folder):
     for turn in range(8):
         ranks = 1 + turn % 3
         text, code = body.stop(ranks, "modes     ", generator.uniform(0.0, 0.8 * body.seconds), signal.SIGKILL, generator.randrange(ranks), "--checkpoint-every", 0.2)
-        check("warning" not in text, f"a killed run left what the next one could not use:\n{text}")
+        check("warning" not in heed(text), f"a killed run left what the next one could not use:\n{text}")
         used += "goes on from state" in text
         if code == 0:
             check_bank(folder, "out.bank", body.expected, f"turn {turn}")
@@ -215,7 +220,7 @@ def damage(folder):
     check(len(whole) > 100000, "no checkpoint was seen")
     (folder / "state").write_bytes(whole)
     text, _ = body.resume(3, "whole")
-    check("goes on from" in text and "warning" not in text, text)
+    check("goes on from" in text and "warning" not in heed(text), text)
     generator = random.Random(3)
     cases = [("cut", length) for length in (0, 1, 24, 255, 256, 257, 4095, 4096, len(whole) - 1, *generator.sample(range(len(whole)), 6))]
     cases += [("flipped", place) for place in (0, 30, 40, 70, 100, 161, 170, 178, 186, 194, 202, 215, 230, 260, 300, 4000, len(whole) - 1, *generator.sample(range(len(whole)), 10))]
@@ -229,7 +234,7 @@ def damage(folder):
         (folder / "state").write_bytes(spoilt)
         text, _ = body.resume(1, f"{kind} at {place}")
         said = text.count("warning: state: the checkpoint is not gone on from, because")
-        check(said <= 1 and text.count("warning") == said, text)
+        check(said <= 1 and heed(text).count("warning") == said, text)
         silent += said == 0
         check(said == 1 or (kind == "flipped" and place < 4096), f"{kind} at {place}: nothing was said:\n{text}")
         if said:
@@ -327,7 +332,7 @@ def accuracy(folder):
     check(run.returncode in (STOPPED, 0), said)
     if run.returncode == STOPPED:
         text, worst = body.resume(1, "accuracy")
-        check("goes on from state" in text and "warning" not in text, text)
+        check("goes on from state" in text and "warning" not in heed(text), text)
         print(f"stopped in trial {seen} of {trials}; frequencies equal to {worst:.1e}")
 
 
