@@ -109,7 +109,7 @@ inline Bank make_first_bank(int n, std::size_t modes) {
     bank.eigenvalue_rad2_s2.push_back(omega * omega);
     bank.decay_per_s.push_back((bank.material.alpha1_s * omega * omega + bank.material.alpha2_per_s) / 2.0);
     bank.residual.push_back(1e-10 * static_cast<double>(i + 1));
-    bank.radiation_gain.push_back(0.5 + static_cast<double>(i));
+    bank.radiation_gain.push_back(0.5 + static_cast<double>(i % 60));
   }
   bank.counts = {static_cast<std::int64_t>(bank.vertex_count()) + 1, 6 * n * n * n, 1, 6};
   bank.element = "T10";
