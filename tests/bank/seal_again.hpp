@@ -12,7 +12,7 @@ namespace carillon::bank {
 inline std::string seal_again(std::string bytes) {
   const std::size_t line = bytes.find('\n') + 1;
   const std::size_t end = bytes.find('\n', line);
-  if (line == 0 || end == std::string::npos || end >= kTextBytes) return bytes;
+  if (line == 0 || end == std::string::npos || end >= kTextBytes || bytes.size() < kSealBytes) return bytes;
   std::string length = "length " + std::to_string(bytes.size());
   if (line + length.size() > kTextBytes) return bytes;
   // The text keeps its place: a length of other digits is cut from, or put into, the padding at its end.
