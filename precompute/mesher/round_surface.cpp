@@ -305,7 +305,13 @@ double RoundSurface::get_usual_bulge() const {
   return *place;
 }
 
+void RoundSurface::keep_facets() {
+  pieces_ = 1;
+  keeps_facets_ = true;
+}
+
 double RoundSurface::calc_volume() const {
+  if (keeps_facets_) return mesher::calc_volume(*facets_);
   // Every patch in 64 and in 16 triangles; what either lacks falls as the square of their size.
   constexpr int kPieces = 8;
   std::array<double, 2> sum{};
@@ -400,11 +406,12 @@ RoundSurface::Place RoundSurface::find_place(std::int32_t triangle, const Vec3& 
   return place;
 }
 
-Vec3 RoundSurface::find(std::int32_t triangle, const Vec3& p) const { return patches_->calc(find_place(triangle, p)); }
+Vec3 RoundSurface::find(std::int32_t triangle, const Vec3& p) const { return keeps_facets_ ? p : patches_->calc(find_place(triangle, p)); }
 
-bool RoundSurface::is_doubtful() const { return other_ != nullptr; }
+bool RoundSurface::is_doubtful() const { return keeps_facets_ || other_ != nullptr; }
 
 Vec3 RoundSurface::find_doubt(std::int32_t triangle, const Vec3& p) const {
+  if (keeps_facets_) return patches_->calc(find_place(triangle, p)) - p;
   if (!other_) return {};
   const Place place = find_place(triangle, p);
   return other_->calc(place) - patches_->calc(place);

@@ -21,19 +21,22 @@ class RoundSurface {
   double get_largest_bulge() const;
   double get_usual_bulge() const;
 
-  /// The volume that the smooth surface encloses [m^3], to about 1e-5 of what the facets lack of it.
+  /// From now on the surface is that of the facets themselves, uncut, and the smooth one is as likely: find_doubt() leads to it.
+  void keep_facets();
+
+  /// The volume that the surface encloses [m^3]; of a smooth one to about 1e-5 of what the facets lack of it.
   double calc_volume() const;
 
   /// A triangle surface on the patches: each edge is cut into `pieces`, at most 16. It stands for this surface from now on, and its
   /// triangles for the arguments of find() and find_doubt().
   TriangleSurface cut(int pieces);
 
-  /// The point of the smooth surface that belongs to a point of a triangle of the last cut().
+  /// The point of the surface that belongs to a point of a triangle of the last cut().
   Vec3 find(std::int32_t triangle, const Vec3& p) const;
 
   /// True if the facets leave open, somewhere, whether they are planes or samples of a smooth surface.
   bool is_doubtful() const;
-  /// From the point of the smooth surface to that of the surface that is as likely: smooth where this one is flat and the other way round.
+  /// From the point of the surface to that of the surface that is as likely: smooth where this one is flat and the other way round.
   /// Zero where there is no doubt.
   Vec3 find_doubt(std::int32_t triangle, const Vec3& p) const;
 
@@ -45,6 +48,7 @@ class RoundSurface {
   std::unique_ptr<TriangleSurface> facets_;  // at one place: the patches refer to it
   std::unique_ptr<Patches> patches_, other_;
   int pieces_ = 1;
+  bool keeps_facets_ = false;
 };
 
 }  // namespace carillon::mesher

@@ -407,6 +407,8 @@ void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   if (mended.clean && pieces > 1 && !is_clean(rounded)) {
     report.facet_pieces = 1;
     report.notes.push_back("The smooth surface through the facets' corners would run through itself; the facets were taken as they are.");
+    round.keep_facets();
+    body.round = std::move(round);
     return;
   }
   mended.surface = std::move(rounded);

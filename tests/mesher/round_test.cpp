@@ -234,6 +234,46 @@ TEST(Round, facets_that_may_be_either_are_named_and_both_readings_are_known) {
   EXPECT_NEAR(fillet.calc_volume() / (10 * (24 - (4 - pi) * 0.16)), 1, 1e-5);
 }
 
+TEST(Round, facets_whose_smooth_surface_would_run_through_itself_stay_and_leave_a_doubt) {
+  // A rod of 16 sides whose facet looks at a block, nearer than the arc over the facet is high: the round rod would be inside the block.
+  const int sides = 16;
+  const double radius = 0.02, length = 0.06, low = radius * std::cos(pi / sides), gap = 0.4 * (radius - low);
+  Outline outline;
+  for (const auto& [x, y] : make_polygon(sides)) {
+    const double angle = std::atan2(y, x) + pi / sides;
+    outline.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+  }
+  Polygons body = make_prism(outline, length);
+  const double rod = calc_volume(to_triangles(body));
+  const int first = static_cast<int>(body.points.size());
+  const Polygons block = make_box(0.02, 0.05, length);
+  for (const auto& [x, y, z] : block.points) body.points.push_back({x + low + gap, y - 0.025, z - length / 2});
+  for (auto face : block.faces) {
+    for (int& v : face) v += first;
+    body.faces.push_back(face);
+  }
+  SurfaceReport report;
+  const mesh::TetMesh m =
+      mesh_surface({.surface = write_text("web.obj", to_obj(body)), .nodes = 2000, .order = 1, .method = Method::kStuffing}, report);
+  EXPECT_NEAR(report.expected_volume_m3 / (rod + 0.02 * 0.05 * length), 1, 2e-3);  // of the facets: the round rod has 1.4 % more
+  EXPECT_NEAR(report.doubt_m / (radius - low), 1, 0.1);
+  ASSERT_EQ(m.doubt_m.size(), m.nodes.size());
+  int on_side = 0;
+  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+    const auto& [x, y, z] = m.nodes[i];
+    const double reach = std::hypot(x, y);
+    if (x > low + gap + 1e-3) {
+      EXPECT_LT(norm(m.doubt_m[i]), 1e-12) << i;  // the block has none
+    }
+    // From the rod's facets it leads to the circle.
+    const double facet = 2 * pi / sides * std::round(std::atan2(y, x) * sides / (2 * pi));
+    if (x > low - 1e-4 || std::abs(z) > 0.4 * length || std::abs(x * std::cos(facet) + y * std::sin(facet) - low) > 2e-6) continue;
+    EXPECT_NEAR(reach + dot(m.doubt_m[i], Vec3{x / reach, y / reach, 0}), radius, 0.02 * (radius - low)) << i;
+    ++on_side;
+  }
+  EXPECT_GT(on_side, 50);
+}
+
 TEST(Round, nodes_of_meshes_lie_on_the_smooth_skins) {
   const double radius = 0.01, length = 0.03, wall = 0.003;
   const auto file = write_text("lathe.obj", to_obj(make_lathe({{radius, 0}, {radius, 0.01}, {radius, length}}, 24, Cut::kQuads)));
