@@ -152,10 +152,15 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
 }  // namespace
 
 std::string describe_scale_key(const spec::JobSpec& job) {
-  if (!job.body) return "\"mesh_scale\": 0.001 in the job takes the mesh file's numbers for millimetres";
-  return job.body->shape.empty()
-             ? "\"scale\": 0.001 inside \"body\" takes the surface's numbers for millimetres, and \"height_m\" gives it a size"
-             : "the dimensions of a shape are metres";
+  if (!job.body)
+    return job.mesh_scale == 1.0 ? "\"mesh_scale\": 0.001 in the job takes the mesh file's numbers for millimetres"
+                                 : fmt::format("\"mesh_scale\" of the job, metres per unit of the mesh file, is {:g}: {:g} for that",
+                                               job.mesh_scale, 0.001 * job.mesh_scale);
+  if (!job.body->shape.empty()) return "the dimensions of a shape are metres";
+  if (job.body->height_m) return fmt::format("\"height_m\" inside \"body\" is {:g}, in metres", *job.body->height_m);
+  const double scale = job.body->scale.value_or(1.0);
+  if (scale == 1.0) return "\"scale\": 0.001 inside \"body\" takes the surface's numbers for millimetres, and \"height_m\" gives it a size";
+  return fmt::format("\"scale\" inside \"body\", metres per unit of the surface, is {:g}: {:g} for that", scale, 0.001 * scale);
 }
 
 Setting get_setting(const spec::JobSpec& job) {

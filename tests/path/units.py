@@ -58,7 +58,10 @@ def check_scale(folder):
     accurate, record, _ = solve(folder, mesh="millimetres.vtu", mesh_scale=0.001, accuracy_cents=300, max_modes=8)
     coarse, _, _ = solve(folder, mesh="metres.vtu", accuracy_cents=300, max_modes=8)
     expect_close(accurate, coarse, "accuracy_cents")
-    # Without the key the warning names it.
+    # Without the key the warning names it; with a wrong value it gives the right one.
+    (folder / "job.json").write_text(json.dumps({"mesh": "metres.vtu", "mesh_scale": 1000, "material": GLASS, "bank": "bank.hdf"}))
+    warnings = json.loads(run(folder, "--validate", "--json", "job.json").stdout)["warnings"]
+    assert any("millimetres" in text and "is 1000: 1 for that" in text for text in warnings), warnings
     (folder / "job.json").write_text(json.dumps({"mesh": "millimetres.vtu", "material": GLASS, "bank": "bank.hdf"}))
     looked = run(folder, "--validate", "--json", "job.json")
     warnings = json.loads(looked.stdout)["warnings"]
