@@ -215,8 +215,8 @@ int count_shells_of(const mesh::TetMesh& m) {
 
 TEST(bodies, who_asks_for_a_wall_has_a_hollow) {
   // The hollow is a tenth of the ball, 10 mm wide, and elements of this count are nearly as long: a solid ball would be within a thousandth
-  // of the volume. It is refused in one line that says what to ask for; with what is asked for so, the second time at the latest, there is a
-  // hollow.
+  // of the volume. It is refused in one line that says what to ask for; with what is asked for so, the second time at the latest, there is
+  // a hollow.
   const auto path = write_text("tiny_hollow.off", to_off(make_sphere(0.05, 4)));
   std::int64_t nodes = 2000;
   int refused = 0;
