@@ -30,7 +30,7 @@
 namespace carillon::io {
 namespace {
 
-constexpr double kMeshShare = 0.6;   // of the patience: for the mesh of a surface
+constexpr double kMeshShare = 0.7;   // of the patience: for the mesh of a surface
 constexpr double kMargin = 1.3;      // of a step's time as foreseen
 constexpr double kTrustSeconds = 1;  // of the start, in which files are waited for
 constexpr double kVeryThin = 100;    // slenderness of bodies whose lowest modes are mended
