@@ -383,8 +383,13 @@ MendedSurface mend_surface(TriangleSurface surface, const SurfaceOptions& option
   const auto is_body = [&](const TriangleSurface& wrapped) {
     return calc_volume(wrapped) - offset * calc_area(wrapped) > 3 * offset * area && calc_area(wrapped) <= kBothSides * area;
   };
-  std::vector<double> parts{14, 25, 50};
+  constexpr double kCoarsest = 14, kFinest = 50;
+  std::vector<double> parts{kCoarsest, 25, kFinest};
   std::erase_if(parts, [&](double part) { return 2 / part > options.close_holes.value_or(kLargestHole); });
+  // What a wrap costs grows with the triangles of its own that cover the surface, and may grow with those of the file: a soup of few
+  // triangles and much area has no detail that is worth a fine wrap. Bodies have an area of one or two squares of their diagonal.
+  const double most_area = (1.5 + 1e-3 * static_cast<double>(surface.triangles.size())) * diagonal * diagonal;  // for the finest
+  std::erase_if(parts, [&](double part) { return part > kCoarsest && part * part * area > kFinest * kFinest * most_area; });
   const auto slips = [&](double part) {
     return calc_area(wrap(surface, diagonal / part, kProbeOffset * diagonal / part)) > kBothSidesOfProbe * area;
   };
