@@ -11,6 +11,7 @@
 #include <json/json.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -443,9 +444,12 @@ Body make_trial_body(Run& run, Setting& setting, Patience* patience) {
     Patience endless;
     Patience& told = patience != nullptr ? *patience : endless;
     told.possible_nodes = 0;
+    const auto start = std::chrono::steady_clock::now();
     try {
       return make_body(run, setting, is_body ? &told : nullptr);
     } catch (const InputError&) {
+      const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
+      told.seconds = std::max(told.seconds - gone.count(), 0.0);
       std::int64_t nodes = told.possible_nodes;
       MPI_Bcast(&nodes, 1, MPI_INT64_T, 0, run.comm);
       if (nodes == 0 || nodes == setting.nodes || count == kMostCounts) throw;
