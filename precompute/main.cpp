@@ -87,9 +87,12 @@ struct CommandLine {
         app.add_flag("--validate", options.validate, "check the job and its mesh, predict modes, memory and time, and solve nothing")
             ->excludes(matrices);
     app.add_option("--patience", options.patience_s,
-                   "with --validate: seconds for the mesh of a surface; one that takes longer is estimated from its size")
+                   "with --validate: seconds for the answer; what would take longer (mesh, analysis, count) is estimated, and that is said")
         ->check(CLI::Range(0.0, 1e6))
         ->capture_default_str()
+        ->needs(validate);
+    app.add_option("--count", options.count_s, "with --validate: most seconds for the count of the modes [what --patience leaves]")
+        ->check(CLI::Range(0.0, 1e6))
         ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.set_version_flag("--version", version::describe("carillon-precompute"));

@@ -192,7 +192,7 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
     launch.arguments.insert(launch.arguments.end(), words.begin(), words.end());
   };
   if (options.is_prediction) {
-    add({"--validate", "--json", "--patience", "1000000"});  // what is reserved rests on the mesh, not on an estimate
+    add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // what is reserved rests on the mesh, not on an estimate
   } else {
     add({"--bank", store::kBankFile, "--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
   }

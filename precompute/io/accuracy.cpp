@@ -11,6 +11,7 @@
 #include <json/json.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -31,6 +32,7 @@ constexpr double kGoal = 0.85;                                 // of what was as
 constexpr double kFinestStep = 0.25;                           // the rates hold for edges so much shorter, see predict_cents()
 constexpr double kLeastStep = 0.9;                             // a trial that is not finer than this tells nothing new
 constexpr double kLinearFrom = 20e3;                           // nodes of ten-node tetrahedra above which those of four are looked at too
+constexpr int kMostCounts = 4;                                 // asked of the mesher for one trial
 constexpr int kMostRefinements = 4;                            // of a mesh file: 4,096 elements of each
 constexpr double kCpuExponent = 1.5, kByteExponent = 4.0 / 3;  // of the nodes, until two trials tell
 
@@ -329,9 +331,9 @@ void Search::attempt(const Setting& setting) {
   current_ = {};  // before the next body needs the room
   const std::size_t first_station = run_.stations.get_all().size();
   current_.setting = setting;
-  current_.body = make_body(run_, setting);
-  current_.solved = solve_body(run_, setting, current_.body);
-  const Trial trial = judge(setting, first_station);
+  current_.body = make_trial_body(run_, current_.setting);
+  current_.solved = solve_body(run_, current_.setting, current_.body);
+  const Trial trial = judge(current_.setting, first_station);
   report_.trials.push_back(trial);
   run_.stations.say(trial.modes == 0 ? std::string("no mode in the band")
                                      : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz); {:g} are asked", trial.worst_cents,
@@ -421,6 +423,41 @@ Setting find_first_setting(const Run& run) {
   setting.element = run.job.body ? spec::Element::T10 : spec::Element::T4;
   if (run.job.body) setting.nodes = run.job.body->shape.empty() ? kCoarseSurfaceNodes : kCoarseShapeNodes;
   return setting;
+}
+
+namespace {
+
+/// Refuses a count of the mesher's own that this machine surely cannot solve, before the mesh is made.
+void check_count(const Run& run, const Setting& setting) {
+  constexpr double kSurely = 0.5;  // of a factor that is estimated by a power of the unknowns, to a factor of two
+  Extent extent;
+  extent.nodes = setting.nodes.value_or(0);
+  const auto bytes = static_cast<std::int64_t>(kSurely * 8 * static_cast<double>(complete(extent).factor_entries));
+  eigen::check_memory(run.comm, bytes / run.ranks, 0, fmt::format("The coarsest mesh of this body ({} nodes)", extent.nodes));
+}
+
+}  // namespace
+
+Body make_trial_body(Run& run, Setting& setting, Patience* patience) {
+  const bool is_body = run.job.body.has_value();
+  for (int count = 1;; ++count) {
+    Patience endless;
+    Patience& told = patience != nullptr ? *patience : endless;
+    told.possible_nodes = 0;
+    const auto start = std::chrono::steady_clock::now();
+    try {
+      return make_body(run, setting, is_body ? &told : nullptr);
+    } catch (const InputError&) {
+      const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
+      told.seconds = std::max(told.seconds - gone.count(), 0.0);
+      std::int64_t nodes = told.possible_nodes;
+      MPI_Bcast(&nodes, 1, MPI_INT64_T, 0, run.comm);
+      if (nodes == 0 || nodes == setting.nodes || count == kMostCounts) throw;
+      run.stations.say(fmt::format("{} nodes cannot be met on this body; {} are tried", setting.nodes.value_or(0), nodes));
+      setting.nodes = nodes;
+      if (patience == nullptr) check_count(run, setting);
+    }
+  }
 }
 
 AccurateBody solve_to_accuracy(Run& run) { return Search(run).solve(); }

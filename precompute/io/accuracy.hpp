@@ -59,6 +59,10 @@ AccurateBody solve_to_accuracy(Run& run);
 /// What solve_to_accuracy() tries first.
 Setting find_first_setting(const Run& run);
 
+/// make_body() for a trial: where the mesher cannot meet the count of nodes, which thin walls do not let be small, with the count that it
+/// names in its place; `setting` has that count then. Collective. Throws as make_body().
+Body make_trial_body(Run& run, Setting& setting, Patience* patience = nullptr);
+
 /// The setting in words: "T10, body meshed with edges of 0.0021 m, tolerance 1e-07".
 std::string describe(const Setting& setting);
 

@@ -16,7 +16,6 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
-#include <limits>
 #include <string_view>
 #include <vector>
 
@@ -32,7 +31,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMostPatience = 5;  // times as long for a surface that is still being read
+// Beyond the time for the mesh: for the surface as it was read, should its repair not end, and for its reading.
+constexpr double kLonger = 1.2, kRoughSeconds = 1.5, kReadSeconds = 2.5, kLeastReadSeconds = 8;
 
 /// Ends of a pipe that close themselves.
 struct Pipe {
@@ -113,21 +113,36 @@ fs::path find_mesher() {
 
 std::string format_length(double metres) { return fmt::format("{:.17g}", metres); }
 
-constexpr std::string_view kEstimateWord = "estimate ";
+// What carillon-mesh --estimate tells, each on a line of its own, before an object.
+constexpr std::string_view kRoughWord = "rough {", kEstimateWord = "estimate {", kInsteadWord = "instead {";
 
-/// What the mesher told in `errors` before it meshed, a line of its own, which is taken away.
-std::optional<BodyEstimate> take_estimate(std::string& errors) {
-  const std::size_t begin = errors.starts_with(kEstimateWord) ? 0 : errors.find("\n" + std::string(kEstimateWord)) + 1;
-  if (!errors.substr(begin).starts_with(kEstimateWord)) return std::nullopt;
+bool has_told(const std::string& errors, std::string_view word) {
+  return errors.starts_with(word) || errors.find("\n" + std::string(word)) != std::string::npos;
+}
+
+/// The object of the line that begins with `word`, which is taken away.
+std::optional<config::Document> take_told(std::string& errors, std::string_view word) {
+  if (!has_told(errors, word)) return std::nullopt;
+  const std::size_t begin = errors.starts_with(word) ? 0 : errors.find("\n" + std::string(word)) + 1;
   const std::size_t end = std::min(errors.find('\n', begin), errors.size());
-  const std::string line = errors.substr(begin + kEstimateWord.size(), end - begin - kEstimateWord.size());
+  const std::size_t brace = begin + word.size() - 1;
+  const std::string text = errors.substr(brace, end - brace);
   errors.erase(begin, end + 1 - begin);
-  config::Object root = config::parse_document(line, "carillon-mesh --estimate").root();
+  return config::parse_document(text, "carillon-mesh --estimate");
+}
+
+constexpr std::int64_t kMostCount = 1'000'000'000'000'000;
+
+std::optional<BodyEstimate> take_estimate(std::string& errors, std::string_view word) {
+  std::optional<config::Document> told = take_told(errors, word);
+  if (!told) return std::nullopt;
+  config::Object root = told->root();
   BodyEstimate estimate;
   estimate.volume_m3 = root.number("volume_m3", config::kPositive);
   estimate.area_m2 = root.number("area_m2", config::kPositive);
   estimate.thickness_m = root.number("thickness_m", config::kPositive);
-  estimate.nodes = root.integer("nodes", 1, std::numeric_limits<std::int64_t>::max());
+  estimate.nodes = root.integer("nodes", 1, kMostCount);
+  estimate.is_rough = word == kRoughWord;
   return estimate;
 }
 
@@ -151,24 +166,30 @@ mesh::TetMesh mesh_surface(const spec::Body& body, int order, const Fineness& fi
   if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
   if (fineness.edge_m) add("--edge", format_length(*fineness.edge_m));
   std::function<bool(const std::string&)> may_stop;
+  double most_s = 0;
   if (patience != nullptr) {
     words.push_back("--estimate");
-    may_stop = [seconds = patience->seconds, start = std::chrono::steady_clock::now()](const std::string& errors) {
+    most_s = std::max(kLonger * patience->seconds + kReadSeconds, kLeastReadSeconds);
+    may_stop = [seconds = patience->seconds, most_s, start = std::chrono::steady_clock::now()](const std::string& errors) {
       const double taken = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      const bool has_told = errors.find(kEstimateWord) != std::string::npos;  // it is let speak, unless that takes too long as well
-      return taken > seconds && (has_told || taken > kMostPatience * (seconds + 1));
+      if (taken > seconds && has_told(errors, kEstimateWord)) return true;
+      return taken > most_s || (taken > kLonger * seconds + kRoughSeconds && has_told(errors, kRoughWord));
     };
   }
   Ended ended = run_program(words, cleanup, may_stop);
-  const std::optional<BodyEstimate> estimate = patience != nullptr ? take_estimate(ended.errors) : std::nullopt;
-  if (ended.is_late) {
-    if (!estimate)
-      throw InputError(fmt::format(
-          "{}: the surface is not even read and repaired after {:.0f} s; decimate it, or mesh it beforehand by carillon-mesh and "
-          "name the \"mesh\"",
-          body.place, kMostPatience * (patience->seconds + 1)));
-    patience->estimate = estimate;
-    return {};
+  if (patience != nullptr) {
+    const std::optional<BodyEstimate> rough = take_estimate(ended.errors, kRoughWord), good = take_estimate(ended.errors, kEstimateWord);
+    if (std::optional<config::Document> instead = take_told(ended.errors, kInsteadWord))
+      patience->possible_nodes = instead->root().integer("nodes", 1, kMostCount);
+    if (ended.is_late) {
+      if (!good && !rough)
+        throw InputError(fmt::format(
+            "{}: the surface is not even read after {:.0f} s; give more time (--patience), decimate it, or mesh it beforehand by "
+            "carillon-mesh and name the \"mesh\"",
+            body.place, most_s));
+      patience->estimate = good ? good : rough;
+      return {};
+    }
   }
   if (WIFEXITED(ended.status) && WEXITSTATUS(ended.status) == 0) return mesh::read_mesh(file);
   const std::string failed = fmt::format("{}: the body cannot be meshed", body.place);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -22,19 +23,21 @@ struct BodyEstimate {
   double area_m2 = 0;  // of all skins
   double thickness_m = 0;
   std::int64_t nodes = 0;
+  bool is_rough = false;  // of the surface as it was read, before its repair
 };
 
-/// How long a mesher may take, and what it found out before it was stopped.
+/// How long a mesher may take, and what it found out before it ended.
 struct Patience {
-  double seconds = 0;                      // of the clock
-  std::optional<BodyEstimate> estimate{};  // set when they were too few: there is no mesh then
+  double seconds = std::numeric_limits<double>::infinity();  // of the clock
+  std::optional<BodyEstimate> estimate{};                    // set when they were too few: there is no mesh then
+  std::int64_t possible_nodes = 0;  // set when the count asked for cannot be met: one that can, about. InputError was thrown then
 };
 
 /// Meshes the body with tetrahedra of four (order 1) or ten nodes (order 2), the mid-side ones on the true surface. A surface is meshed by
 /// the program carillon-mesh beside this one, started without a shell, in a temporary folder that is gone afterwards.
 /// Not collective. Throws InputError naming the job's line for what cannot be meshed, SystemError when carillon-mesh does not start or
 /// dies. With `patience`, a surface that is not meshed in time gives an empty mesh and patience->estimate; InputError when not even that
-/// can be told.
+/// can be told some seconds later.
 mesh::TetMesh make_body_mesh(const spec::Body& body, int order, const Fineness& fineness, Patience* patience = nullptr);
 
 /// "bar, 20000 nodes" or "bunny.obj, edges of 0.002 m", for people.

@@ -16,7 +16,8 @@ struct RunOptions {
   std::filesystem::path bank;               // where the bank goes, whatever the job says; empty: as it says
   std::filesystem::path matrices;           // folder for K and M as files; empty: none
   bool validate = false;                    // check and predict, do not solve
-  double patience_s = 6;                    // of --validate: a surface that takes longer to mesh is estimated
+  double patience_s = 9;                    // of --validate: for the answer; steps that would take longer are left out
+  double count_s = 1e6;                     // of --validate: for the count of the modes
   bool json = false;                        // what is printed at the end is JSON
 };
 

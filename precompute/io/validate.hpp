@@ -12,8 +12,9 @@ namespace carillon::io {
 
 /// Reads the job, makes or reads its mesh, finds the materials, assembles K and M, and analyses the factorisation: all that a run does
 /// before it searches, so that whatever would end a run before then ends this, with the same words. Then predicts modes, memory and time.
-/// The modes are counted by two factorisations where those take less than about 20 s and there is room, else estimated from volume and
-/// surface. Returns what main prints: lines for people, or one JSON object (options.json).
+/// The modes are counted by two factorisations, or else estimated from volume and surface. All of it takes options.patience_s of the clock
+/// since the process began: a step that is not expected to fit what is left of it is not begun, what it would find is estimated, and the
+/// answer says so and how to have it. Returns what main prints: lines for people, or one JSON object (options.json).
 /// One rank only: InputError on several. Throws InputError, SolveError, SystemError as run_job(). Collective.
 std::string validate_job(MPI_Comm comm, const std::filesystem::path& job_file, const RunOptions& options);
 

@@ -271,7 +271,7 @@ std::string format_report(const Order& order, const Result& result, const mesh::
 void make_mesh(const Order& order) {
   const auto start = Clock::now();
   const mesher::Progress progress = [&](std::string_view phase) {
-    if (phase.starts_with("estimate ")) {  // for programs
+    if (phase.starts_with("rough {") || phase.starts_with("estimate {")) {  // for programs
       if (order.estimate) fmt::print(stderr, "{}\n", phase);
       std::fflush(stderr);
       return;
@@ -293,7 +293,13 @@ void make_mesh(const Order& order) {
     throw InputError(fmt::format("--json {}: the report would overwrite the mesh; give it another name", order.json));
   }
 
-  Result result = order.shape.empty() ? make_from_surface(order, progress) : make_from_shape(order, progress);
+  Result result;
+  try {
+    result = order.shape.empty() ? make_from_surface(order, progress) : make_from_shape(order, progress);
+  } catch (const mesher::CountRefusal& refusal) {
+    if (order.estimate) fmt::print(stderr, "instead {{\"nodes\": {}}}\n", refusal.nodes);  // for programs
+    throw;
+  }
   note_count(order, result);
   progress("checking the mesh");
   auto phase = Clock::now();
@@ -358,8 +364,10 @@ int run(int argc, char** argv) {
          "Surface: closes holes up to this part of the body's diagonal (a hole counts as the diameter of a circle of its area) [0.15]")
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
-  app.add_flag("--estimate", order.estimate,
-               "Surface: says on standard error, before meshing, volume, area, thickness and about how many nodes there will be");
+  app.add_flag(
+      "--estimate", order.estimate,
+      "Surface: says on standard error volume, area, thickness and about how many nodes there will be, in JSON, of the surface as it "
+      "was read (rough) and repaired (estimate); and of a count that cannot be met, which can (instead)");
   app.add_flag("-q,--quiet", order.quiet, "Print nothing but notes on the mesh and errors, on standard error");
   app.set_version_flag("--version", version::describe("carillon-mesh"));
   std::map<std::string, std::string> help{

@@ -1,11 +1,13 @@
 // Method: a node of the skin gets the way from its nearest point on the triangles to the point of the smooth surface that belongs to it.
 //   The inner skin of a shell moves as the outer one does there. The ways are short: of the order of the height of an arc over one of the
-//   triangles.
+//   triangles. The skins of a shell come from a sampled distance, which is linear between its samples and so lies off a curved skin by up
+//   to an eighth of the square of their spacing over the radius; there the way leads to no distance, or to that of the wall.
 // Source: our own.
 // Deviations: none.
 #include "precompute/mesher/place_nodes.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "precompute/mesh/curved.hpp"
@@ -16,6 +18,8 @@ namespace {
 
 // An element keeps at least this part of its volume.
 constexpr double kLeastVolume = 0.3;
+// Of the spacing of the samples: farther off a skin a node is not by their interpolation.
+constexpr double kMostOff = 0.25;
 
 double calc_volume(const mesh::TetMesh& mesh, std::int64_t e) {
   const auto tet = mesh.tet(e);
@@ -39,9 +43,17 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
       edges.insert(make_edge(t[c], t[(c + 1) % 3]));
     }
   std::vector<Vec3> way(mesh.nodes.size(), Vec3{});
+  // The part of the way from the surface by which a node lies off the skin that it belongs to.
+  const auto calc_off = [&](const Vec3& inward) {
+    const double depth = norm(inward);
+    if (!body.field || body.wall_m <= 0 || depth == 0) return 0.0;
+    const double off = depth < body.wall_m / 2 ? depth : depth - body.wall_m;
+    return std::abs(off) < kMostOff * body.field->voxel_m ? off / depth : 0.0;
+  };
   const auto find_way = [&](std::int32_t v) {
     const auto [at, triangle] = body.nearest->find_on(mesh.nodes[v]);
-    way[v] = body.round->find(triangle, at) - at;
+    const Vec3 inward = mesh.nodes[v] - at;
+    way[v] = body.round->find(triangle, at) - at - calc_off(inward) * inward;
     if (!mesh.doubt_m.empty()) mesh.doubt_m[v] = body.round->find_doubt(triangle, at);
   };
   if (body.round->is_doubtful()) mesh.doubt_m.assign(mesh.nodes.size(), Vec3{});

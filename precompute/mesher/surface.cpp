@@ -230,8 +230,9 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
 [[noreturn]] void throw_wrong(const SurfaceOptions& options, const Body& body, const WrongMesh& failure) {
   const double shorter = failure.edge_m / 1.4;
   const double nodes = std::max(body.model.calc_nodes(shorter), 1.5 * static_cast<double>(options.nodes.value_or(0)));
-  throw InputError(fmt::format("{}: with edges of {:.3g} m the mesh {}; ask for about {:.2g} nodes, or for edges of {:.2g} m",
-                               options.surface.string(), failure.edge_m, failure.what(), nodes, shorter));
+  throw CountRefusal(fmt::format("{}: with edges of {:.3g} m the mesh {}; ask for about {:.2g} nodes, or for edges of {:.2g} m",
+                                 options.surface.string(), failure.edge_m, failure.what(), nodes, shorter),
+                     std::llround(nodes));
 }
 
 [[noreturn]] void throw_count(const SurfaceOptions& options, const CountError& failure) {
@@ -241,11 +242,13 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
                                  options.surface.string(), options.wall_m ? "wall" : "body", failure.fewest, kMostNodes,
                                  options.wall_m ? "wall" : "body"));
   if (failure.fewest > asked)
-    throw InputError(
+    throw CountRefusal(
         fmt::format("{}: {} nodes cannot be met within 10 %: the thickness of the body{} needs at least about {:.0f}; ask for that many",
-                    options.surface.string(), *options.nodes, options.wall_m ? "'s wall" : "", 1.05 * failure.fewest));
-  throw InputError(fmt::format("{}: {} nodes cannot be met within 10 %: the nearest mesh has {:.0f}; ask for that many",
-                               options.surface.string(), *options.nodes, failure.nearest));
+                    options.surface.string(), *options.nodes, options.wall_m ? "'s wall" : "", 1.05 * failure.fewest),
+        std::llround(1.05 * failure.fewest));
+  throw CountRefusal(fmt::format("{}: {} nodes cannot be met within 10 %: the nearest mesh has {:.0f}; ask for that many",
+                                 options.surface.string(), *options.nodes, failure.nearest),
+                     std::llround(failure.nearest));
 }
 
 /// The surface defeats Delaunay refinement, but perhaps not stuffing.
@@ -430,6 +433,42 @@ void round_to_height(Body& body, const SurfaceOptions& options, SurfaceReport& r
   round(body, options, report);
 }
 
+/// What counts the nodes of a body whose surface has this volume and area.
+void set_model(Body& body, const SurfaceOptions& options, double volume_m3, double area_m2) {
+  body.wall_m = options.wall_m.value_or(0);
+  // The wall takes at most the whole volume; its two skins are about its volume over its thickness each.
+  const double wall_volume = std::min(body.wall_m * area_m2, volume_m3);
+  body.model = body.wall_m > 0 ? CountModel{.volume_m3 = wall_volume, .area_m2 = 2 * wall_volume / body.wall_m, .is_wall = true}
+                               : CountModel{.volume_m3 = volume_m3, .area_m2 = area_m2};
+  body.thickness_m = body.wall_m > 0 ? body.wall_m : 2 * volume_m3 / area_m2;
+  // A second-order mesh of a solid has about seven and a half times as many nodes as corners, of a thin wall fewer.
+  if (options.order == 2) body.model.factor = body.wall_m > 0 ? 6.4 : 7.5;
+}
+
+/// The edges to begin with.
+double find_first_edge(const Body& body, const SurfaceOptions& options) {
+  if (options.edge_m) return *options.edge_m;
+  return body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : (options.order == 2 ? 30000 : 10000));
+}
+
+/// The fewest nodes that the thickness allows.
+double calc_least_nodes(const Body& body) { return body.model.calc_nodes(kEdgePerThickness * body.thickness_m); }
+
+std::string format_estimate(const char* word, const Body& body, double edge_m) {
+  return fmt::format("{} {{\"volume_m3\": {:.12g}, \"area_m2\": {:.12g}, \"thickness_m\": {:.12g}, \"nodes\": {}}}", word,
+                     body.model.volume_m3, body.model.area_m2, body.thickness_m,
+                     std::llround(std::min(std::max(body.model.calc_nodes(edge_m), calc_least_nodes(body)), 1e15)));
+}
+
+/// Says what the surface as it was read tells of the body: its repair may take long.
+void tell_roughly(const TriangleSurface& raw, const SurfaceOptions& options, Phases& phases) {
+  const double volume = std::abs(calc_volume(raw)), area = calc_area(raw);
+  if (!(volume > 0 && area > 0)) return;
+  Body body;
+  set_model(body, options, volume, area);
+  phases.tell(format_estimate("rough", body, find_first_edge(body, options)));
+}
+
 mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   Body body;
   TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
@@ -438,31 +477,22 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   std::optional<CpuLimit> cpu_limit(std::in_place,
                                     kLeastCpu + kCpuPerTriangle * static_cast<double>(raw.triangles.size()) + kCpuPerNode * nodes_asked);
   scale_surface(raw, options, report);
+  tell_roughly(raw, options, phases);
   body.mended = phases.run("mending", [&] { return mend_surface(std::move(raw), options, report); });
   phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
-  body.wall_m = options.wall_m.value_or(0);
   const TriangleSurface& surface = body.mended.surface;
   report.input_area_m2 = calc_area(surface);
   report.input_volume_m3 = body.round ? body.round->calc_volume() : calc_volume(surface) - body.mended.offset_m * report.input_area_m2;
-
-  // The wall takes at most the whole volume; its two skins are about its volume over its thickness each.
-  const double wall_volume = std::min(body.wall_m * report.input_area_m2, report.input_volume_m3);
-  body.model = body.wall_m > 0 ? CountModel{.volume_m3 = wall_volume, .area_m2 = 2 * wall_volume / body.wall_m, .is_wall = true}
-                               : CountModel{.volume_m3 = report.input_volume_m3, .area_m2 = report.input_area_m2};
-  body.thickness_m = body.wall_m > 0 ? body.wall_m : 2 * report.input_volume_m3 / report.input_area_m2;
-  // A second-order mesh of a solid has about seven and a half times as many nodes as corners, of a thin wall fewer.
-  if (options.order == 2) body.model.factor = body.wall_m > 0 ? 6.4 : 7.5;
+  set_model(body, options, report.input_volume_m3, report.input_area_m2);
   const double diagonal = calc_box(surface.points).diagonal();
-  double edge = options.edge_m
-                    ? *options.edge_m
-                    : body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : (options.order == 2 ? 30000 : 10000));
+  double edge = find_first_edge(body, options);
   if (options.edge_m && edge > diagonal)
     throw InputError(fmt::format("{}: edges of {:.3g} m are longer than the body ({:.3g} m); ask for shorter ones",
                                  options.surface.string(), edge, diagonal));
   if (const double nodes = body.model.calc_nodes(edge); nodes > 1.5 * kMostNodes)
     throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
                                  options.surface.string(), edge, nodes, kMostNodes));
-  const double least = body.model.calc_nodes(kEdgePerThickness * body.thickness_m);
+  const double least = calc_least_nodes(body);
   if (!options.nodes && std::max(body.model.calc_nodes(edge), least) > nodes_asked) {
     cpu_limit.reset();
     cpu_limit.emplace(kLeastCpu + kCpuPerTriangle * static_cast<double>(report.input_triangles) +
@@ -474,9 +504,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   if (!options.edge_m && !options.nodes)
     report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
-  phases.tell(fmt::format("estimate {{\"volume_m3\": {:.12g}, \"area_m2\": {:.12g}, \"thickness_m\": {:.12g}, \"nodes\": {}}}",
-                          body.model.volume_m3, body.model.area_m2, body.thickness_m,
-                          std::llround(std::max(body.model.calc_nodes(edge), least))));
+  phases.tell(format_estimate("estimate", body, edge));
 
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
   body.nearest.emplace(surface);

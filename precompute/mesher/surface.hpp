@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "precompute/mesh/tet_mesh.hpp"
+#include "runtime/config/error.hpp"
 
 namespace carillon::mesher {
 
@@ -94,7 +95,14 @@ struct SurfaceReport {
   std::vector<std::string> notes;                       // sentences for the user: what was mended, what fell short
 };
 
-/// Called with a short sentence at the start of each phase.
+/// The count asked for cannot be met. `nodes` is what to ask for in its place: the fewest that the thickness allows, or the nearest.
+struct CountRefusal : InputError {
+  CountRefusal(const std::string& what, std::int64_t count) : InputError(what), nodes(count) {}
+  std::int64_t nodes;
+};
+
+/// Called with a short sentence at the start of each phase. Two sentences are for programs, a word and a JSON object: "rough {...}" of the
+/// surface as it was read, and "estimate {...}" of the repaired one, each with volume_m3, area_m2, thickness_m and nodes.
 using Progress = std::function<void(std::string_view)>;
 
 /// Meshes a surface. The tetrahedra are positively oriented, every node is used, the boundary is a closed 2-manifold

@@ -213,6 +213,33 @@ int count_shells_of(const mesh::TetMesh& m) {
   return shells;
 }
 
+TEST(bodies, who_asks_for_a_wall_has_a_hollow) {
+  // The hollow is a tenth of the ball, 10 mm wide, and elements of this count are nearly as long: a solid ball would be within a thousandth
+  // of the volume. It is refused in one line that says what to ask for; with what is asked for so, the second time at the latest, there is
+  // a hollow.
+  const auto path = write_text("tiny_hollow.off", to_off(make_sphere(0.05, 4)));
+  std::int64_t nodes = 2000;
+  int refused = 0;
+  SurfaceReport report;
+  mesh::TetMesh m;
+  while (m.tets.empty() && refused < 3) {
+    try {
+      m = mesh_surface({.surface = path, .wall_m = 0.045, .nodes = nodes}, report);
+    } catch (const CountRefusal& refusal) {
+      ++refused;
+      const std::string text = refusal.what();
+      EXPECT_NE(text.find("1 closed surface where the body has 2; ask for"), std::string::npos) << text;
+      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+      EXPECT_GT(refusal.nodes, nodes);
+      nodes = refusal.nodes;
+    }
+  }
+  EXPECT_GE(refused, 1);
+  ASSERT_FALSE(m.tets.empty());
+  expect_sound(m);
+  EXPECT_EQ(count_shells_of(m), 2);
+}
+
 TEST(bodies, coarse_walls_are_the_body_or_are_refused) {
   // Elements longer than the wall is thick. No node may lie outside or in the hollow, both skins must be there, and what cannot be had is
   // refused with what to ask for.

@@ -286,7 +286,7 @@ TEST(Round, nodes_of_meshes_lie_on_the_smooth_skins) {
     const double exact = pi * (radius * radius * length - inner * inner * (options.wall_m ? length - 2 * wall : 0));
     double worst = 0;
     for (const auto& p : m.nodes) worst = std::max(worst, std::hypot(p[0], p[1]) - radius);
-    EXPECT_LT(worst, (options.wall_m ? 2e-4 : 2e-5) * radius);
+    EXPECT_LT(worst, 2e-5 * radius);
     if (options.order == 2) {
       EXPECT_NEAR(report.volume_m3 / exact, 1, options.wall_m ? 3e-3 : 1e-4);
     }

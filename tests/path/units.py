@@ -63,7 +63,7 @@ def check_scale(folder):
     warnings = json.loads(run(folder, "--validate", "--json", "job.json").stdout)["warnings"]
     assert any("millimetres" in text and "is 1000: 1 for that" in text for text in warnings), warnings
     (folder / "job.json").write_text(json.dumps({"mesh": "millimetres.vtu", "material": GLASS, "bank": "bank.hdf"}))
-    looked = run(folder, "--validate", "--json", "job.json")
+    looked = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
     warnings = json.loads(looked.stdout)["warnings"]
     assert any("millimetres" in text and '"mesh_scale": 0.001' in text for text in warnings), warnings
     assert '"mesh_scale": 0.001' in looked.stderr
@@ -75,13 +75,13 @@ def check_questions(folder):
                           ({"young_modulus_pa": 72}, ["72: was it given in GPa?"]), ({"young_modulus_pa": 72000}, ["72000: was it given in MPa"]),
                           ({"density_kg_m3": 2.5}, ["2.5: was it given in g/cm^3?"]), ({"damping": {"rayleigh": {}}}, ["rings for ever"])):
         (folder / "job.json").write_text(json.dumps({"body": body, "material": GLASS | change, "bank": "bank.hdf", "band_hz": [20, 5000], "max_modes": 3}))
-        looked = run(folder, "--validate", "--json", "job.json")
+        looked = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
         assert looked.returncode == 0, looked.stderr
         warnings = json.loads(looked.stdout)["warnings"]
         for word in words:
             assert sum(word in text for text in warnings) == 1, f"{change}: {warnings}"
             assert sum(word in line for line in looked.stderr.splitlines()) == 1, looked.stderr
-        people = run(folder, "--validate", "job.json")
+        people = run(folder, "--validate", "--patience", "1000000", "job.json")
         assert all(word in people.stderr for word in words), people.stderr
     solved = run(folder, "-q", "job.json")  # no damping: solved, with the warning in the record
     assert solved.returncode == 0 and "rings for ever" in solved.stderr, solved.stderr

@@ -36,7 +36,7 @@ def write_job(folder, job):
 
 def check_predictions(folder, name, job):
     write_job(folder, job)
-    result = run(folder, "--validate", "--json", "job.json")
+    result = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
     assert result.returncode == 0, f"{name}: {result.stderr}"
     assert not (folder / "bank.hdf").exists(), f"{name}: a validation wrote a bank"
     foreseen = json.loads(result.stdout)
@@ -83,7 +83,7 @@ def check_refusals(folder):
             text = json.loads((folder / "job.json").read_text())
             text.pop("material", None)
             (folder / "job.json").write_text(json.dumps(text))
-        solved, looked = run(folder, "-q", "job.json"), run(folder, "--validate", "--json", "job.json")
+        solved, looked = run(folder, "-q", "job.json"), run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
         assert solved.returncode == looked.returncode == 2, f"{name}: {solved.returncode} of a run, {looked.returncode} of --validate: {looked.stderr}"
         assert len(find_error(looked)) == 1 and find_error(looked) == find_error(solved), f"{name}:\n{find_error(solved)}\n{find_error(looked)}"
         said = json.loads(looked.stdout)
@@ -97,10 +97,10 @@ def check_words(folder):
     assert several.returncode == 2 and "without mpirun" in several.stderr, several.stderr
     alone = run(folder, "--json", "job.json")
     assert alone.returncode == 2 and "--validate" in alone.stderr, alone.stderr
-    people = run(folder, "--validate", "job.json")
+    people = run(folder, "--validate", "--patience", "1000000", "job.json")
     assert people.returncode == 0 and "counted by inertia" in people.stdout and "ranks" in people.stdout, people.stdout
     write_job(folder, {"body": {key: value for key, value in BAR.items() if key != "nodes"}, "accuracy_cents": 5})
-    trial = run(folder, "--validate", "--json", "job.json")
+    trial = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
     assert trial.returncode == 0 and "trial" in " ".join(json.loads(trial.stdout)["notes"]), trial.stdout + trial.stderr
 
 

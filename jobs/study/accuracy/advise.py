@@ -17,6 +17,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 
 import programs
 import scaling
@@ -30,7 +32,8 @@ TRIAL_TOLERANCE = 1e-6
 START_S = 0.15  # CPU seconds of starting, which no station of a run's record claims
 BUDGET_MARGIN = 0.85  # of --seconds: what is aimed at
 CHECK_GROWTH = 2.5  # of the nodes, for --check
-PATIENCE_S = 3.0  # for the mesh of a surface, before it is estimated from its size
+PATIENCE_S = 6.0  # for a first look; what does not fit is estimated
+LONG_S, MANY_NODES = 10.0, 45000  # of a mesh file's solve, of a surface's coarsest mesh: from here on the first look is an answer of its own
 MOST_CENTS, MOST_SECONDS = 2400.0, 1e6
 PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
 
@@ -138,14 +141,42 @@ class Adviser:
         """Progress: trials take their time."""
         print(f"carillon-study: {printable(text)}", file=sys.stderr, flush=True)
 
+    @contextlib.contextmanager
+    def doing(self, text):
+        """Says so, and again while it goes on."""
+        self.say(text)
+        done, begin = threading.Event(), time.monotonic()
+
+        def beat():
+            for number in range(10**6):
+                if done.wait(3 if number < 5 else 15):
+                    return
+                self.say(f"still {text}, {time.monotonic() - begin:.0f} s")
+        thread = threading.Thread(target=beat, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
+
     def estimate(self):
-        """What carillon-precompute --validate says of a surface that takes long to mesh, from its size alone; None of any other body."""
-        if self.target.kind != "surface":
+        """What carillon-precompute --validate says of a surface or mesh file whose trials will take long; None of any other body."""
+        if self.target.kind not in ("surface", "mesh"):
             return None
-        self.say(f"looking at {self.target.name}")
+        with self.doing(f"looking at {self.target.name}"):
+            found = self.look()
+        if found is None:
+            return None
+        # A surface that is not thin has a few thousand nodes in its first trial, whatever its usual mesh takes.
+        is_thin = self.target.kind == "surface" and found["mesh"]["nodes"] > MANY_NODES
+        is_unmade = self.target.kind == "mesh" or found["mesh"]["how"] == "estimated"
+        return found if is_thin or is_unmade and found["cpu_seconds"] > LONG_S else None
+
+    def look(self):
         setting = forecast.Setting("T10", PROBE_NODES["surface"], TRIAL_TOLERANCE)
         job = self.target.target.make_job(setting) | {"bank": "bank.hdf"}
-        del job["body"]["nodes"]  # what its thickness needs
+        job.get("body", {}).pop("nodes", None)  # what its thickness needs
         with tempfile.TemporaryDirectory(dir=self.lab.runs) as folder:
             file = pathlib.Path(folder) / "job.json"
             file.write_text(json.dumps(job))
@@ -153,14 +184,13 @@ class Adviser:
             done = subprocess.run(command, capture_output=True, text=True, errors="surrogateescape", stdin=subprocess.DEVNULL)
         if done.returncode != 0:
             return None  # the first trial says why, in the words of a run
-        found = json.loads(done.stdout)
-        return found if found["mesh"]["how"] == "estimated" else None
+        return json.loads(done.stdout)
 
     def calibrate(self):
         """How fast this machine is beside the study's, by the study's small solve."""
-        self.say("measuring the pace of this machine")
         known = self.advice.get_calibration()
-        solve = self.lab.measure([Case("calibration", known["job"])], 2, is_fresh=True)["calibration"]
+        with self.doing("measuring the pace of this machine"):
+            solve = self.lab.measure([Case("calibration", known["job"])], 2, is_fresh=True)["calibration"]
         self.pace = min(max(min(solve.cpu_s) / known["cpu_s"], 0.05), 20.0)
 
     def find_curves(self):
@@ -241,9 +271,9 @@ class Adviser:
         return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, find_bars(solve), solve.cpu, mesh_s)
 
     def solve(self, setting, name):
-        self.say(f"solving: {name}")
         case = self.target.make_case(self.lab, setting, name)
-        return self.lab.measure([case], is_fresh=True)[case.name]
+        with self.doing(f"solving: {name}"):
+            return self.lab.measure([case], is_fresh=True)[case.name]
 
     def make_forecast(self, curve, nodes):
         cents = curve.predict_cents(nodes)
@@ -355,9 +385,10 @@ def describe_estimate(adviser, found, options):
     asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
     memory = found["memory_bytes"]["1"] * 1e-9
     lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]]
-    lines += [f"asked:     {asked}",
-              f"estimate:  so thin a body takes long to mesh. Its coarsest mesh has about {found['mesh']['nodes']:,} nodes (T10), about {found['modes']['count']} modes in the band, "
-              f"{found['cpu_seconds']:.0f} CPU s and {memory:.1f} GB, by its size alone and to a factor of two"]
+    modes = "modes that are not known before it is read" if found["modes"]["how"] == "unknown" else f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
+    what = "so many nodes take long to solve. The mesh has" if adviser.target.kind == "mesh" else "so thin a body takes long to mesh and to solve. Its coarsest mesh has"
+    by = "by its size alone and to a factor of two" if found["mesh"]["how"] == "estimated" else "without a solve"
+    lines += [f"asked:     {asked}", f"estimate:  {what} about {found['mesh']['nodes']:,} nodes (T10), {modes}, {found['cpu_seconds']:.0f} CPU s and {memory:.1f} GB, {by}"]
     if options.dry_run:
         lines.append("           cents are not predicted without a trial: leave --dry-run away for the trials")
     return lines
