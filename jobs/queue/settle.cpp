@@ -140,7 +140,7 @@ void settle_unbegun(const store::Store& store, registry::Registry& registry, con
 
 void settle_unstarted(const store::Store& store, registry::Registry& registry, const Job& job, const std::string& refusal) {
   outcome::Outcome outcome = outcome::make_killed(job.token);
-  outcome.cause = store::is_disk_full(store.root()) ? outcome::Cause::disk_full : outcome::Cause::system;
+  outcome.cause = store::is_disk_full(store.root(), refusal) ? outcome::Cause::disk_full : outcome::Cause::system;
   outcome.reason = refusal;
   change_running(
       registry, job, [&](Job& row) { apply(row, outcome); }, nullptr);

@@ -1,5 +1,5 @@
 // Rows and the processes behind them: what became of attempts, cancel, retry. Used by everything that opens the registry, so that no row
-// stays "running" when nobody works on it.
+// stays "running" when no attempt runs.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ namespace carillon::queue {
 enum class Standing {
   working,   // a process works in its folder
   starting,  // claimed, and who claimed it or was started for it is there
-  ended,     // worked on, and nobody is there any more
+  ended,     // its attempt has ended
   unbegun,   // claimed, and whoever claimed it is gone before anything began
   elsewhere  // claimed on another machine
 };
@@ -46,7 +46,7 @@ struct Said {
 /// carillon::slurm looks after them.
 Said cancel(const store::Store& store, registry::Registry& registry, const store::Id& id, double patience_s = 90.0);
 
-/// Cancels a row that nobody works on; its reason says what it was, and why it had failed or waited. Pure.
+/// Cancels a row without a running attempt; its reason says what it was, and why it had failed or waited. Pure.
 void cancel_unstarted(registry::Job& job);
 
 /// Puts a failed or cancelled job back into the queue, with its checkpoint and a new count of retries; a waiting one is ready at once.
