@@ -68,13 +68,22 @@ std::string make_canonical(Json::Value root) {
 /// What a record of a run (JSON) has in common with a request.
 enum class Origin { same, unknown, another_job, another_input };
 
-/// As JSON, not as a job: the words of the schema at that time are those of the request.
-Origin compare_origin(const std::string& record, const Request& request) {
+/// An object of JSON; null for anything else.
+Json::Value parse_object(const std::string& text) {
   Json::Value root;
-  std::istringstream stream(record);
+  std::istringstream stream(text);
   std::string errors;
   try {
-    if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) || !root.isObject()) return Origin::unknown;
+    if (Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) && root.isObject()) return root;
+  } catch (const Json::Exception&) {  // too deep
+  }
+  return {};
+}
+
+/// As JSON, not as a job: the words of the schema at that time are those of the request.
+Origin compare_origin(Json::Value root, const Request& request) {
+  if (!root.isObject()) return Origin::unknown;
+  try {
     const Json::Value& named = request.input_kind == "surface" ? root["body"]["surface"] : root["mesh"];
     const std::string input = named.isString() ? fs::path(named.asString()).stem().string() : "";
     for (const char* key : {"run", "bank"}) root.removeMember(key);
@@ -336,7 +345,7 @@ std::optional<std::string> find_job_fault(const Store& store, const Id& id, cons
 }
 
 std::optional<std::string> find_origin_fault(const std::string& provenance, const Request& request) {
-  switch (compare_origin(provenance, request)) {
+  switch (compare_origin(parse_object(provenance), request)) {
     case Origin::same:
       return std::nullopt;
     case Origin::unknown:
@@ -364,7 +373,7 @@ std::optional<std::string> find_resolved_fault(const fs::path& folder, const Id&
   } catch (const InputError&) {
     return "its job.json is missing, or cannot be read";
   }
-  switch (compare_origin(text, *request)) {
+  switch (compare_origin(parse_object(text), *request)) {
     case Origin::same:
       return std::nullopt;
     case Origin::unknown:
@@ -388,10 +397,12 @@ std::string name_job(const std::string& message, const Id& id, const std::string
 std::vector<std::string> read_warnings(const Store& store, const Id& id, const std::string& name) {
   std::vector<std::string> texts;
   const fs::path folder = store.bank_folder(id);
-  if (find_resolved_fault(folder, id)) return texts;
   try {
-    const Json::Value root = parse_json(config::read_file(folder / kJobFile, "record", kMostJobBytes));
+    const Json::Value root = parse_object(config::read_file(folder / kJobFile, "record", kMostJobBytes));
     const Json::Value& list = root["run"]["warnings"];
+    if (list.empty()) return texts;
+    const std::optional<Request> request = read_request(folder);
+    if (!request || request->id != id.text() || calc_id(*request) != id || compare_origin(root, *request) != Origin::same) return texts;
     for (Json::ArrayIndex i = 0; list.isArray() && i < list.size() && texts.size() < kMostTexts; ++i) {
       if (!list[i].isString()) continue;
       const std::string text = name_job(list[i].asString(), id, name);
