@@ -127,7 +127,7 @@ class Runner {
     for (const auto& [pid, job] : children_) pids.push_back(pid);
     for (const Job& job : registry_.list({State::running})) {
       const std::optional<outcome::Attempt> attempt = outcome::read_attempt(store_.work_folder(job.id));
-      if (job.engine != "local" || !attempt || process::find_life(attempt->process) != process::Life::running) continue;
+      if (job.engine != "local" || !attempt || !is_attempt_of(job, attempt->process)) continue;
       const std::map<pid_t, attempt::Usage> self = attempt::find_below(attempt->process.pid);
       const auto usage = self.find(attempt->process.pid);
       if (usage == self.end() || children_.count(attempt->process.pid) > 0) continue;
@@ -186,7 +186,7 @@ class Runner {
       if (now_s - asked_s < kAskAgainS && now_s >= asked_s) continue;
       asked_s = now_s;
       const std::optional<outcome::Attempt> attempt = outcome::read_attempt(store_.work_folder(job.id));
-      if (attempt && process::find_life(attempt->process) == process::Life::running) ::kill(attempt->process.pid, SIGUSR1);
+      if (attempt && is_attempt_of(job, attempt->process)) ::kill(attempt->process.pid, SIGUSR1);
     }
   }
 

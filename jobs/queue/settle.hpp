@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "jobs/outcome/outcome.hpp"
+#include "jobs/process/process.hpp"
 #include "jobs/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
@@ -21,6 +22,10 @@ enum class Standing {
   elsewhere  // claimed on another machine
 };
 Standing find_standing(const store::Store& store, const registry::Job& job);
+
+/// Whether a process that lives is the attempt of this row: it was started with the row's token. attempt.json, which every member of a
+/// group may write, can name another process, and that must get no signal.
+bool is_attempt_of(const registry::Job& job, const process::Identity& found);
 
 /// Changes a row by what came of its attempt: done, failed, cancelled (when that was wanted), waiting or queued. Pure.
 void apply(registry::Job& job, const outcome::Outcome& outcome);
