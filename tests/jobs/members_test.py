@@ -206,9 +206,10 @@ class Members(Bench):
                         if os.path.lexists(f"{path}.aside") and not os.path.lexists(path):
                             os.rename(f"{path}.aside", path)
 
-        child, rounds = start_as_nobody(swap_on), 0
-        while os.waitpid(child, os.WNOHANG)[0] == 0 or rounds < 3:
+        child, rounds, is_over = start_as_nobody(swap_on), 0, False
+        while not is_over or rounds < 3:
             rounds += 1
+            is_over = is_over or os.waitpid(child, os.WNOHANG)[0] != 0
             (self.store / "tmp" / DEAD).mkdir(exist_ok=True) if not (self.store / "tmp").is_symlink() else None
             for words in (("gc", "--delete"), ("submit", self.open_job), ("run", "--quiet", "--no-pictures")):
                 done = self.run_it(*words, code=None, timeout=60)
