@@ -13,6 +13,7 @@
 #include <string_view>
 #include <thread>
 
+#include "precompute/io/enter_folder.hpp"
 #include "precompute/io/interrupt.hpp"
 #include "precompute/io/run_job.hpp"
 #include "precompute/io/run_record.hpp"
@@ -81,6 +82,9 @@ struct CommandLine {
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
     app.add_option("--bank", options.bank, "write the bank to this file, whatever the job says")->check(named);
+    app.add_option("--folder", options.folder, "work in folder NAME below ROOT, to which no link below ROOT leads")
+        ->expected(2)
+        ->type_name("ROOT NAME");
     CLI::Option* matrices =
         app.add_option("--matrices", options.matrices, "write K and M to this folder too, as Matrix Market files")->check(named);
     CLI::Option* validate =
@@ -171,6 +175,7 @@ int main(int argc, char** argv) {
   try {
     const CommandLine words(argc, argv);
     if (words.only_asks()) return is_first_of_all() ? words.app.exit(*words.error) : 0;
+    if (!words.error && !words.options.folder.empty()) io::enter_folder(words.options.folder[0], words.options.folder[1]);
     petsc::restart_with_fitting_kernels(argv);
     io::end_on_signals(is_first_of_all() ? 0 : 1);
     if (!words.options.checkpoint.empty()) io::save_on_signals();

@@ -14,6 +14,8 @@ enum class Launcher { automatic, alone, mpirun, srun };  // automatic: alone for
 
 struct Options {
   std::filesystem::path work;  // work/ab/<id> of a store
+  std::filesystem::path root;  // that store, for ranks that have to find the folder themselves
+  std::string id;              // and the job
   int ranks = 1;
   double memory_gb = 0.0;     // admitted, for the record; 0: not known
   double time_limit_s = 0.0;  // of this attempt; 0: none

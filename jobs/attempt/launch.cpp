@@ -178,8 +178,6 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   if (launcher == Launcher::mpirun) {
     launch.arguments = {find_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
     launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
-    // Under Slurm ranks run on other machines too, where only the folder's name leads to it.
-    if (!is_under_slurm()) launch.arguments.insert(launch.arguments.end(), {"--wdir", options.work.string()});
     for (const char* name : {"CARILLON_ATTEMPT", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "HWLOC_COMPONENTS"}) {
       launch.arguments.insert(launch.arguments.end(), {"-x", name});
     }
@@ -191,6 +189,9 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   const auto add = [&](std::initializer_list<const char*> words) {
     launch.arguments.insert(launch.arguments.end(), words.begin(), words.end());
   };
+  // What starts ranks knows the folder by its name, and does so on other machines too: each rank goes there step by step.
+  const std::string folder = fmt::format("work/{}/{}", options.id.substr(0, 2), options.id);
+  if (launcher != Launcher::alone) add({"--folder", options.root.c_str(), folder.c_str()});
   if (options.is_prediction) {
     add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // what is reserved rests on the mesh, not on an estimate
   } else {

@@ -84,17 +84,40 @@ std::optional<std::string> find_bank_fault(const fs::path& work, const store::Re
   }
 }
 
-std::optional<std::string> find_published_fault(const store::Store& store, const store::Id& id) {
-  if (std::optional<std::string> fault = store.find_bank_fault(id, store::Look::full)) return fault;
-  const fs::path folder = store.bank_folder(id);
+std::optional<std::string> find_record_fault(const store::Store& store, const store::Id& id) {
   try {
-    const bank::Bank bank = bank::read_bank(folder / store::kBankFile);
-    const std::optional<store::Request> request = store::read_request(folder);
-    if (!request || request->id != id.text() || store::calc_id(*request) != id) return "its request.json is not what was submitted";
-    return bank.provenance.empty() ? std::nullopt : store::find_origin_fault(bank.provenance, *request);
-  } catch (const InputError& fault) {
-    return fault.what();
+    if (std::optional<std::string> change = store.find_record_change(id)) return change;
+    const store::OpenFolder folder = store.open_bank(id);
+    if (std::optional<std::string> fault = store::find_resolved_fault(folder.path(), id)) return fault;
+    if (!folder.look_at(store::kOutcomeFile)) return "its outcome.json is missing";
+    const std::optional<outcome::Outcome> outcome = outcome::read_outcome(folder.path());
+    if (!outcome) return "its outcome.json is empty, cut or damaged";
+    if (outcome->cause != outcome::Cause::done) return "its outcome.json is that of another attempt";
+    return std::nullopt;
+  } catch (const SystemError& error) {
+    return error.what();
   }
+}
+
+bool repair_records(const store::Store& store, const store::Request& request) {
+  const store::Id id = store::calc_id(request);
+  const store::OpenFolder folder = store.open_bank(id);
+  const store::Temporary temporary = store.make_temporary();
+  std::string record;
+  try {
+    record = bank::read_bank(folder.path() / store::kBankFile).provenance;
+  } catch (const InputError&) {
+    return false;
+  }
+  if (store::find_origin_fault(record, request)) return false;
+  config::write_file(temporary / store::kJobFile, record + "\n");
+  store::write_request(temporary.path(), request);
+  outcome::Outcome outcome;  // how the attempt went is lost with its record; that it was done is not
+  outcome.cause = outcome::Cause::done;
+  outcome.percent = 100.0;
+  outcome::write_outcome(temporary.path(), outcome);
+  store.replace_records(id, temporary);
+  return true;
 }
 
 void publish(const store::Store& store, const store::Id& id, const fs::path& work, const outcome::Outcome& outcome,

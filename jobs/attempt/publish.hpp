@@ -16,8 +16,13 @@ namespace carillon::attempt {
 /// `has_bank` says whether there is one.
 std::optional<std::string> find_bank_fault(const std::filesystem::path& work, const store::Request& request, bool& has_bank);
 
-/// The same of a bank in the store, all its bytes read. A bank that does not say what it was made of has no fault in that.
-std::optional<std::string> find_published_fault(const store::Store& store, const store::Id& id);
+/// Why one of the records beside a bank in the store (job.json, request.json, outcome.json) is not what was published, or not that of this
+/// job, in one sentence; none when all are.
+std::optional<std::string> find_record_fault(const store::Store& store, const store::Id& id);
+
+/// Writes those records again: from the request, and from the copy of job.json that the bank holds. False when the bank holds none, or was
+/// not made of that request. SystemError when the disk refuses.
+bool repair_records(const store::Store& store, const store::Request& request);
 
 /// Puts bank, resolved job, request, log, outcome and a report (titled by the job's input) from the folder of work into one folder and
 /// publishes it as the bank of `id`; nothing is taken from the folder of work before that. SystemError when the disk refuses: nothing is

@@ -102,6 +102,8 @@ class Attempt {
     outcome_.host = process::find_host();
     outcome_.started = outcome::find_utc();
     options_.work = work_;
+    options_.root = store.root();
+    options_.id = id.text();
     // For what this process itself starts (the pictures of the report); its own entry in /proc stays as it is.
     ::setenv("CARILLON_ATTEMPT", outcome_.token.c_str(), 1);
   }
@@ -114,13 +116,13 @@ class Attempt {
       clean();
       solve(before ? before->percent : 0.0);
     } catch (const SystemError& error) {
-      set(store::is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+      set(store::is_disk_full(work_, error.what()) ? Cause::disk_full : Cause::system, error.what());
     } catch (const InputError& error) {
       set(Cause::bad_input, error.what());
     } catch (const std::bad_alloc&) {
       set(Cause::memory, "out of memory while the bank was verified");
     } catch (const std::exception& error) {
-      set(store::is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+      set(store::is_disk_full(work_, error.what()) ? Cause::disk_full : Cause::system, error.what());
     }
     outcome_.seconds = find_seconds() - start_s;
     outcome_.percent = std::max(outcome_.percent, before ? before->percent : 0.0);
@@ -219,7 +221,7 @@ class Attempt {
         return 0;
       } catch (const std::exception& error) {
         if (store_.has_bank(id_)) return 0;  // only the work could not be removed
-        set(store::is_disk_full(work_) ? Cause::disk_full : Cause::system, error.what());
+        set(store::is_disk_full(work_, error.what()) ? Cause::disk_full : Cause::system, error.what());
       }
     }
     fmt::print(stderr, "carillon attempt: {}: {}\n", outcome::to_text(outcome_.cause), outcome_.reason);

@@ -128,7 +128,7 @@ bool is_owner_gone(const std::string& name) {
   return process::find_life(owner) == process::Life::gone;
 }
 
-/// False: a record could not be read, so that nobody knows which inputs are used.
+/// False: a record could not be read, so it is not known which inputs are used.
 bool add_jobs(Shared& shared, const References& references, std::vector<Item>& items, std::set<fs::path>& used_inputs) {
   const store::Store& store = shared.store();
   bool is_known = true;
@@ -187,10 +187,10 @@ void add_inputs(const store::Store& store, const std::set<fs::path>& used_inputs
   }
 }
 
-/// "registry.damaged-3.sqlite", and the same with -wal and -shm.
+/// "registry.damaged-3.sqlite", and the same with -journal, -wal and -shm.
 bool is_damaged_registry(std::string name) {
-  for (const char* ending : {"-wal", "-shm"}) {
-    if (name.ends_with(ending)) name.resize(name.size() - 4);
+  for (const std::string_view ending : {"-journal", "-wal", "-shm"}) {
+    if (name.ends_with(ending)) name.resize(name.size() - ending.size());
   }
   constexpr std::string_view kBegin = "registry.damaged-", kEnd = ".sqlite";
   if (!name.starts_with(kBegin) || !name.ends_with(kEnd) || name.size() <= kBegin.size() + kEnd.size()) return false;

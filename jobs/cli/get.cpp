@@ -8,6 +8,7 @@
 #include "jobs/cli/gather.hpp"
 #include "jobs/cli/shared.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/config/file.hpp"
 
@@ -53,7 +54,7 @@ int run_get(Shared& shared, const Options& options) {
   // A copy is for good: every byte is looked at before.
   const auto fault = shared.store().find_bank_fault(id, options.to.empty() ? store::Look::quick : store::Look::full);
   const bool is_done = !fault, is_damaged = fault && shared.store().has_bank_folder(id);
-  const std::vector<std::string> warnings = is_done ? store::read_warnings(shared.store().bank_folder(id)) : std::vector<std::string>();
+  const std::vector<std::string> warnings = is_done ? store::read_warnings(shared.store(), id) : std::vector<std::string>();
   if (is_done && !options.to.empty()) copy_to(bank, options.to);
   const bool is_again =
       job && (job->state == registry::State::queued || job->state == registry::State::running || job->state == registry::State::waiting);

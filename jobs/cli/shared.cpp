@@ -9,6 +9,7 @@
 
 #include "jobs/cli/gather.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
 #include "runtime/config/document.hpp"
 #include "runtime/config/error.hpp"
 
@@ -97,11 +98,11 @@ registry::Registry& Shared::registry() {
 
 bool Shared::fall_back(const std::string& error) {
   if (!only_reads && !works_when_full) return false;
-  if (!store::is_disk_full(store().root()) && !store::is_disk_full(store().registry_folder())) return false;
+  if (!store::is_disk_full(store().root(), error) && !store::is_disk_full(store().registry_folder())) return false;
   is_disk_full_ = true;
   registry_.reset();
   if (!is_full_told_)
-    fmt::print(stderr, "carillon: the disk is full ({}); states are as the files of the store tell them\n", show_message(error));
+    fmt::print(stderr, "carillon: the disk or quota is full ({}); states are as the files of the store tell them\n", show_message(error));
   is_full_told_ = true;
   return true;
 }
@@ -147,7 +148,7 @@ bool is_submitted_again(const registry::Job& job, bool has_work) {
 }
 
 std::string find_reason(Shared& shared, const registry::Job& job) {
-  std::string reason = job.reason;
+  std::string reason = store::name_job(job.reason, job.id, "the job");
   const std::string inputs = (shared.store().root() / "inputs").string();
   if (reason.find(inputs) == std::string::npos) return reason;
   try {
@@ -161,9 +162,9 @@ std::string find_reason(Shared& shared, const registry::Job& job) {
   return reason;
 }
 
-std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job) {
+std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job, const std::string& name) {
   if (job.state != registry::State::done) return {};
-  return store::read_warnings(shared.store().bank_folder(job.id));
+  return store::read_warnings(shared.store(), job.id, name);
 }
 
 Json::Value to_json(const std::vector<std::string>& texts) {

@@ -113,8 +113,8 @@ bool is_submitted_again(const registry::Job& job, bool has_work);
 
 /// A row with its progress, its bank and its log, under the keys of docs/howto/jobs.md.
 Json::Value describe(Shared& shared, const registry::Job& job);
-/// What the solver warned of, of a job that is done.
-std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job);
+/// What the solver warned of, of a job that is done; `name` stands for its job file.
+std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job, const std::string& name = "the job");
 /// A list of texts as JSON.
 Json::Value to_json(const std::vector<std::string>& texts);
 /// The reason of a row with the file that the user named in place of its copy in the store.

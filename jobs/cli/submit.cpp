@@ -80,6 +80,21 @@ void print_errors(const std::vector<Source>& sources) {
   if (count > kMostShown) fmt::print(stderr, "carillon: ... and {} more\n", count - kMostShown);
 }
 
+/// What the solver warned of: with the lines of the job file that was submitted, where its numbers are meant.
+std::vector<std::string> find_own_warnings(Shared& shared, const Answer& answer) {
+  std::vector<std::string> warnings = find_warnings(shared, *answer.job, answer.source->job_file);
+  std::vector<std::string> own = answer.source->job.warnings;
+  for (std::string& warning : warnings) {
+    if (!warning.starts_with(answer.source->job_file + ": ")) continue;
+    const std::string text = warning.substr(answer.source->job_file.size());
+    const auto fits = std::find_if(own.begin(), own.end(), [&](const std::string& line) { return line.ends_with(text); });
+    if (fits == own.end()) continue;
+    warning = store::to_text(*fits);
+    own.erase(fits);
+  }
+  return warnings;
+}
+
 Json::Value describe_answers(Shared& shared, const std::vector<Answer>& answers) {
   Json::Value root;
   root["store"] = to_json(shared.store().root().string());
@@ -87,7 +102,10 @@ Json::Value describe_answers(Shared& shared, const std::vector<Answer>& answers)
   root["errors"] = Json::arrayValue;
   for (const Answer& answer : answers) {
     Json::Value entry;
-    if (answer.job) entry = describe(shared, *answer.job);
+    if (answer.job) {
+      entry = describe(shared, *answer.job);
+      entry["warnings"] = to_json(find_own_warnings(shared, answer));
+    }
     entry["job_file"] = to_json(answer.source->job_file);
     if (answer.job) {
       entry["new"] = answer.is_new;
@@ -104,7 +122,7 @@ void print_warnings(Shared& shared, const std::vector<Answer>& answers) {
   std::size_t shown = 0;
   for (const Answer& answer : answers) {
     if (!answer.job) continue;
-    for (const std::string& warning : find_warnings(shared, *answer.job)) {
+    for (const std::string& warning : find_own_warnings(shared, answer)) {
       if (++shown > kMostShown) return;
       fmt::print(stderr, "carillon: {}: warning: {}\n", show(answer.job->name), show_message(warning));
     }

@@ -21,7 +21,7 @@ struct Options {
 };
 
 struct Finding {
-  std::string kind;  // "bank", "work", "input"
+  std::string kind;  // "bank", "record", "work", "input"
   store::Id id;      // of the job
   std::string fault;
   std::string repair;  // what was done, or why it could not be; empty: nothing was tried
@@ -56,7 +56,10 @@ void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::o
                std::vector<Finding>& findings) {
   const store::Store& store = shared.store();
   if (store.has_bank_folder(id)) {
-    if (const auto fault = attempt::find_published_fault(store, id)) findings.push_back({"bank", id, *fault, "", false});
+    if (const auto fault = store.find_bank_fault(id, store::Look::content))
+      findings.push_back({"bank", id, *fault, "", false});
+    else if (const auto record = attempt::find_record_fault(store, id))
+      findings.push_back({"record", id, *record, "", false});
   }
   if (!store.has_bank_folder(id) && !store.has_work(id)) findings.push_back({"bank", id, "its bank is missing", "", false});
   if (store.has_work(id) && !is_worked_on(store, id)) {
@@ -83,6 +86,14 @@ void repair(Shared& shared, Finding& finding) {
   });
   finding.is_repaired = !refusal;
   finding.repair = refusal ? *refusal : "queued again; carillon run computes it";
+}
+
+/// What lies beside a bank that is whole: written again where the bank tells it, else the bank is computed again.
+void repair_record(Shared& shared, Finding& finding) {
+  const auto request = queue::find_request(shared.store(), shared.registry(), finding.id);
+  if (!request || !attempt::repair_records(shared.store(), *request)) return repair(shared, finding);
+  finding.is_repaired = true;
+  finding.repair = "written again from what the bank and the submission hold";
 }
 
 /// An input alone: what is done stays done.
@@ -124,7 +135,11 @@ int run_verify(Shared& shared, const Options& options) {
   root["checked"] = Json::UInt64(ids.size());
   root["damaged"] = Json::arrayValue;
   for (Finding& finding : findings) {
-    if (options.repairs) finding.kind == "input" ? repair_input(shared, finding) : repair(shared, finding);
+    if (options.repairs) {
+      finding.kind == "input"    ? repair_input(shared, finding)
+      : finding.kind == "record" ? repair_record(shared, finding)
+                                 : repair(shared, finding);
+    }
     is_whole = is_whole && finding.is_repaired;
     Json::Value entry;
     entry["kind"] = finding.kind;
@@ -134,8 +149,8 @@ int run_verify(Shared& shared, const Options& options) {
     entry["repair"] = finding.repair.empty() ? Json::Value() : to_json(finding.repair);
     root["damaged"].append(entry);
     if (shared.json) continue;
-    fmt::print("{}  {:<5}  {}\n", finding.id.short_text(), finding.kind, show_message(finding.fault));
-    if (!finding.repair.empty()) fmt::print("              {}\n", show_message(finding.repair));
+    fmt::print("{}  {:<6}  {}\n", finding.id.short_text(), finding.kind, show_message(finding.fault));
+    if (!finding.repair.empty()) fmt::print("                      {}\n", show_message(finding.repair));
   }
   if (shared.json)
     print_json(root);

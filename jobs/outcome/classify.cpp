@@ -120,7 +120,7 @@ Verdict classify(const Ending& ending) {
                0.0};
   }
   if (ending.is_disk_full && verdict.cause != Cause::disk_full && verdict.cause != Cause::memory)
-    return {Cause::disk_full, fmt::format("the disk is full ({})", verdict.reason), 0.0};
+    return {Cause::disk_full, fmt::format("the disk or quota is full ({})", verdict.reason), 0.0};
   return verdict;
 }
 

@@ -21,7 +21,7 @@ enum class Cause {
   checkpointed,  // saved and stopped (85), asked to by somebody else than us
   stopped,       // we were asked to stop, saved or not
   time_limit,    // the time of the job was over, saved or not
-  killed,        // by a signal that nobody here sent
+  killed,        // by a signal from elsewhere
   crashed,       // by a signal of its own making: SIGSEGV, SIGABRT ...
   node_lost,     // mpirun lost a machine or a rank
   hung,          // neither progress nor work for too long

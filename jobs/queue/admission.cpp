@@ -13,7 +13,7 @@
 namespace carillon::queue {
 namespace {
 
-constexpr double kUnknownGb = 0.5;  // of a job that nobody has predicted
+constexpr double kUnknownGb = 0.5;  // of a job without a prediction
 
 struct Room {
   int cores = 0;

@@ -24,10 +24,12 @@
 #include "jobs/queue/admission.hpp"
 #include "jobs/queue/display.hpp"
 #include "jobs/queue/needs.hpp"
+#include "jobs/queue/repair.hpp"
 #include "jobs/queue/settle.hpp"
 #include "jobs/queue/spawn.hpp"
 #include "jobs/registry/registry.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
 
 namespace carillon::queue {
@@ -66,8 +68,8 @@ class Runner {
         if (is_over) return exit_code_;
       } catch (const SystemError& error) {
         // A full disk passes; whatever else the registry cannot do ends this.
-        if (!store::is_disk_full(store_.root()) && !store::is_disk_full(store_.registry_folder())) throw;
-        if (!is_disk_told_) display_.say(fmt::format("the disk is full ({}); this goes on when there is room", error.what()));
+        if (!store::is_disk_full(store_.root(), error.what()) && !store::is_disk_full(store_.registry_folder())) throw;
+        if (!is_disk_told_) display_.say(fmt::format("the disk or quota is full ({}); this goes on when there is room", error.what()));
         is_disk_told_ = true;
         if (stops_ > 0 && list_attempts().empty()) return exit_code_;
         pause(kDiskPatienceS);
@@ -125,7 +127,7 @@ class Runner {
     for (const auto& [pid, job] : children_) pids.push_back(pid);
     for (const Job& job : registry_.list({State::running})) {
       const std::optional<outcome::Attempt> attempt = outcome::read_attempt(store_.work_folder(job.id));
-      if (job.engine != "local" || !attempt || process::find_life(attempt->process) != process::Life::running) continue;
+      if (job.engine != "local" || !attempt || !is_attempt_of(job, attempt->process)) continue;
       const std::map<pid_t, attempt::Usage> self = attempt::find_below(attempt->process.pid);
       const auto usage = self.find(attempt->process.pid);
       if (usage == self.end() || children_.count(attempt->process.pid) > 0) continue;
@@ -159,8 +161,13 @@ class Runner {
   void tell_end(const Job& job) {
     blocked_since_.erase(job.id.text());
     needs_.erase(job.id.text());
-    display_.tell(registry::to_text(job.state), job,
-                  job.state == State::done ? store::read_warnings(store_.bank_folder(job.id)) : std::vector<std::string>());
+    display_.tell(registry::to_text(job.state), job, job.state == State::done ? find_warnings(job) : std::vector<std::string>());
+  }
+
+  /// They name the file that the job was submitted from.
+  std::vector<std::string> find_warnings(const Job& job) const {
+    const std::optional<store::Request> request = find_request(store_, registry_, job.id);
+    return store::read_warnings(store_, job.id, request && !request->job_file.empty() ? request->job_file : "the job");
   }
 
   void tell_adopted(const std::vector<Job>& jobs) {
@@ -179,7 +186,7 @@ class Runner {
       if (now_s - asked_s < kAskAgainS && now_s >= asked_s) continue;
       asked_s = now_s;
       const std::optional<outcome::Attempt> attempt = outcome::read_attempt(store_.work_folder(job.id));
-      if (attempt && process::find_life(attempt->process) == process::Life::running) ::kill(attempt->process.pid, SIGUSR1);
+      if (attempt && is_attempt_of(job, attempt->process)) ::kill(attempt->process.pid, SIGUSR1);
     }
   }
 
@@ -273,7 +280,7 @@ class Runner {
            std::none_of(children_.begin(), children_.end(), [&](const auto& child) { return is_same(child.second); });
   }
 
-  /// Rows that were claimed in another container or under another name of this machine, and that nobody began to work on.
+  /// Rows that were claimed in another container or under another name of this machine, whose attempt never began.
   void release_lost(const std::vector<Job>& jobs) {
     const double now_s = process::find_boot_seconds();
     for (const Job& job : jobs) {

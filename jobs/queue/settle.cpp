@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <fstream>
 #include <optional>
 
 #include "jobs/outcome/policy.hpp"
@@ -61,7 +62,7 @@ bool change_running(registry::Registry& registry, const Job& job, const std::fun
 /// Asks the process that works on the job to save and stop. False: there is none that can be reached.
 bool ask_to_stop(const store::Store& store, const Job& job, int signal) {
   const std::optional<outcome::Attempt> attempt = outcome::read_attempt(store.work_folder(job.id));
-  if (!attempt || process::find_life(attempt->process) != process::Life::running) return false;
+  if (!attempt || !is_attempt_of(job, attempt->process)) return false;
   return ::kill(attempt->process.pid, signal) == 0;
 }
 
@@ -71,6 +72,16 @@ void sleep_ms(long milliseconds) {
 }
 
 }  // namespace
+
+bool is_attempt_of(const Job& job, const process::Identity& found) {
+  const bool is_token = job.token.size() == 32 && job.token.find_first_not_of("0123456789abcdef") == std::string::npos;
+  if (!is_token || process::find_life(found) != process::Life::running) return false;
+  std::ifstream words(fmt::format("/proc/{}/cmdline", found.pid), std::ios::binary);
+  for (std::string word; std::getline(words, word, '\0');) {
+    if (word == job.token) return true;
+  }
+  return false;
+}
 
 Standing find_standing(const store::Store& store, const Job& job) {
   const std::filesystem::path work = store.work_folder(job.id);
@@ -140,7 +151,7 @@ void settle_unbegun(const store::Store& store, registry::Registry& registry, con
 
 void settle_unstarted(const store::Store& store, registry::Registry& registry, const Job& job, const std::string& refusal) {
   outcome::Outcome outcome = outcome::make_killed(job.token);
-  outcome.cause = store::is_disk_full(store.root()) ? outcome::Cause::disk_full : outcome::Cause::system;
+  outcome.cause = store::is_disk_full(store.root(), refusal) ? outcome::Cause::disk_full : outcome::Cause::system;
   outcome.reason = refusal;
   change_running(
       registry, job, [&](Job& row) { apply(row, outcome); }, nullptr);

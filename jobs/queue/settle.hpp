@@ -1,5 +1,5 @@
 // Rows and the processes behind them: what became of attempts, cancel, retry. Used by everything that opens the registry, so that no row
-// stays "running" when nobody works on it.
+// stays "running" when no attempt runs.
 #pragma once
 
 #include <functional>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "jobs/outcome/outcome.hpp"
+#include "jobs/process/process.hpp"
 #include "jobs/registry/registry.hpp"
 #include "jobs/store/store.hpp"
 
@@ -16,11 +17,15 @@ namespace carillon::queue {
 enum class Standing {
   working,   // a process works in its folder
   starting,  // claimed, and who claimed it or was started for it is there
-  ended,     // worked on, and nobody is there any more
+  ended,     // its attempt has ended
   unbegun,   // claimed, and whoever claimed it is gone before anything began
   elsewhere  // claimed on another machine
 };
 Standing find_standing(const store::Store& store, const registry::Job& job);
+
+/// Whether a process that lives is the attempt of this row: it was started with the row's token. attempt.json, which every member of a
+/// group may write, can name another process, and that must get no signal.
+bool is_attempt_of(const registry::Job& job, const process::Identity& found);
 
 /// Changes a row by what came of its attempt: done, failed, cancelled (when that was wanted), waiting or queued. Pure.
 void apply(registry::Job& job, const outcome::Outcome& outcome);
@@ -46,7 +51,7 @@ struct Said {
 /// carillon::slurm looks after them.
 Said cancel(const store::Store& store, registry::Registry& registry, const store::Id& id, double patience_s = 90.0);
 
-/// Cancels a row that nobody works on; its reason says what it was, and why it had failed or waited. Pure.
+/// Cancels a row without a running attempt; its reason says what it was, and why it had failed or waited. Pure.
 void cancel_unstarted(registry::Job& job);
 
 /// Puts a failed or cancelled job back into the queue, with its checkpoint and a new count of retries; a waiting one is ready at once.

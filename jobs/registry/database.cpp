@@ -1,10 +1,13 @@
 // Method:     SQLite in WAL mode; every commit is synced before it returns (synchronous=FULL).
-// Source:     sqlite.org: wal.html, pragma.html, rescode.html.
+// Source:     sqlite.org: wal.html, pragma.html, rescode.html, vfs.html, fileformat2.html (the rollback journal).
 // Deviations: none.
 #include "jobs/registry/database.hpp"
 
 #include <fmt/core.h>
 #include <unistd.h>
+
+#include <cstring>
+#include <string_view>
 
 #include "jobs/store/files.hpp"
 #include "runtime/config/error.hpp"
@@ -13,6 +16,29 @@ namespace carillon::registry {
 namespace {
 
 constexpr int kBusyMs = 60'000;
+constexpr const char* kFilesName = "carillon-registry";
+
+/// SQLite's own access to files, but for what a journal that somebody else put beside the registry could ask for: it may name a "super
+/// journal", any file at all, which SQLite reads and then removes. The registry never has one.
+const char* find_files() {
+  static sqlite3_vfs& system = *sqlite3_vfs_find(nullptr);
+  static sqlite3_vfs own = system;
+  static const int code = [] {
+    own.zName = "carillon-registry";
+    own.pNext = nullptr;
+    own.xOpen = [](sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* flags_out) {
+      file->pMethods = nullptr;
+      return (flags & SQLITE_OPEN_SUPER_JOURNAL) != 0 ? SQLITE_CORRUPT : system.xOpen(&system, name, file, flags, flags_out);
+    };
+    own.xDelete = [](sqlite3_vfs*, const char* name, int syncs_folder) {
+      const std::string_view text = name;
+      const bool is_ours = text.ends_with("-journal") || text.ends_with("-wal") || text.ends_with("-shm");
+      return is_ours ? system.xDelete(&system, name, syncs_folder) : SQLITE_CORRUPT;
+    };
+    return sqlite3_vfs_register(&own, 0);
+  }();
+  return code == SQLITE_OK ? own.zName : nullptr;
+}
 
 }  // namespace
 
@@ -21,7 +47,8 @@ Database::Database(const std::filesystem::path& file) : file_(file) {
   std::error_code none;
   const std::filesystem::path folder = std::filesystem::canonical(file.parent_path(), none);
   const std::filesystem::path name = none ? file : folder / file.filename();
-  const int code = sqlite3_open_v2(name.c_str(), &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_NOFOLLOW, nullptr);
+  const int code =
+      sqlite3_open_v2(name.c_str(), &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_NOFOLLOW, find_files());
   try {
     if (code != SQLITE_OK) fail(code);
     sqlite3_extended_result_codes(handle_, 1);
@@ -55,14 +82,17 @@ void Database::run(const char* sql) {
 
 void Database::fail(int code) const {
   std::string what = fmt::format("{}: {}", file_.string(), handle_ != nullptr ? sqlite3_errmsg(handle_) : sqlite3_errstr(code));
-  // A full disk shows itself in many ways: no log, no shared memory, no journal.
-  const bool is_full = file_.has_parent_path() && store::is_disk_full(file_.parent_path());
+  // A full disk shows itself in many ways: no log, no shared memory, no journal. A quota is told by errno alone.
+  const int number = handle_ != nullptr ? sqlite3_system_errno(handle_) : 0;
+  const bool is_refused = (code & 0xFF) == SQLITE_IOERR && store::is_full_error(number);
+  if (is_refused) what += fmt::format(" ({})", std::strerror(number));
+  const bool is_full = is_refused || (file_.has_parent_path() && store::is_disk_full(file_.parent_path()));
   if (is_full && (code & 0xFF) != SQLITE_FULL && (code & 0xFF) != SQLITE_BUSY && (code & 0xFF) != SQLITE_CORRUPT &&
       (code & 0xFF) != SQLITE_NOTADB)
-    throw SystemError(what + "; the disk is full: make room on it (carillon gc lists what could go) and try again");
+    throw SystemError(fmt::format("{}; {}", what, store::kFullAdvice));
   switch (code & 0xFF) {
     case SQLITE_FULL:
-      throw SystemError(what + "; the disk is full: make room on it (carillon gc lists what could go) and try again");
+      throw SystemError(fmt::format("{}; {}", what, store::kFullAdvice));
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       throw SystemError(what + " by another process for a minute; find out what it does, and try again");

@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 constexpr const char* kLogName = "submissions.jsonl";
 constexpr std::size_t kMostLineBytes = 32 << 20;
 
-/// A job whose attempt lives is running, whatever the registry has forgotten. Of a node of Slurm nobody here can say that it is gone.
+/// A job whose attempt lives is running, whatever the registry has forgotten. Whether a node of Slurm is gone cannot be told here.
 bool adopt_attempt(Job& job, const fs::path& work) {
   const auto attempt = outcome::read_attempt(work);
   if (!attempt) return false;
@@ -152,7 +152,7 @@ fs::path set_aside(const fs::path& file) {
   fs::path target;
   for (int n = 1; target.empty() || fs::exists(target, error); ++n)
     target = file.parent_path() / fmt::format("registry.damaged-{}.sqlite", n);
-  for (const char* ending : {"-wal", "-shm", ""}) {  // the file itself last: until then the damage is seen again
+  for (const char* ending : {"-journal", "-wal", "-shm", ""}) {  // the file itself last: until then the damage is seen again
     fs::rename(fs::path(file) += ending, fs::path(target) += ending, error);
     if (error && error != std::errc::no_such_file_or_directory) store::throw_errno(file, "set aside this damaged registry", error.value());
   }

@@ -37,6 +37,12 @@ std::pair<dev_t, ino_t> find_file(const fs::path& file) {
 /// Makes the file unless it is there: its group gets the rights of the store, and SQLite gives the same to the files beside it.
 void make_file(const fs::path& file) {
   struct stat info {};
+  for (const char* ending : {"-journal", "-wal", "-shm"}) {
+    const fs::path beside = fs::path(file) += ending;
+    if (::lstat(beside.c_str(), &info) != 0 || S_ISREG(info.st_mode)) continue;
+    throw InputError(fmt::format("{}: {}, and the registry keeps a file of its own here; find out who put it there, and remove it",
+                                 beside.string(), S_ISLNK(info.st_mode) ? "this is a link" : "this is something else"));
+  }
   if (::lstat(file.c_str(), &info) == 0) {
     if (!S_ISREG(info.st_mode))
       throw InputError(fmt::format("{}: the registry must be a regular file; remove what is there", file.string()));

@@ -35,11 +35,10 @@ void make_folder(const fs::path& folder) {
 }
 
 void throw_errno(const fs::path& path, const std::string& verb, int error) {
-  const char* mend = error == ENOSPC || error == EDQUOT
-                         ? "the disk is full: make room on it (carillon gc lists what could go) and try again"
-                     : error == EACCES || error == EPERM || error == EROFS ? "check owner, group and rights"
-                                                                           : "check the disk";
-  throw SystemError(fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), mend));
+  const char* advice = is_full_error(error)                                  ? kFullAdvice
+                       : error == EACCES || error == EPERM || error == EROFS ? "check owner, group and rights"
+                                                                             : "check the disk";
+  throw SystemError(fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), advice));
 }
 
 bool append_text(const fs::path& file, const std::string& text) {
@@ -50,6 +49,13 @@ bool append_text(const fs::path& file, const std::string& text) {
   const bool is_written = is_ours && ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
   ::close(fd);
   return is_written;
+}
+
+bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT; }
+
+bool is_disk_full(const fs::path& folder, std::string_view message) {
+  const auto says = [&](int error) { return message.find(std::strerror(error)) != std::string_view::npos; };
+  return is_disk_full(folder) || says(ENOSPC) || says(EDQUOT);
 }
 
 bool is_disk_full(const fs::path& folder) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace carillon::store {
 
@@ -13,13 +14,20 @@ void sync_folder(const std::filesystem::path& folder);
 /// Makes one folder unless it is there. SystemError when the disk refuses.
 void make_folder(const std::filesystem::path& folder);
 
-/// Throws SystemError "path: cannot VERB: reason; mend" with the mend that fits errno.
+/// Throws SystemError "path: cannot VERB: reason; correction" with the correction that fits errno.
 [[noreturn]] void throw_errno(const std::filesystem::path& path, const std::string& verb, int error);
 
 /// Appends to a regular file, which is made unless it is there; follows no link and waits for no pipe. False when that cannot be.
 bool append_text(const std::filesystem::path& file, const std::string& text);
 
+/// errno's values for a disk, or a user's share of it, that takes no more.
+bool is_full_error(int error);
+/// What to do then, as the end of a message.
+inline constexpr const char* kFullAdvice = "the disk or quota is full: make room on it (carillon gc lists what could go) and try again";
+
 /// Whether hardly a byte is free on the file system of `folder`.
 bool is_disk_full(const std::filesystem::path& folder);
+/// The same, or `message`, of an error, says so: how full a quota is cannot be asked.
+bool is_disk_full(const std::filesystem::path& folder, std::string_view message);
 
 }  // namespace carillon::store

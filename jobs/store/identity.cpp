@@ -32,6 +32,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kHeadBytes = 4096;
 constexpr std::uint64_t kMostJobBytes = 64 << 20;
+constexpr std::size_t kMostTexts = 50;
 constexpr const char* kScheme = "carillon identity 1";
 
 Json::Value parse_json(const std::string& text) {
@@ -48,6 +49,48 @@ void drop_signs_of_zero(Json::Value& value) {
   if (value.type() == Json::realValue && value.asDouble() == 0.0) value = 0.0;
   if (value.isArray() || value.isObject()) {
     for (Json::Value& member : value) drop_signs_of_zero(member);
+  }
+}
+
+/// A resolved job without paths on one line.
+std::string make_canonical(Json::Value root) {
+  root.removeMember("mesh");
+  if (root["body"].isObject()) root["body"].removeMember("surface");
+  if (root["body"].isNull()) root.removeMember("body");
+  drop_signs_of_zero(root);
+  Json::StreamWriterBuilder writer;
+  writer["indentation"] = "";
+  writer["precision"] = 17;
+  writer["emitUTF8"] = true;
+  return Json::writeString(writer, root);
+}
+
+/// What a record of a run (JSON) has in common with a request.
+enum class Origin { same, unknown, another_job, another_input };
+
+/// An object of JSON; null for anything else.
+Json::Value parse_object(const std::string& text) {
+  Json::Value root;
+  std::istringstream stream(text);
+  std::string errors;
+  try {
+    if (Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) && root.isObject()) return root;
+  } catch (const Json::Exception&) {  // too deep
+  }
+  return {};
+}
+
+/// As JSON, not as a job: the words of the schema at that time are those of the request.
+Origin compare_origin(Json::Value root, const Request& request) {
+  if (!root.isObject()) return Origin::unknown;
+  try {
+    const Json::Value& named = request.input_kind == "surface" ? root["body"]["surface"] : root["mesh"];
+    const std::string input = named.isString() ? fs::path(named.asString()).stem().string() : "";
+    for (const char* key : {"run", "bank"}) root.removeMember(key);
+    if (make_canonical(root) != request.job) return Origin::another_job;
+    return request.input_kind == "shape" || input == request.input_sha256 ? Origin::same : Origin::another_input;
+  } catch (const Json::Exception&) {
+    return Origin::unknown;
   }
 }
 
@@ -189,7 +232,7 @@ spec::JobSpec make_job(const Store& store, const Request& request, const Id& id)
   return spec::parse_job(Json::writeString(writer, root), work / kJobFile);
 }
 
-/// A folder of work that nobody works in and that is not what was submitted.
+/// A folder of work that is not what was submitted, and in which no attempt runs.
 bool is_spoilt(const Store& store, const Id& id) {
   try {
     const OpenFolder work = store.open_work(id);
@@ -204,15 +247,7 @@ bool is_spoilt(const Store& store, const Id& id) {
 std::string make_canonical_job(const spec::JobSpec& job) {
   spec::JobSpec bare = job;
   bare.bank.clear();
-  Json::Value root = parse_json(spec::resolved_json(bare, "/", ""));
-  root.removeMember("mesh");
-  if (root.isMember("body")) root["body"].removeMember("surface");
-  drop_signs_of_zero(root);
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "";
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
-  return Json::writeString(writer, root);
+  return make_canonical(parse_json(spec::resolved_json(bare, "/", "")));
 }
 
 const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const std::string& what) {
@@ -310,16 +345,73 @@ std::optional<std::string> find_job_fault(const Store& store, const Id& id, cons
 }
 
 std::optional<std::string> find_origin_fault(const std::string& provenance, const Request& request) {
-  try {
-    const spec::JobSpec job = spec::parse_job(provenance, "/the record in the bank");
-    if (make_canonical_job(job) != request.job) return "the bank was made of another job than this one";
-    const std::string name = get_input(job).stem().string();
-    if (request.input_kind != "shape" && name != request.input_sha256)
-      return fmt::format("the bank was made of another {} than this job's", request.input_kind);
-    return std::nullopt;
-  } catch (const InputError&) {
-    return "the bank does not tell which job it was made of";
+  switch (compare_origin(parse_object(provenance), request)) {
+    case Origin::same:
+      return std::nullopt;
+    case Origin::unknown:
+      return "the bank does not tell which job it was made of";
+    case Origin::another_job:
+      return "the bank was made of another job than this one";
+    case Origin::another_input:
+      break;
   }
+  return fmt::format("the bank was made of another {} than this job's", request.input_kind);
+}
+
+std::optional<std::string> find_resolved_fault(const fs::path& folder, const Id& id) {
+  std::optional<Request> request;
+  try {
+    request = read_request(folder);
+  } catch (const InputError&) {
+    return "its request.json cannot be read";
+  }
+  if (!request) return "its request.json is missing";
+  if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
+  std::string text;
+  try {
+    text = config::read_file(folder / kJobFile, "record", kMostJobBytes);
+  } catch (const InputError&) {
+    return "its job.json is missing, or cannot be read";
+  }
+  switch (compare_origin(parse_object(text), *request)) {
+    case Origin::same:
+      return std::nullopt;
+    case Origin::unknown:
+      return text.empty() ? "its job.json is empty" : "its job.json is cut or damaged";
+    default:
+      return "its job.json is that of another job";
+  }
+}
+
+std::string name_job(const std::string& message, const Id& id, const std::string& name) {
+  const std::string copy = fmt::format("/{}/{}", id.text(), kJobFile);
+  const std::size_t at = message.find(copy);
+  if (at == std::string::npos || message[0] != '/') return message;
+  std::size_t end = at + copy.size();
+  if (const std::size_t digits = message.find_first_not_of("0123456789", end + 1);
+      message.compare(end, 1, ":") == 0 && digits != std::string::npos && digits > end + 1)
+    end = digits;
+  return name + message.substr(end);
+}
+
+std::vector<std::string> read_warnings(const Store& store, const Id& id, const std::string& name) {
+  std::vector<std::string> texts;
+  const fs::path folder = store.bank_folder(id);
+  try {
+    const Json::Value root = parse_object(config::read_file(folder / kJobFile, "record", kMostJobBytes));
+    const Json::Value& list = root["run"]["warnings"];
+    if (list.empty()) return texts;
+    const std::optional<Request> request = read_request(folder);
+    if (!request || request->id != id.text() || calc_id(*request) != id || compare_origin(root, *request) != Origin::same) return texts;
+    for (Json::ArrayIndex i = 0; list.isArray() && i < list.size() && texts.size() < kMostTexts; ++i) {
+      if (!list[i].isString()) continue;
+      const std::string text = name_job(list[i].asString(), id, name);
+      if (std::find(texts.begin(), texts.end(), text) == texts.end()) texts.push_back(text);
+    }
+  } catch (const InputError&) {
+  } catch (const Json::Exception&) {
+  }
+  return texts;
 }
 
 bool restore_input(const Store& store, const Request& request) {

@@ -95,7 +95,7 @@ OpenFolder OpenFolder::make_private(const std::string& name) const {
   // Someone else may have put a folder of their own in its place.
   if (!made || ::fstat(made->get(), &info) != 0 || info.st_uid != ::geteuid())
     throw SystemError(fmt::format("{}: another user replaced this folder of the store while it was being made", (name_ / name).string()));
-  ::fchmod(made->get(), 0700);
+  ::fchmod(made->get(), 0700 | (info.st_mode & S_ISGID));  // what is made in it belongs to the group of the store
   return std::move(*made);
 }
 

@@ -153,26 +153,6 @@ void write_standing(const fs::path& folder, const Standing& standing) {
   config::write_file(folder / kStandingFile, format_standing(standing));
 }
 
-std::vector<std::string> read_warnings(const fs::path& folder) {
-  constexpr std::uint64_t kMostBytes = 64 << 20;
-  constexpr std::size_t kMostTexts = 50;
-  std::vector<std::string> texts;
-  try {
-    Json::Value root;
-    std::string errors;
-    std::istringstream stream(config::read_file(folder / kJobFile, "record", kMostBytes));
-    if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) || !root.isObject() || !root["run"].isObject()) return {};
-    const Json::Value& list = root["run"]["warnings"];
-    for (Json::ArrayIndex i = 0; list.isArray() && i < list.size() && texts.size() < kMostTexts; ++i) {
-      if (list[i].isString() && std::find(texts.begin(), texts.end(), list[i].asString()) == texts.end())
-        texts.push_back(list[i].asString());
-    }
-  } catch (const InputError&) {
-  } catch (const Json::Exception&) {
-  }
-  return texts;
-}
-
 std::optional<Progress> read_progress(const fs::path& folder) {
   const std::string text = read_tail(folder / "progress.jsonl", 1 << 16);
   for (std::size_t end = text.rfind('\n'); end != std::string::npos && end > 0;) {

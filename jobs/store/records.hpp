@@ -55,10 +55,6 @@ std::optional<Standing> read_standing(const std::filesystem::path& folder);
 /// Reads only the end of the file; a line that is cut or no JSON is passed over. Never throws for content.
 std::optional<Progress> read_progress(const std::filesystem::path& folder);
 
-/// What the solver warned of, from the record beside a bank (member "run" of job.json): each text once, at most fifty. Never throws for
-/// content.
-std::vector<std::string> read_warnings(const std::filesystem::path& folder);
-
 /// `folder`/request.json and so on. SystemError when the disk refuses.
 void write_request(const std::filesystem::path& folder, const Request& request);
 /// The text of request.json, or of one line of submissions.jsonl; and back.

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -22,6 +23,8 @@
 
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
+#include "runtime/bank/bank.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/config/file.hpp"
 
@@ -61,7 +64,7 @@ fs::path find_root(const fs::path& folder) {
 void make_root(const fs::path& root) {
   std::error_code error;
   fs::create_directories(root, error);
-  if (error == std::errc::no_space_on_device) throw_errno(root, "make this store", ENOSPC);
+  if (is_full_error(error.value())) throw_errno(root, "make this store", error.value());
   if (error || !fs::is_directory(root, error))
     throw InputError(fmt::format("{}: cannot make this store: {}; choose another folder with --store", root.string(),
                                  error ? error.message() : "this is no folder"));
@@ -90,7 +93,7 @@ void check_rights(const fs::path& folder) {
   const int error = errno;
   struct stat info {};
   ::stat(folder.c_str(), &info);
-  if (error == ENOSPC || error == EROFS) throw_errno(folder, "write to this store", error);
+  if (is_full_error(error) || error == EROFS) throw_errno(folder, "write to this store", error);
   throw InputError(
       fmt::format("{}: you (user {}) may not write to this store: its folder belongs to user {} and group {}, rights {:04o}; a store for a "
                   "group is made with "
@@ -236,12 +239,14 @@ bool rename_into(const OpenFolder& from, const std::string& name, const OpenFold
   throw_errno(shard.name() / id.text(), "rename", errno);
 }
 
-/// bank.sum: what a bank was when it was published.
+/// bank.sum: what a bank was when it was published, on one line; then a line for each record beside it, with its name and SHA-256.
 struct Sum {
   std::string id, sha256, head;  // head: SHA-256 of the first bytes
   long long bytes = 0, written_ns = 0;
+  std::map<std::string, std::string> records;
 };
 constexpr const char* kSumWord = "carillon-bank-sum-1";
+constexpr std::array kRecords{kJobFile, kRequestFile, kOutcomeFile};
 
 std::string read_head(int file, std::size_t most) {
   std::string head(most, '\0');
@@ -258,18 +263,55 @@ std::optional<Sum> read_sum(const OpenFolder& folder) {
   std::istringstream stream(read_head(file.value, 1000));
   std::string word;
   Sum sum;
-  if (stream >> word >> sum.id >> sum.sha256 >> sum.head >> sum.bytes >> sum.written_ns && word == kSumWord) return sum;
-  return Sum{};  // damaged itself: fits nothing
+  if (!(stream >> word >> sum.id >> sum.sha256 >> sum.head >> sum.bytes >> sum.written_ns) || word != kSumWord || !parse_id(sum.id))
+    return Sum{};  // damaged itself: fits nothing
+  for (std::string name, sha256; stream >> name >> sha256;) sum.records[name] = sha256;
+  return sum;
 }
 
-void write_sum(const OpenFolder& folder, const Id& id) {
+/// SHA-256 of a regular file in a folder; empty when there is none that can be read.
+std::string hash_record(const OpenFolder& folder, const char* name) {
+  const File file{open_regular(folder, name)};
+  return file.value < 0 ? "" : hash_file(fmt::format("/proc/self/fd/{}", file.value), "record").text();
+}
+
+/// With the records as they are.
+void write_sum(const OpenFolder& folder, const Sum& sum) {
+  std::string text = fmt::format("{} {} {} {} {} {}\n", kSumWord, sum.id, sum.sha256, sum.head, sum.bytes, sum.written_ns);
+  for (const char* name : kRecords) {
+    if (const std::string sha256 = hash_record(folder, name); !sha256.empty()) text += fmt::format("{} {}\n", name, sha256);
+  }
+  config::write_file(folder.path() / kSumFile, text);
+}
+
+Sum calc_sum(const OpenFolder& folder, const Id& id) {
   const File bank{open_regular(folder, kBankFile)};
   struct stat info {};
   if (bank.value < 0 || ::fstat(bank.value, &info) != 0) throw_errno(folder.name() / kBankFile, "read", errno);
-  const Id sha256 = hash_file(folder.path() / kBankFile, "bank");
-  config::write_file(folder.path() / kSumFile, fmt::format("{} {} {} {} {} {}\n", kSumWord, id.text(), sha256.text(),
-                                                           hash_text(read_head(bank.value, kHeadBytes)).text(),
-                                                           static_cast<long long>(info.st_size), find_written_ns(info)));
+  return {id.text(),
+          hash_file(folder.path() / kBankFile, "bank").text(),
+          hash_text(read_head(bank.value, kHeadBytes)).text(),
+          static_cast<long long>(info.st_size),
+          find_written_ns(info),
+          {}};
+}
+
+/// Why a bank is not sane, or was not made of the job of `id`, as all its bytes tell. What its own records do not tell is no fault where
+/// `has_sum` says that it is what was published.
+std::optional<std::string> find_content_fault(const OpenFolder& folder, const Id& id, bool has_sum) {
+  try {
+    const bank::Bank bank = bank::read_bank(folder.path() / kBankFile);
+    std::optional<Request> request;
+    try {
+      request = read_request(folder.path());
+    } catch (const InputError&) {
+    }
+    if (request && (request->id != id.text() || calc_id(*request) != id)) request.reset();
+    if (!request) return has_sum ? std::nullopt : std::optional("its request.json is not what was submitted");
+    return bank.provenance.empty() ? std::nullopt : find_origin_fault(bank.provenance, *request);
+  } catch (const InputError& error) {
+    return show_names(folder, error.what());
+  }
 }
 
 }  // namespace
@@ -344,7 +386,8 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
     if (file.value < 0 || ::fstat(file.value, &info) != 0) return "its bank is no regular file";
     if (info.st_size == 0) return "its bank is empty";
     const auto sum = read_sum(*folder);
-    if (!sum) return std::nullopt;  // of an earlier version: carillon verify reads it
+    if (!sum) return look == Look::quick ? std::nullopt : find_content_fault(*folder, id, false);  // of an earlier version
+    if (sum->id.empty()) return "its bank.sum is damaged";
     if (sum->id != id.text()) return "its folder is that of another bank";
     if (info.st_size < sum->bytes) return fmt::format("its bank is cut: {} bytes of {}", info.st_size, sum->bytes);
     if (info.st_size != sum->bytes) return fmt::format("its bank has {} bytes instead of {}", info.st_size, sum->bytes);
@@ -357,12 +400,43 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
       if (own.value >= 0) (void)!::futimens(own.value, nullptr);
       return "its bank is damaged: its bytes are no longer those that were computed";
     }
-    return std::nullopt;
+    return look == Look::content ? find_content_fault(*folder, id, true) : std::nullopt;
   } catch (const SystemError& error) {
     return error.what();
   } catch (const InputError& error) {
     return error.what();
   }
+}
+
+std::optional<std::string> Store::find_record_change(const Id& id) const {
+  const OpenFolder folder = open_bank(id);
+  const auto sum = read_sum(folder);
+  for (const auto& [name, sha256] : sum ? sum->records : std::map<std::string, std::string>()) {
+    const bool is_ours = std::any_of(kRecords.begin(), kRecords.end(), [&](const char* record) { return name == record; });
+    if (!is_ours) continue;
+    const auto info = folder.look_at(name);
+    if (!info) return fmt::format("its {} is missing", name);
+    if (hash_record(folder, name.c_str()) != sha256 && (!S_ISREG(info->st_mode) || info->st_size == 0))
+      return fmt::format("its {} is {}", name, S_ISREG(info->st_mode) ? "empty" : "no regular file");
+    if (hash_record(folder, name.c_str()) != sha256) return fmt::format("its {} is not what was published", name);
+  }
+  return std::nullopt;
+}
+
+void Store::replace_records(const Id& id, const Temporary& folder) const {
+  const OpenFolder bank = open_bank(id);
+  if (::fchmod(bank.get(), 0755) != 0) throw_errno(bank.name(), "write to this folder", errno);
+  for (const std::string& name : folder.content().list()) {
+    seal_file(folder.content(), name);
+    if (bank.look_at(name)) bank.remove(name);
+    if (::renameat(folder.content().get(), name.c_str(), bank.get(), name.c_str()) != 0) throw_errno(bank.name() / name, "write", errno);
+  }
+  if (const auto sum = read_sum(bank); sum && sum->id == id.text()) {
+    write_sum(bank, *sum);
+    seal_file(bank, kSumFile);
+  }
+  bank.sync();
+  ::fchmod(bank.get(), 0555);
 }
 
 std::string Store::set_bank_aside(const Id& id) const {
@@ -387,10 +461,10 @@ std::string Store::set_bank_aside(const Id& id) const {
 
 OpenFolder Store::open_folder(const std::string& name) const { return OpenFolder::open(root_).make(name); }
 
-OpenFolder Store::open_work(const Id& id) const {
-  const auto shard = find_shard("work", id);
+OpenFolder Store::open_job(const char* folder_name, const Id& id) const {
+  const auto shard = find_shard(folder_name, id);
   auto folder = shard ? shard->find(id.text()) : std::nullopt;
-  if (!folder) throw_errno(work_folder(id), "open this folder", ENOENT);
+  if (!folder) throw_errno(sharded(root_ / folder_name, id), "open this folder", ENOENT);
   return std::move(*folder);
 }
 
@@ -448,7 +522,7 @@ bool Store::publish(const Id& id, const Temporary& folder) const {
     if (has_bank(id)) return end(false);
     if (round == 0) {
       sync_tree(folder.content(), true);
-      write_sum(folder.content(), id);
+      write_sum(folder.content(), calc_sum(folder.content(), id));
       seal_file(folder.content(), kSumFile);
       folder.content().sync();
     }
@@ -501,8 +575,8 @@ void Store::remove_folder(const char* folder, const Id& id) const {
   std::optional<Temporary> temporary;
   try {
     temporary.emplace(make_temporary());
-  } catch (const SystemError&) {
-    if (!is_disk_full(root_)) throw;
+  } catch (const SystemError& error) {
+    if (!is_disk_full(root_, error.what())) throw;
   }
   // A full disk may have no room for another folder: what is left in the middle of this is no whole bank and no job, and is seen as such.
   if (!temporary) return shard->remove(id.text());

@@ -38,7 +38,8 @@ inline constexpr const char* kStandingFile = "state.json";
 inline constexpr const char* kProgressFile = "progress.jsonl";
 inline constexpr const char* kCheckpointFile = "checkpoint.hdf";
 inline constexpr const char* kReportFile = "report.html";
-inline constexpr const char* kSumFile = "bank.sum";  // what the bank was when it was published
+inline constexpr const char* kOutcomeFile = "outcome.json";
+inline constexpr const char* kSumFile = "bank.sum";  // what the bank and its records were when it was published
 
 /// Holds the store's lock while it lives.
 class Lock {
@@ -74,9 +75,9 @@ class Temporary {
   OpenFolder own_, content_;
 };
 
-/// How thoroughly a bank is looked at: by its size, its first bytes (they hold the hash of the rest) and the time it was written; or by
-/// all its bytes.
-enum class Look { quick, full };
+/// How thoroughly a bank is looked at: by its size, its first bytes (they hold the hash of the rest) and the time it was written; by all
+/// its bytes; or by all its bytes and what they say. A bank without bank.sum (an earlier version made it) is read whole for `full` too.
+enum class Look { quick, full, content };
 
 class Store {
  public:
@@ -102,10 +103,16 @@ class Store {
   bool has_work(const Id& id) const;
   /// Why the bank of `id` is not what was published, in one sentence; none when it is.
   std::optional<std::string> find_bank_fault(const Id& id, Look look) const;
+  /// Which of the records beside the bank (job.json, request.json, outcome.json) is not what was published, in one sentence; none when all
+  /// are, or when bank.sum does not say.
+  std::optional<std::string> find_record_change(const Id& id) const;
+  /// Puts the files of a temporary folder in place of those beside a bank, read-only. SystemError when that cannot be.
+  void replace_records(const Id& id, const Temporary& folder) const;
   /// Sets a bank aside into damaged/; the folder's new name there. Empty when there was none.
   std::string set_bank_aside(const Id& id) const;
-  /// The folder of work by descriptor, to write in. SystemError when it is not there, or a link.
-  OpenFolder open_work(const Id& id) const;
+  /// The folder of work by descriptor, to write in; that of a bank. SystemError when it is not there, or a link.
+  OpenFolder open_work(const Id& id) const { return open_job("work", id); }
+  OpenFolder open_bank(const Id& id) const { return open_job("banks", id); }
   /// "tmp", "inputs" ... by descriptor; made when it is not there. SystemError when it is a link.
   OpenFolder open_folder(const std::string& name) const;
   /// inputs/ab, made when it is not there.
@@ -146,6 +153,7 @@ class Store {
  private:
   Lock take_lock(int operation) const;
   std::optional<OpenFolder> find_shard(const char* folder, const Id& id) const;
+  OpenFolder open_job(const char* folder, const Id& id) const;
   void remove_folder(const char* folder, const Id& id) const;
   explicit Store(std::filesystem::path root) : root_(std::move(root)) {}
   std::filesystem::path root_;  // absolute

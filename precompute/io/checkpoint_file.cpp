@@ -3,13 +3,15 @@
 //             columns by groups of 16: of each group node after node, of each node x, y, z, of each the group's columns. SHA-256 guards all
 //             but the columns, whose records are mixed one by one and summed, so that each rank does it for its own. A new file is
 //             written beside the old one, brought to the disk, and renamed.
-// Source:     MPI 3.1, chapter 13 (files); POSIX.1-2008 (rename, fsync).
-// Deviations: no HDF5: its reader trusts what it reads, and a file of it that was cut or flipped can end the process.
+// Source:     POSIX.1-2008 (open, pread, pwrite, fcntl, rename, fsync); nfs(5), "data and metadata coherence".
+// Deviations: no HDF5: its reader trusts what it reads, and a file of it that was cut or flipped can end the process. No MPI-IO: it opens
+//             files by name on every rank, follows links, and puts files of its own beside them.
 #include "precompute/io/checkpoint_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -39,7 +41,6 @@ constexpr std::int64_t kAlign = 4096;          // of the first column
 constexpr std::int64_t kMostText = 1LL << 32;  // bytes of settings and numbers
 constexpr std::int64_t kMostRows = 1LL << 31, kMostColumns = 1LL << 24;
 constexpr std::size_t kMostSettings = 100;
-constexpr int kPiece = 1 << 22;     // doubles to or from the disk at once
 constexpr double kLeastPause = 20;  // times what the last save took, until the next
 
 struct RawHeader {
@@ -81,13 +82,6 @@ std::uint64_t sum_records(const std::vector<double>& records, std::int64_t first
   return sum;
 }
 
-std::string describe_error(int code) {
-  char text[MPI_MAX_ERROR_STRING] = "";
-  int size = 0;
-  MPI_Error_string(code, text, &size);
-  return text;
-}
-
 /// Opens, does, closes. Throws SystemError with errno's words.
 void with_descriptor(const fs::path& file, int flags, const std::function<bool(int)>& work) {
   const int descriptor = ::open(file.c_str(), flags | O_CLOEXEC | ((flags & O_DIRECTORY) != 0 ? 0 : O_NOFOLLOW), 0666);
@@ -111,52 +105,101 @@ int find_width(std::int64_t columns, std::int64_t group) {
 
 }  // namespace
 
-/// A file of all ranks; closed with it, which is collective.
+/// A file of all ranks, each with a descriptor of its own. Others may write to its folder: a new file is made by rank 0 alone, no link is
+/// followed, and every rank makes sure that it has opened that file. Making one and sync() are collective.
 class SharedFile {
  public:
-  SharedFile(MPI_Comm comm, const fs::path& file, int mode) : comm_(comm) {
-    const int code = MPI_File_open(comm, file.c_str(), mode, MPI_INFO_NULL, &file_);
-    if (code != MPI_SUCCESS) file_ = MPI_FILE_NULL;
+  enum class Use { create, read };
+  SharedFile(MPI_Comm comm, const fs::path& file, Use use) : comm_(comm) {
+    int rank = 0;
+    MPI_Comm_rank(comm, &rank);
+    const bool creates = use == Use::create;
+    // A name without a folder is a file of this folder, and a link there is somebody else's; what the user names may be one.
+    const int links = creates || !file.has_parent_path() ? O_NOFOLLOW : 0;
     petsc::run_agreed(comm, [&] {
-      if (code != MPI_SUCCESS) throw SystemError(describe_error(code));
+      if (rank == 0) open(file, links | (creates ? O_WRONLY | O_CREAT | O_EXCL : O_RDONLY));
     });
-  }
-  ~SharedFile() {
-    if (file_ != MPI_FILE_NULL) MPI_File_close(&file_);
+    std::uint64_t number = number_;
+    MPI_Bcast(&number, 1, MPI_UINT64_T, 0, comm);
+    petsc::run_agreed(comm, [&] {
+      if (rank != 0) open(file, links | (creates ? O_WRONLY : O_RDONLY));
+      if (number_ != number) throw SystemError(kReplaced);
+    });
   }
   SharedFile(const SharedFile&) = delete;
   SharedFile& operator=(const SharedFile&) = delete;
 
+  static constexpr const char* kReplaced = "another file has taken its name";
+
   /// Local. Throws SystemError.
-  void write(std::int64_t at, const double* values, std::size_t count) { move(at, count, true, const_cast<double*>(values)); }
-  void read(std::int64_t at, double* values, std::size_t count) { move(at, count, false, values); }
+  void write(std::int64_t at, const void* bytes, std::size_t count) { move(at, count, true, static_cast<char*>(const_cast<void*>(bytes))); }
+  void read(std::int64_t at, void* bytes, std::size_t count) { move(at, count, false, static_cast<char*>(bytes)); }
+  /// What this rank wrote is on the disk. Local.
+  void flush() {
+    if (::fsync(own_.descriptor) != 0) throw SystemError(std::strerror(errno));
+  }
   /// What was written is on the disk. Collective.
   void sync() {
-    const int code = MPI_File_sync(file_);
-    petsc::run_agreed(comm_, [&] {
-      if (code != MPI_SUCCESS) throw SystemError(describe_error(code));
-    });
+    petsc::run_agreed(comm_, [&] { flush(); });
+  }
+  /// Whether `name` leads to this file, and is no link. Local.
+  bool has_name(const fs::path& name) const {
+    struct stat info {};
+    return ::lstat(name.c_str(), &info) == 0 && S_ISREG(info.st_mode) && info.st_ino == number_;
   }
 
  private:
-  void move(std::int64_t at, std::size_t count, bool writes, double* values) {
-    while (count > 0) {
-      const int piece = static_cast<int>(std::min<std::size_t>(count, kPiece));
-      MPI_Status status;
-      const int code = writes ? MPI_File_write_at(file_, at, values, piece, MPI_DOUBLE, &status)
-                              : MPI_File_read_at(file_, at, values, piece, MPI_DOUBLE, &status);
-      if (code != MPI_SUCCESS) throw SystemError(describe_error(code));
-      int done = 0;
-      MPI_Get_count(&status, MPI_DOUBLE, &done);
-      if (done != piece) throw SystemError(writes ? "the disk is full, or refuses" : "the file ends early");
-      at += piece * static_cast<std::int64_t>(sizeof(double));
-      values += piece;
-      count -= static_cast<std::size_t>(piece);
+  void open(const fs::path& file, int flags) {
+    own_.descriptor = ::open(file.c_str(), flags | O_NONBLOCK | O_CLOEXEC, 0666);
+    struct stat info {};
+    struct statfs system {};
+    if (own_.descriptor < 0 || ::fstat(own_.descriptor, &info) != 0) throw SystemError(std::strerror(errno));
+    if (!S_ISREG(info.st_mode) || ((flags & O_ACCMODE) != O_RDONLY && info.st_nlink != 1)) throw SystemError(kReplaced);
+    number_ = info.st_ino;
+    locks_ = ::fstatfs(own_.descriptor, &system) == 0 && system.f_type == kNfs;
+  }
+
+  /// Hosts that write to one page of a file on NFS lose each other's bytes unless each has locked its own. Where there are no locks, it
+  /// goes without.
+  void lock(std::int64_t at, std::size_t count, short kind) {
+    struct flock range {};
+    range.l_type = kind;
+    range.l_whence = SEEK_SET;
+    range.l_start = at;
+    range.l_len = static_cast<off_t>(count);
+    while (locks_ && ::fcntl(own_.descriptor, F_SETLKW, &range) != 0 && errno == EINTR) {
     }
   }
 
+  void move(std::int64_t at, std::size_t count, bool writes, char* bytes) {
+    lock(at, count, writes ? F_WRLCK : F_RDLCK);
+    std::size_t done = 0;
+    int error = 0;
+    while (done < count && error == 0) {
+      const std::size_t piece = std::min(count - done, kPiece);
+      const off_t place = at + static_cast<off_t>(done);
+      const ssize_t got =
+          writes ? ::pwrite(own_.descriptor, bytes + done, piece, place) : ::pread(own_.descriptor, bytes + done, piece, place);
+      if (got > 0) done += static_cast<std::size_t>(got);
+      if (got == 0) break;
+      if (got < 0 && errno != EINTR) error = errno;
+    }
+    lock(at, count, F_UNLCK);
+    if (error != 0) throw SystemError(std::strerror(error));
+    if (done < count) throw SystemError(writes ? "the disk takes no more" : "the file ends early");
+  }
+
+  static constexpr std::size_t kPiece = 32 << 20;  // bytes to or from the disk at once
+  static constexpr long kNfs = 0x6969;             // statfs(2)
   MPI_Comm comm_;
-  MPI_File file_ = MPI_FILE_NULL;
+  struct Own {
+    int descriptor = -1;
+    ~Own() {
+      if (descriptor >= 0) ::close(descriptor);
+    }
+  } own_;
+  std::uint64_t number_ = 0;  // of the file
+  bool locks_ = false;
 };
 
 CheckpointFile::CheckpointFile(MPI_Comm comm, fs::path file, double every_s, const Fingerprint& job, Stations& stations)
@@ -179,7 +222,8 @@ CheckpointFile::~CheckpointFile() = default;
 
 /// Rank 0 only: what is wrong with the file, or nothing; an empty content where there is no file.
 std::string CheckpointFile::read_content(Content& content) const {
-  const int descriptor = ::open(file_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  const int links = file_.has_parent_path() ? 0 : O_NOFOLLOW;  // as of SharedFile
+  const int descriptor = ::open(file_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | links);
   if (descriptor < 0) return errno == ENOENT ? "" : std::string("it cannot be opened: ") + std::strerror(errno);
   struct Closer {
     int descriptor;
@@ -272,14 +316,14 @@ std::string CheckpointFile::verify() {
   if (content_.rows != order_->all()) return "it is of another mesh";
   std::uint64_t sum = 0;
   try {
-    SharedFile file(comm_, file_, MPI_MODE_RDONLY);
+    SharedFile file(comm_, file_, SharedFile::Use::read);
     NodeOrder::Room room;
     petsc::run_agreed(comm_, [&] {
       order_->make_room(kGroup, room);
       for (std::int64_t group = 0; group * kGroup < content_.columns; ++group) {
         const int width = find_width(content_.columns, group);
         room.records.resize(static_cast<std::size_t>(order_->count() * 3 * width));
-        file.read(find_place(content_.data_at, group, width), room.records.data(), room.records.size());
+        file.read(find_place(content_.data_at, group, width), room.records.data(), room.records.size() * sizeof(double));
         sum += sum_records(room.records, order_->first(), static_cast<int>(group), width);
       }
     });
@@ -295,7 +339,7 @@ std::int64_t CheckpointFile::find_place(std::int64_t data_at, std::int64_t group
 }
 
 void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into) const {
-  SharedFile file(comm_, file_, MPI_MODE_RDONLY);
+  SharedFile file(comm_, file_, SharedFile::Use::read);
   NodeOrder::Room room;
   std::vector<double> rows;  // of a group
   petsc::run_agreed(comm_, [&] {
@@ -307,7 +351,7 @@ void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into
     const eigen::Columns part{rows.data(), into.rows, into.rows, find_width(content_.columns, group)};
     petsc::run_agreed(comm_, [&] {
       room.records.resize(static_cast<std::size_t>(order_->count() * 3 * part.count));
-      file.read(find_place(content_.data_at, group, part.count), room.records.data(), room.records.size());
+      file.read(find_place(content_.data_at, group, part.count), room.records.data(), room.records.size() * sizeof(double));
     });
     order_->from_records(room, part);
     for (int j = 0; j < part.count; ++j) {
@@ -364,9 +408,7 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
   RawHeader header{};
   std::string text;
   petsc::run_agreed(comm_, [&] {
-    if (rank_ != 0) return;
-    ::unlink(temporary_.c_str());  // of a run that was killed; O_EXCL then follows no planted link
-    with_descriptor(temporary_, O_WRONLY | O_CREAT | O_EXCL, [](int) { return true; });
+    if (rank_ == 0) ::unlink(temporary_.c_str());  // of a run that was killed
   });
   eigen::NumberWriter settings;
   settings.add(static_cast<std::int64_t>(settings_.size()));
@@ -384,27 +426,19 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
   header.numbers_bytes = static_cast<std::int64_t>(numbers.size());
   const std::int64_t data_at = find_data_start(header.settings_bytes, header.numbers_bytes);
   header.total_bytes = data_at + 24 * header.rows * count;
-  {
-    SharedFile file(comm_, temporary_, MPI_MODE_WRONLY);
-    header.sum = write_columns(file, data_at, count, columns);
-    file.sync();
-  }
+  SharedFile file(comm_, temporary_, SharedFile::Use::create);
+  header.sum = write_columns(file, data_at, count, columns);
+  file.sync();
   petsc::run_agreed(comm_, [&] {
     if (rank_ != 0) return;
     header.sha256 = seal(header, text);
     std::string start(reinterpret_cast<const char*>(&header), sizeof header);
     start += text;
     start.resize(static_cast<std::size_t>(data_at), '\0');
-    with_descriptor(temporary_, O_WRONLY, [&](int descriptor) {
-      for (std::size_t done = 0; done < start.size();) {
-        const ssize_t put = ::pwrite(descriptor, start.data() + done, start.size() - done, static_cast<off_t>(done));
-        if (put < 0 && errno == EINTR) continue;
-        if (put <= 0) return false;
-        done += static_cast<std::size_t>(put);
-      }
-      return ::fsync(descriptor) == 0;
-    });
+    file.write(0, start.data(), start.size());
+    file.flush();
     if (::rename(temporary_.c_str(), file_.c_str()) != 0) throw SystemError(std::strerror(errno));
+    if (!file.has_name(file_)) throw SystemError(SharedFile::kReplaced);
     const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
     try {
       with_descriptor(folder, O_RDONLY | O_DIRECTORY, [](int descriptor) { return ::fsync(descriptor) == 0; });
@@ -429,7 +463,7 @@ std::uint64_t CheckpointFile::write_columns(SharedFile& file, std::int64_t data_
     sum += sum_records(room.records, order_->first(), static_cast<int>(group), width);
     if (trouble) continue;  // The others wait for what this rank sends.
     try {
-      file.write(find_place(data_at, group, width), room.records.data(), room.records.size());
+      file.write(find_place(data_at, group, width), room.records.data(), room.records.size() * sizeof(double));
     } catch (...) {
       trouble = std::current_exception();
     }

@@ -40,8 +40,9 @@ void check_job(const Run& run) {
                       run.job.file.string(), run.ranks));
     }
     if (run.rank != 0 || run.job.bank.empty()) return;
-    config::check_writable(run.job.bank, "bank");
-    config::check_writable(spec::find_resolved_path(run.job.bank), "resolved job");
+    const fs::path bank = run.options.bank.empty() ? run.job.bank : run.options.bank;  // as it is opened
+    config::check_writable(bank, "bank");
+    config::check_writable(spec::find_resolved_path(bank), "resolved job");
   });
 }
 

@@ -13,6 +13,7 @@ struct RunOptions {
   std::filesystem::path checkpoint;         // resumed from where it fits, and saved to; empty: none
   double checkpoint_every_s = 300;          // seconds between two saves of it
   std::filesystem::path progress;           // progress as JSON lines is appended here; empty: nowhere
+  std::vector<std::string> folder;          // work in folder [1] below [0]; no link below [0] is followed; empty: where it was started
   std::filesystem::path bank;               // where the bank goes, whatever the job says; empty: as it says
   std::filesystem::path matrices;           // folder for K and M as files; empty: none
   bool validate = false;                    // check and predict, do not solve

@@ -323,7 +323,7 @@ std::string describe(const CheckReport& report) {
       fmt::format("dihedral angles {:.2f} to {:.2f} degrees; mean ratio {:.3f} at worst, {:.3f} at 1 %, {:.3f} on average; {} slivers\n",
                   report.min_dihedral_deg, report.max_dihedral_deg, report.mean_ratio_min, report.mean_ratio_1_percent,
                   report.mean_ratio_mean, report.slivers);
-  text += fmt::format("mended: {} elements turned, {} unused nodes dropped, {} nodes welded, {} elements straightened", report.reoriented,
+  text += fmt::format("repaired: {} elements turned, {} unused nodes dropped, {} nodes welded, {} elements straightened", report.reoriented,
                       report.unreferenced, report.welded, report.straightened);
   if (report.order == 2) text += fmt::format("; {} curved elements", report.curved);
   return text + "\n";

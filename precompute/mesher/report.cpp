@@ -10,7 +10,7 @@ std::string describe(const SurfaceReport& r) {
       fmt::format("surface    {} triangles, {} points, {} component{}; {:.4g} x {:.4g} x {:.4g} m (scale {:.6g}), volume {:.6g} m3\n",
                   r.input_triangles, r.input_vertices, r.components, r.components == 1 ? "" : "s", r.extent_m[0], r.extent_m[1],
                   r.extent_m[2], r.scale, r.input_volume_m3);
-  out += fmt::format("mended     {} triangles dropped, {} turned, {} hole{} closed{}\n", r.removed_triangles, r.flipped_triangles,
+  out += fmt::format("repaired   {} triangles dropped, {} turned, {} hole{} closed{}\n", r.removed_triangles, r.flipped_triangles,
                      r.holes_closed, r.holes_closed == 1 ? "" : "s", r.wrapped ? ", wrapped" : "");
   out += fmt::format("mesh       {} nodes ({} corners), {} tetrahedra, mean edge {:.4g} m, by {} in {} attempt{}\n", r.nodes,
                      r.corner_nodes, r.tets, r.mean_edge_m, r.method == Method::kStuffing ? "isosurface stuffing" : "Delaunay refinement",

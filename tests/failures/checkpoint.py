@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """A run that is stopped or killed goes on from its checkpoint, on another number of ranks, and its bank is that of a run that was left alone.
 
-usage: checkpoint.py BIN_DIR stops|slices|kills|damage|disk|accuracy
+usage: checkpoint.py BIN_DIR stops|slices|kills|damage|disk|accuracy|replaced
 """
 import json
 import os
@@ -305,6 +305,31 @@ def disk(folder):
             check(not list(small.iterdir()), f"{list(small.iterdir())} stays")
     finally:
         subprocess.run(["umount", small])
+
+
+def replaced(folder):
+    """Somebody who may write to the folder puts a link where the temporary file was made: what it leads to is not written to."""
+    folder.mesh("--shape", "plate", "--length", 0.3, "--width", 0.21, "--thickness", 0.02, "--nodes", 1500, "--order", 2, "-o", "body.msh")
+    body = Body(folder, band_hz=[20, 30000])
+    victim = folder / "victim"
+    victim.write_text("important")
+    for ranks in (1, 2, 3):
+        command = ["env", f"LD_PRELOAD={folder.bin / 'replace_name.so'}", f"CARILLON_TEST_VICTIM={victim}", *body.command(ranks, "--checkpoint-every", 0)]
+        text, code = folder.run(ranks, command=command, timeout_s=200)
+        check(victim.read_text() == "important", f"{ranks} ranks wrote through the link:\n{text}")
+        check(code == 0 and "the checkpoint cannot be saved: " in text, f"exit code {code}:\n{text}")
+        check((folder / ".state.new.taken").exists(), "nothing was replaced")
+        check(not os.path.lexists(folder / "state") and not os.path.lexists(folder / ".state.new"), "a link stays")
+        check_bank(folder, "out.bank", body.expected, f"{ranks} ranks")
+        (folder / "out.bank").unlink()
+        (folder / ".state.new.taken").unlink()
+    # A link that was there before is no checkpoint, and one in place of the temporary file is removed.
+    for name in ("state", ".state.new"):
+        (folder / name).symlink_to(victim)
+        text, code = folder.run(2, command=body.command(2, "--checkpoint-every", 0), timeout_s=200)
+        check(code == 0 and victim.read_text() == "important", f"exit code {code}:\n{text}")
+        check_bank(folder, "out.bank", body.expected, name)
+        (folder / "out.bank").unlink()
 
 
 def accuracy(folder):

@@ -105,6 +105,31 @@ class Damage(Bench):
         self.run_it("get", job)
         self.assertEqual(sorted(path.name for path in victim.iterdir()), before)
 
+    def test_ranks_that_find_the_folder_by_name_follow_no_link(self):
+        job = self.write("bar.json", make_job())
+        self.run_it("submit", job)
+        work, = self.store.glob("work/*/*")
+        victim = self.folder / "victim"
+        shutil.copytree(work, victim)
+        before = {path.name: path.read_bytes() for path in victim.iterdir()}
+        # What Slurm does: it goes to the folder by its name, where somebody has put a link by now.
+        programs = self.folder / "programs"
+        programs.mkdir()
+        srun = programs / "srun"
+        srun.write_text('#!/bin/sh\nwhile case $1 in */carillon-precompute) false ;; esac; do shift; done\n'
+                        'if [ -n "$VICTIM" ]; then mv "$WORK" "$WORK.aside" && ln -s "$VICTIM" "$WORK"; fi\ncd "$WORK" && exec "$@"\n')
+        srun.chmod(0o755)
+        environment = {**self.environment, "PATH": f"{programs}:/usr/bin:/bin", "WORK": str(work), "OMPI_MCA_ess_singleton_isolated": "1"}
+        attempt = [BIN / "carillon", "attempt", work, "--ranks", "1", "--launcher", "srun", "--no-pictures"]
+        done = subprocess.run(attempt, capture_output=True, text=True, env={**environment, "VICTIM": str(victim)}, timeout=60)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertEqual({path.name: path.read_bytes() for path in victim.iterdir()}, before)
+        self.assertIn("a link or a file is in its place: remove it", (work.with_name(work.name + ".aside") / "log").read_text())
+        work.unlink()
+        work.with_name(work.name + ".aside").rename(work)
+        subprocess.run(attempt, check=True, capture_output=True, env=environment, timeout=60)
+        self.assertEqual(self.ask("status")["jobs"][0]["state"], "done")
+
     def test_gc_empties_no_folder_that_is_linked(self):
         self.make_done()
         for name in ("tmp", "work", "inputs", "banks"):
@@ -173,6 +198,114 @@ class Damage(Bench):
         self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1)
         self.assertEqual([entry["state"] for entry in self.ask("status", job)["jobs"]], ["failed"])
         self.assertTrue(all(item["kind"] == "damaged" for item in self.ask("gc")["items"]))
+
+    def open_up(self, folder):
+        for path in (folder, *folder.iterdir()):
+            path.chmod(0o755)
+
+    def test_a_bank_without_its_sum_is_read_before_it_is_believed(self):
+        job, bank = self.make_done()
+        other = self.write("other.json", make_job(max_modes=2))
+        self.run_it("submit", other)
+        self.run_queue()
+        second = pathlib.Path(self.run_it("get", other).stdout.strip()).read_bytes()
+        whole = bank.read_bytes()
+
+        def spoil(content):
+            self.open_up(bank.parent)
+            (bank.parent / "bank.sum").unlink()
+            time = bank.stat()
+            bank.write_bytes(content)
+            os.utime(bank, ns=(time.st_atime_ns, time.st_mtime_ns))
+
+        spoil(whole)
+        self.run_it("get", job, "--to", self.folder / "copy.hdf")
+        self.assertEqual((self.folder / "copy.hdf").read_bytes(), whole)
+        self.assertIn("nothing to do", self.run_it("submit", job).stdout)
+        self.assertIn("nothing to do again", self.run_it("retry", job, code=None).stdout)
+        self.assertEqual(self.ask("verify")["damaged"], [])
+        (bank.parent / "bank.sum").write_text("")
+        flipped = whole[:9000] + bytes([whole[9000] ^ 1]) + whole[9001:]
+        for number, content in enumerate((flipped, second, flipped[:len(whole) // 2], second)):
+            with self.subTest(number):
+                spoil(content)
+                self.assertEqual(self.run_it("get", job).stdout.strip(), str(bank))  # a path, and a look that costs nothing
+                (self.folder / "copy.hdf").unlink(missing_ok=True)
+                self.assertIn("computes it again", self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1).stderr)
+                self.assertFalse((self.folder / "copy.hdf").exists())
+                self.assertEqual([entry["kind"] for entry in self.ask("verify", code=3)["damaged"]], ["bank"])
+                self.run_it("retry" if number % 2 == 0 else "submit", job)
+                self.assertEqual(self.ask("status", job)["jobs"][0]["state"], "queued")
+                self.run_queue()
+                self.assertEqual(pathlib.Path(self.run_it("get", job).stdout.strip()), bank)
+                self.assertTrue((bank.parent / "bank.sum").exists())
+                self.assertEqual(self.ask("verify")["damaged"], [])
+
+    def test_records_beside_a_bank_are_verified_and_written_again(self):
+        job, bank = self.make_done()
+        loud = self.write("loud.json", make_job(band_hz=[20, 21]))
+        self.run_it("submit", loud)
+        self.run_queue()
+        other = pathlib.Path(self.run_it("get", loud).stdout.strip()).parent
+        whole = self.folder / "whole"
+        shutil.copytree(bank.parent, whole)
+        records = {name: (bank.parent / name).read_text() for name in ("job.json", "outcome.json", "request.json")}
+        damages = {"empty": lambda name: "", "cut": lambda name: records[name][:len(records[name]) // 2], "other": lambda name: (other / name).read_text(),
+                   "odd": lambda name: "{}", "list": lambda name: "[1]", "deep": lambda name: "[" * 100000, "missing": lambda name: None}
+        for name in records:
+            for kind, make in damages.items():
+                for has_sum in (True, False):
+                    if not has_sum and (name == "request.json" or (name, kind) == ("outcome.json", "other")):
+                        continue  # a bank that nothing else tells of; and one end that is as good as another
+                    with self.subTest(f"{name} {kind} {has_sum}"):
+                        self.open_up(bank.parent)
+                        shutil.rmtree(bank.parent)
+                        shutil.copytree(whole, bank.parent)
+                        self.open_up(bank.parent)
+                        if not has_sum:
+                            (bank.parent / "bank.sum").unlink(missing_ok=True)
+                        text = make(name)
+                        (bank.parent / name).unlink() if text is None else (bank.parent / name).write_text(text)
+                        got = self.ask("get", job)
+                        self.assertEqual((got["state"], got["bank"]), ("done", str(bank)))
+                        self.assertFalse([warning for warning in got["warnings"] if "silent" in warning])
+                        state = next(entry for entry in self.ask("status")["jobs"] if entry["id"] == got["id"])
+                        self.assertEqual(state["state"], "done")
+                        self.assertFalse([warning for warning in state["warnings"] if "silent" in warning])
+                        for words in (("explain", job), ("log", job), ("report", job), ("gc",)) if kind in ("empty", "deep") else ():
+                            self.run_it(*words)
+                        found = self.ask("verify", code=3)["damaged"]
+                        self.assertEqual([(entry["kind"], entry["id"]) for entry in found], [("record", got["id"])])
+                        self.assertIn(name, found[0]["fault"])
+                        self.assertTrue(self.ask("verify", "--repair")["damaged"][0]["repaired"])
+                        self.assertEqual(self.ask("verify")["damaged"], [])
+                        self.assertEqual(self.ask("status", job)["jobs"][0]["state"], "done")
+                        self.assertEqual(bank.parent.stat().st_mode & 0o222, 0)
+                        before, after = json.loads(records["job.json"]), json.loads((bank.parent / "job.json").read_text())
+                        self.assertEqual({**before, "run": None}, {**after, "run": None})
+                        self.assertEqual(json.loads((bank.parent / "request.json").read_text())["id"], got["id"])
+
+    def test_warnings_name_the_file_of_the_user(self):
+        text = json.dumps(make_job(material={"young_modulus_pa": 72, "poisson_ratio": 0.3, "density_kg_m3": 2500, "damping": {"rayleigh": {"alpha1_s": 1e-7}}}, max_modes=1), indent=1)
+        job = self.write("glass.json", text)
+        line = next(number for number, words in enumerate(text.splitlines(), 1) if "young_modulus_pa" in words)
+        wanted = "young_modulus_pa is 72: was it given in GPa?"
+
+        def find(warnings):
+            found = [warning for warning in warnings if wanted in warning]
+            self.assertEqual(len(found), 1, warnings)
+            self.assertNotIn(str(self.store), found[0])
+            return found[0]
+
+        self.run_it("submit", job)
+        told = [json.loads(words) for words in self.run_it("run", "--json").stdout.splitlines()]
+        self.assertTrue(find(next(entry["warnings"] for entry in told if entry["event"] == "done")).startswith(f"{job}: "))
+        self.assertTrue(find(self.ask("submit", job)["jobs"][0]["warnings"]).startswith(f"{job}:{line}: "))
+        self.assertTrue(find(self.run_it("submit", job).stderr.splitlines()).startswith(f"carillon: glass.json: warning: {job}:{line}: "))
+        self.assertTrue(find(self.ask("status")["jobs"][0]["warnings"]).startswith("the job: "))
+        self.assertTrue(find(self.ask("get", job)["warnings"]).startswith("the job: "))
+        find(self.run_it("status").stdout.splitlines())
+        find(self.run_it("get", job).stderr.splitlines())
 
     def test_a_bank_whose_folder_is_gone_is_found_and_queued_again(self):
         self.make_done()

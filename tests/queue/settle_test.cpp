@@ -1,7 +1,11 @@
-// Cancel and retry of rows that nobody works on.
+// Cancel and retry of rows without a running attempt; who is asked to stop.
 #include "jobs/queue/settle.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
 
 #include "jobs/store/identity.hpp"
 #include "tests/registry/jobs.hpp"
@@ -69,4 +73,31 @@ TEST_F(Settle, a_job_whose_folder_is_of_another_is_not_retried) {
 }
 
 }  // namespace
+TEST_F(Settle, a_process_that_was_not_started_for_the_row_gets_no_signal) {
+  Job job{make_id(1)};
+  job.token = store::make_random_name();
+  EXPECT_FALSE(queue::is_attempt_of(job, process::find_self()));
+  std::array<int, 2> ends{};
+  ASSERT_EQ(::pipe(ends.data()), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::dup2(ends[0], 0);
+    ::close(ends[1]);
+    ::execlp("sh", "sh", "-c", "read line", job.token.c_str(), static_cast<char*>(nullptr));
+    ::_exit(127);
+  }
+  const process::Identity found = *process::find_process(child);
+  for (int round = 0; round < 10000 && !queue::is_attempt_of(job, found); ++round) ::usleep(1000);  // until it is another program
+  EXPECT_TRUE(queue::is_attempt_of(job, found));
+  Job other = job;
+  other.token = store::make_random_name();
+  EXPECT_FALSE(queue::is_attempt_of(other, found));
+  other.token = "sh";  // a word of its command line, but no token
+  EXPECT_FALSE(queue::is_attempt_of(other, found));
+  ::close(ends[0]);
+  ::close(ends[1]);
+  ::waitpid(child, nullptr, 0);
+  EXPECT_FALSE(queue::is_attempt_of(job, found));
+}
+
 }  // namespace carillon::tests

@@ -138,6 +138,51 @@ TEST_F(Damage, a_log_of_writes_cut_or_flipped_anywhere_costs_nothing) {
   }
 }
 
+/// A rollback journal of no pages that names another file as its super journal (sqlite.org, fileformat2.html, section 3).
+std::string make_journal(const std::string& super, std::uint32_t pages, std::uint32_t page_bytes) {
+  const std::string magic("\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", 8);
+  const auto number = [](std::uint32_t value) {
+    std::string bytes;
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 0xFF);
+    return bytes;
+  };
+  std::string text = magic + number(0) + number(1) + number(pages) + number(512) + number(page_bytes);
+  text.resize(512, '\0');
+  std::uint32_t sum = 0;
+  for (const char c : super) sum += static_cast<std::uint32_t>(static_cast<signed char>(c));
+  return text + number((1U << 30) / page_bytes + 1) + super + number(static_cast<std::uint32_t>(super.size())) + number(sum) + magic;
+}
+
+TEST_F(Damage, a_journal_beside_the_registry_removes_no_file_elsewhere) {
+  std::string wanted;
+  {
+    Registry registry = Registry::open(store_, be_silent);
+    wanted = describe(registry);
+  }
+  const std::string whole = read_all(file());
+  const fs::path victim = folder_.write("victim/thesis.tex", "important");
+  folder_.write("store/registry.sqlite-journal", make_journal(victim.string(), static_cast<std::uint32_t>(whole.size() / 4096), 4096));
+  EXPECT_EQ(describe(Registry::open(store_, be_silent)), wanted);
+  EXPECT_EQ(read_all(victim), "important");
+  EXPECT_EQ(describe(Registry::open(store_, be_silent)), wanted);
+}
+
+TEST_F(Damage, a_link_beside_the_registry_is_named) {
+  for (const char* ending : {"-journal", "-wal", "-shm"}) {
+    const fs::path link = folder_ / (std::string("store/registry.sqlite") + ending);
+    fs::remove(link);
+    fs::create_symlink(folder_.write("victim", "important"), link);
+    try {
+      Registry::open(store_, be_silent);
+      ADD_FAILURE() << ending;
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()).find(link.string() + ": this is a link"), 0u) << error.what();
+    }
+    EXPECT_EQ(read_all(folder_ / "victim"), "important");
+    fs::remove(link);
+  }
+}
+
 TEST_F(Damage, what_is_damaged_is_kept_beside_the_new_one) {
   put("this is no database, but it is long enough to be taken for one, if nobody looks at its first bytes: " + std::string(5000, 'x'));
   EXPECT_TRUE(check("text"));

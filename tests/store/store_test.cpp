@@ -5,10 +5,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <fstream>
 #include <functional>
 #include <iterator>
 
+#include "jobs/store/files.hpp"
 #include "tests/store/folder.hpp"
 
 namespace {
@@ -228,6 +230,23 @@ TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
   EXPECT_TRUE(spoil([](const fs::path& bank) { std::ofstream(bank) << std::string(9000, 'z'); }, store::Look::quick, true));
   EXPECT_TRUE(spoil(flip, store::Look::quick, false));
   EXPECT_TRUE(spoil(flip, store::Look::full, true));
+}
+
+TEST(Store, a_quota_that_is_full_is_a_full_disk) {
+  for (const int error : {ENOSPC, EDQUOT}) {
+    EXPECT_TRUE(store::is_full_error(error));
+    try {
+      store::throw_errno("/some/file", "write", error);
+    } catch (const SystemError& refusal) {
+      const std::string what = refusal.what();
+      EXPECT_NE(what.find("/some/file: cannot write"), std::string::npos) << what;
+      EXPECT_NE(what.find("the disk or quota is full: make room"), std::string::npos) << what;
+      EXPECT_TRUE(store::is_disk_full("/proc", what)) << what;
+    }
+  }
+  EXPECT_FALSE(store::is_full_error(EACCES));
+  const Folder folder;
+  EXPECT_EQ(store::is_disk_full(folder.path(), "Permission denied"), store::is_disk_full(folder.path()));
 }
 
 TEST(Store, names_of_temporary_folders_are_known_again) {

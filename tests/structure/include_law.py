@@ -47,7 +47,7 @@ LAW = {
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
     "jobs/process": (["runtime/config"], ["fmt"]),
     "jobs/outcome": (["runtime/config", "jobs/process"], ["fmt"]),
-    "jobs/store": (["runtime/config", "jobs/spec", "jobs/process"], ["fmt", "json", "openssl"]),
+    "jobs/store": (["runtime/config", "runtime/bank", "jobs/spec", "jobs/process"], ["fmt", "json", "openssl"]),
     "jobs/registry": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store"], ["fmt", "sqlite"]),
     "jobs/attempt": (["runtime/config", "runtime/bank", "jobs/process", "jobs/outcome", "jobs/store", "jobs/report"], ["fmt"]),
     "jobs/queue": (["runtime/config", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt"], ["fmt"]),
