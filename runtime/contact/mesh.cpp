@@ -1,6 +1,5 @@
-// Method: half-edges are put into buckets by their lower vertex, where their partners are next to them. The tree halves the faces at the
-//   median of their centroids along the longest side of their box, down to four. Nearest places by branch and bound; boxes of two meshes by
-//   the fifteen separating axes.
+// Method: the tree halves the faces at the median of their centroids along the longest side of their box, down to four. Nearest places by
+//   branch and bound; boxes of two meshes by the fifteen separating axes.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5 (nearest point of a triangle), 4.4 (boxes), 6.1 (trees); T. Moeller and
 //   B. Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
 // Deviations: none.
@@ -8,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+
+#include "runtime/bank/edges.hpp"
 
 namespace carillon::contact {
 namespace {
@@ -47,30 +48,18 @@ Vec3 find_nearest_barycentric(const Vec3& x, const Vec3& a, const Vec3& b, const
 }  // namespace
 
 std::vector<std::int32_t> find_opposite_edges(const std::vector<Face>& triangles, std::size_t vertices) {
-  std::vector<std::int32_t> begin(vertices + 1, 0), edges(3 * triangles.size()), opposite(3 * triangles.size(), -1);
-  const auto from = [&](std::int32_t e) { return triangles[e / 3][e % 3]; };
-  const auto to = [&](std::int32_t e) { return triangles[e / 3][(e % 3 + 1) % 3]; };
-  const auto upper = [&](std::int32_t e) { return std::max(from(e), to(e)); };
-  const auto count = static_cast<std::int32_t>(edges.size());
-  for (std::int32_t e = 0; e < count; ++e) ++begin[std::min(from(e), to(e)) + 1];
-  for (std::size_t v = 0; v < vertices; ++v) begin[v + 1] += begin[v];
-  std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
-  for (std::int32_t e = 0; e < count; ++e) edges[next[std::min(from(e), to(e))]++] = e;
-  for (std::size_t v = 0; v < vertices; ++v) {
-    std::sort(edges.begin() + begin[v], edges.begin() + begin[v + 1],
-              [&](std::int32_t e, std::int32_t f) { return upper(e) != upper(f) ? upper(e) < upper(f) : e < f; });
-    for (std::int32_t i = begin[v], j = i; i < begin[v + 1]; i = j) {
-      while (j < begin[v + 1] && upper(edges[j]) == upper(edges[i])) ++j;
-      const std::int32_t e = edges[i];
-      if (j - i == 1 && from(e) != to(e)) continue;
-      if (j - i == 2 && from(e) == to(edges[i + 1]) && from(e) != to(e)) {
-        opposite[e] = edges[i + 1];
-        opposite[edges[i + 1]] = e;
-        continue;
-      }
-      for (std::int32_t k = i; k < j; ++k) opposite[edges[k]] = -2;
+  std::vector<std::int32_t> opposite(3 * triangles.size(), -1);
+  bank::for_each_edge(triangles, vertices, [&](std::int32_t low, const bank::HalfEdge* first, const bank::HalfEdge* last) {
+    const auto begins_low = [&](const bank::HalfEdge& edge) { return triangles[edge.number / 3][edge.number % 3] == low; };
+    const bool is_edge = low != first->upper;
+    if (last - first == 1 && is_edge) return;
+    if (last - first == 2 && is_edge && begins_low(first[0]) != begins_low(first[1])) {
+      opposite[first[0].number] = first[1].number;
+      opposite[first[1].number] = first[0].number;
+      return;
     }
-  }
+    for (const bank::HalfEdge* edge = first; edge < last; ++edge) opposite[edge->number] = -2;
+  });
   return opposite;
 }
 
