@@ -43,6 +43,7 @@ plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, 
         std::any_of(scene.strikes.begin(), scene.strikes.end(), [i](const SceneStrike& strike) { return strike.body == i; });
     facts.bodies.push_back({.name = body.name,
                             .bank = body.spec.bank,
+                            .sphere_radius_m = body.sphere_radius_m,
                             .fixed = body.spec.fixed,
                             .struck = struck,
                             .position_m = calc_world_point(body.spec.initial, body.spec.bank->rigid.centre_m),

@@ -188,20 +188,7 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
   return powers;
 }
 
-void check_sizes(const bank::Bank& bank) {
-  const std::size_t modes = bank.mode_count(), vertices = bank.vertex_count();
-  bool inside = bank.shape.size() == 3 * vertices * modes && bank.shape_scale.size() == modes && bank.radiation_gain.size() == modes;
-  for (const bank::Triangle& triangle : bank.triangles)
-    for (const std::int32_t v : triangle) inside = inside && v >= 0 && static_cast<std::size_t>(v) < vertices;
-  if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
-}
-
-}  // namespace
-
-std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
-  check_sizes(bank);
-  if (kind == GainKind::kOsg02) return bank.radiation_gain;
-  const Skin skin = make_skin(bank);
+std::vector<double> calc_gains_of_skin(const bank::Bank& bank, const Skin& skin) {
   const std::vector<Power> powers = calc_powers(bank, skin);
   std::vector<double> gains(bank.mode_count());
   for (std::size_t m = 0; m < gains.size(); ++m) {
@@ -214,9 +201,32 @@ std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
   return gains;
 }
 
+double calc_sphere_radius_of_skin(const Skin& skin) { return std::cbrt(skin.volume_m3 * 3.0 / (4.0 * pi)); }
+
+void check_sizes(const bank::Bank& bank) {
+  const std::size_t modes = bank.mode_count(), vertices = bank.vertex_count();
+  bool inside = bank.shape.size() == 3 * vertices * modes && bank.shape_scale.size() == modes && bank.radiation_gain.size() == modes;
+  for (const bank::Triangle& triangle : bank.triangles)
+    for (const std::int32_t v : triangle) inside = inside && v >= 0 && static_cast<std::size_t>(v) < vertices;
+  if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
+}
+
+}  // namespace
+
+std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
+  check_sizes(bank);
+  return kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, make_skin(bank));
+}
+
+Radiation calc_radiation(const bank::Bank& bank, GainKind kind) {
+  check_sizes(bank);
+  const Skin skin = make_skin(bank);
+  return {kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, skin), calc_sphere_radius_of_skin(skin)};
+}
+
 double calc_sphere_radius_m(const bank::Bank& bank) {
   check_sizes(bank);
-  return std::cbrt(make_skin(bank).volume_m3 * 3.0 / (4.0 * pi));
+  return calc_sphere_radius_of_skin(make_skin(bank));
 }
 
 }  // namespace carillon::radiation

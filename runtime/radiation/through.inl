@@ -1,8 +1,8 @@
-// The flow of a row of modes through a triangle, kLanes modes at once; whoever includes this says how many. To be compiled without contraction, so that all instruction sets
-// give the same numbers.
-#include "runtime/radiation/flow.hpp"
-
+// The flow of a row of modes through a triangle, kLanes modes at once; whoever includes this says how many. To be compiled without
+// contraction, so that all instruction sets give the same numbers.
 #include <utility>
+
+#include "runtime/radiation/flow.hpp"
 
 namespace carillon::radiation {
 namespace {

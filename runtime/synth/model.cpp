@@ -12,6 +12,7 @@
 #include <limits>
 #include <numbers>
 
+#include "runtime/bank/large.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/synth/oscillator.hpp"
 
@@ -195,7 +196,7 @@ void Model::add_damped_modes(std::vector<Mode> modes) {
 
 void Model::copy_shapes(const bank::Bank& bank) {
   columns_ = sound_.size() * kGroup + damped_.size();
-  shape_.assign(bank.vertex_count() * 3 * columns_, 0);
+  bank::resize_large(shape_, bank.vertex_count() * 3 * columns_);
   std::vector<std::uint32_t> first, column;  // of each mode: its place in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     first.push_back(3 * static_cast<std::uint32_t>(modes_[i].bank_mode));
