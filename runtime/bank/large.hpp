@@ -9,10 +9,10 @@
 
 namespace carillon::bank {
 
-/// As values.resize(count) of an empty vector. Asks for large pages first, where the system has them: a page of 4 KiB that is touched for
-/// the first time costs more than the writing of it.
+/// As values.reserve(count). Asks for large pages, where the system has them: a page of 4 KiB that is touched for the first time costs
+/// more than the writing of it. To append what comes then is cheaper than to overwrite zeros.
 template <class T>
-void resize_large(std::vector<T>& values, std::size_t count) {
+void reserve_large(std::vector<T>& values, std::size_t count) {
   values.reserve(count);
 #if defined(MADV_HUGEPAGE)
   constexpr std::uintptr_t kLarge = std::uintptr_t{1} << 21;
@@ -20,7 +20,6 @@ void resize_large(std::vector<T>& values, std::size_t count) {
   const auto end = reinterpret_cast<std::uintptr_t>(values.data() + values.capacity()) / kLarge * kLarge;
   if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);  // advice: nothing depends on it
 #endif
-  values.resize(count);
 }
 
 }  // namespace carillon::bank

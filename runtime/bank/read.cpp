@@ -177,7 +177,7 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   if (bank.shape_bytes == 1) {
     form.narrow_shape.resize(vertices * modes * 3);
   } else {
-    resize_large(bank.shape, vertices * modes * 3);
+    reserve_large(bank.shape, vertices * modes * 3);  // load() appends
   }
   const auto make_text = [&](const std::string& field, std::string& text) {
     const Extent& extent = get_extent(seal, field, name);
@@ -218,12 +218,15 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   Digest digest;
   std::vector<std::byte> buffer(std::min(seal.length, kPiece));
   std::uint64_t place = 0;
-  const auto take = [&](std::byte* data, std::uint64_t bytes) {
+  const auto take = [&](std::byte* data, std::uint64_t bytes, bool is_shape = false) {
     for (std::uint64_t done = 0, step = 0; done < bytes; done += step, place += step) {
       step = std::min(bytes - done, kPiece);
       const std::span piece(data != nullptr ? data + done : buffer.data(), step);
       read(place, piece);
       digest.update(piece);
+      if (!is_shape) continue;
+      const auto* steps = reinterpret_cast<const std::int16_t*>(piece.data());
+      loaded.bank.shape.insert(loaded.bank.shape.end(), steps, steps + piece.size() / sizeof *steps);
     }
   };
   take(nullptr, kTextBytes);
@@ -231,7 +234,8 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   for (const Target& target : targets) {
     if (target.offset < place) throw InputError(name + ": damaged seal: two arrays overlap; copy or write the bank again");
     take(nullptr, target.offset - place);
-    take(target.data, target.bytes);
+    const bool is_shape = target.bytes > 0 && target.data == reinterpret_cast<std::byte*>(loaded.bank.shape.data());
+    take(is_shape ? nullptr : target.data, target.bytes, is_shape);
   }
   if (digest.finish() != seal.digest) {
     throw InputError(name +

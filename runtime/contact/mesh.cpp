@@ -63,13 +63,6 @@ std::vector<std::int32_t> find_opposite_edges(const std::vector<Face>& triangles
   return opposite;
 }
 
-void Box::add(const Vec3& x) {
-  for (int k = 0; k < 3; ++k) {
-    low[k] = std::min(low[k], x[k]);
-    high[k] = std::max(high[k], x[k]);
-  }
-}
-
 bool Box::contains(const Vec3& x) const {
   for (int k = 0; k < 3; ++k)
     if (x[k] < low[k] || x[k] > high[k]) return false;
@@ -111,6 +104,8 @@ bool are_boxes_near(const Box& a, const Box& b, const SimTK::Transform& X_ba, do
 }
 
 Mesh::Mesh(std::vector<Vec3> vertices, std::vector<Face> faces) : vertices_(std::move(vertices)), faces_(std::move(faces)) {
+  normals_.reserve(faces_.size());
+  edges_.reserve(3 * faces_.size() / 2);
   for (const Face& f : faces_) {
     const Vec3 n = cross(vertices_[f[1]] - vertices_[f[0]], vertices_[f[2]] - vertices_[f[0]]);
     normals_.push_back(n / n.norm());
@@ -125,23 +120,31 @@ Mesh::Mesh(std::vector<Vec3> vertices, std::vector<Face> faces) : vertices_(std:
 Vec3 Mesh::calc_centroid(int f) const { return (vertices_[faces_[f][0]] + vertices_[faces_[f][1]] + vertices_[faces_[f][2]]) / 3.0; }
 
 void Mesh::make_tree() {
-  std::vector<Vec3> middles;
+  struct Key {
+    double at;
+    int face;
+    bool operator<(const Key& other) const { return at != other.at ? at < other.at : face < other.face; }
+  };
+  std::vector<Vec3> middles(faces_.size());
+  std::vector<Box> boxes(faces_.size());
+  std::vector<Key> keys(faces_.size());
+  order_.resize(faces_.size());
   for (int f = 0; f < face_count(); ++f) {
-    order_.push_back(f);
-    middles.push_back(calc_centroid(f));
+    order_[f] = f;
+    middles[f] = calc_centroid(f);
+    for (const int v : faces_[f]) boxes[f].add(vertices_[v]);
   }
   nodes_.push_back({Box(), 0, face_count(), -1});
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
     Node node = nodes_[n];
-    for (int i = 0; i < node.count; ++i)
-      for (const int v : faces_[order_[node.first + i]]) node.box.add(vertices_[v]);
+    for (int i = node.first; i < node.first + node.count; ++i) node.box.add(boxes[order_[i]]);
     if (node.count > kLeaf) {
       const Vec3 size = node.box.high - node.box.low;
       const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
       const int half = node.count / 2;
-      const auto begin = order_.begin() + node.first;
-      std::nth_element(begin, begin + half, begin + node.count,
-                       [&](int f, int g) { return middles[f][axis] != middles[g][axis] ? middles[f][axis] < middles[g][axis] : f < g; });
+      for (int i = 0; i < node.count; ++i) keys[i] = {middles[order_[node.first + i]][axis], order_[node.first + i]};
+      std::nth_element(keys.begin(), keys.begin() + half, keys.begin() + node.count);
+      for (int i = 0; i < node.count; ++i) order_[node.first + i] = keys[i].face;
       node.child = static_cast<int>(nodes_.size());
       nodes_.push_back({Box(), node.first, half, -1});
       nodes_.push_back({Box(), node.first + half, node.count - half, -1});

@@ -153,8 +153,14 @@ Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std
     : mesh_(make_mesh(vertices, triangles, body, bank_triangle_)) {
   neighbours_.resize(mesh_.vertex_count());
   face_ridges_.resize(mesh_.face_count());
+  face_middles_m_.reserve(mesh_.face_count());
   for (int f = 0; f < mesh_.face_count(); ++f) face_middles_m_.push_back(mesh_.calc_centroid(f));
+  std::vector<int> valence(mesh_.vertex_count(), 0);
+  for (const Mesh::Edge& edge : mesh_.edges())
+    for (const int v : edge.vertices) ++valence[v];
+  for (int v = 0; v < mesh_.vertex_count(); ++v) neighbours_[v].reserve(valence[v]);
   std::vector<double> lengths;
+  lengths.reserve(mesh_.edges().size());
   for (const Mesh::Edge& edge : mesh_.edges()) {
     const auto [a, b] = edge.vertices;
     neighbours_[a].push_back(b);
