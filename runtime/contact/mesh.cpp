@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "runtime/bank/edges.hpp"
+#include "runtime/bank/triangle.hpp"
 
 namespace carillon::contact {
 namespace {
@@ -23,26 +24,9 @@ constexpr double kSame = 1e-13;  // relative: distances that are equal
 
 /// Barycentric coordinates of the place of a triangle that is nearest to x.
 Vec3 find_nearest_barycentric(const Vec3& x, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ax = x - a;
-  const double d1 = dot(ab, ax), d2 = dot(ac, ax);
-  if (d1 <= 0.0 && d2 <= 0.0) return {1, 0, 0};
-  const Vec3 bx = x - b;
-  const double d3 = dot(ab, bx), d4 = dot(ac, bx);
-  if (d3 >= 0.0 && d4 <= d3) return {0, 1, 0};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return {1.0 - d1 / (d1 - d3), d1 / (d1 - d3), 0.0};
-  const Vec3 cx = x - c;
-  const double d5 = dot(ab, cx), d6 = dot(ac, cx);
-  if (d6 >= 0.0 && d5 <= d6) return {0, 0, 1};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return {1.0 - d2 / (d2 - d6), 0.0, d2 / (d2 - d6)};
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0.0, 1.0 - w, w};
-  }
-  const double sum = va + vb + vc;
-  return {va / sum, vb / sum, vc / sum};
+  const Vec3 ab = b - a, ac = c - a, ax = x - a, bx = x - b, cx = x - c;
+  const auto w = bank::weigh_corners(dot(ab, ax), dot(ac, ax), dot(ab, bx), dot(ac, bx), dot(ab, cx), dot(ac, cx));
+  return {w[0], w[1], w[2]};
 }
 
 }  // namespace

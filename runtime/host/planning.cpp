@@ -4,16 +4,14 @@
 #include <limits>
 #include <optional>
 
+#include "runtime/config/chance.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/synth/pulse.hpp"
 
 namespace carillon::host {
 
 synth::Surface make_surface(const SceneBody& body) {
-  // FNV-1a (Fowler, Noll and Vo 1991).
-  std::uint64_t seed = 0xcbf29ce484222325U;
-  for (const char c : body.name) seed = (seed ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = seed};
+  return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = config::hash_name(body.name)};
 }
 
 synth::Surface make_ground(const Scene& scene) {
