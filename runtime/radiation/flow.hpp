@@ -19,7 +19,8 @@ void add_flow_plain(const float* through, const float* harmonic, std::size_t row
 void add_flow_avx2(const float* through, const float* harmonic, std::size_t rows, double* flow);
 void add_flow_avx512(const float* through, const float* harmonic, std::size_t rows, double* flow);
 
-/// A triangle: the rows of its corners in the shapes of the bank (modes, 3), and what a motion of one step along each axis sends through it.
+/// A triangle: the rows of its corners in the shapes of the bank (modes, 3), and what a motion of one step along each axis sends through
+/// it.
 struct Corners {
   std::array<const std::int16_t*, 3> steps{};
   std::array<float, 3> share{};

@@ -198,7 +198,7 @@ void Model::copy_shapes(const bank::Bank& bank) {
   columns_ = sound_.size() * kGroup + damped_.size();
   bank::reserve_large(shape_, bank.vertex_count() * 3 * columns_);
   std::vector<std::int16_t> row(3 * columns_, 0);  // of a vertex; lanes without a mode stay 0
-  std::vector<std::uint32_t> first, column;  // of each mode: its place in a vertex's row of the bank, and here
+  std::vector<std::uint32_t> first, column;        // of each mode: its place in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     first.push_back(3 * static_cast<std::uint32_t>(modes_[i].bank_mode));
     column.push_back(static_cast<std::uint32_t>(
