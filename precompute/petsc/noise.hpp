@@ -3,14 +3,11 @@
 
 #include <cstdint>
 
+#include "runtime/config/chance.hpp"
+
 namespace carillon::petsc {
 
-/// The finaliser of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
-constexpr std::uint64_t scramble(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
-  return x ^ (x >> 31);
-}
+using config::scramble;
 
 /// In [-1/2, 1/2), from scrambled bits.
 constexpr double to_noise(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1.0p-53 - 0.5; }

@@ -20,12 +20,14 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/nearest.hpp"
+#include "runtime/config/chance.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/stream/events.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/synthesiser.hpp"
+#include "runtime/synth/variation.hpp"
 
 struct carillon_bank {
   explicit carillon_bank(carillon::bank::Bank given) : bank(std::move(given)) {}
@@ -219,6 +221,17 @@ double find_sphere_radius_m(const bank::Bank& bank) {
   } catch (const InputError&) {
     return 0.0;
   }
+}
+
+stream::Impulse to_event(const carillon_impulse& impulse) {
+  return {.time_s = impulse.time_s,
+          .body = impulse.body,
+          .other = impulse.other,
+          .triangle = impulse.triangle,
+          .shape = impulse.gaussian != 0 ? stream::PulseShape::kGaussian : stream::PulseShape::kHertz,
+          .barycentric = to_vector(impulse.barycentric),
+          .impulse_n_s = to_vector(impulse.impulse_n_s),
+          .duration_s = impulse.duration_s};
 }
 
 carillon_status push(carillon_synth* synth, const stream::Event& event) noexcept {
@@ -461,15 +474,30 @@ void carillon_listener_init_sized(carillon_listener* listener, size_t size) { in
 carillon_status carillon_push_impulse(carillon_synth* synth, const carillon_impulse* impulse) {
   const auto ours = read(impulse);
   if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
-  return push(synth, stream::Impulse{.time_s = ours->time_s,
-                                     .body = ours->body,
-                                     .other = ours->other,
-                                     .triangle = ours->triangle,
-                                     .shape = ours->gaussian != 0 ? stream::PulseShape::kGaussian : stream::PulseShape::kHertz,
-                                     .barycentric = to_vector(ours->barycentric),
-                                     .impulse_n_s = to_vector(ours->impulse_n_s),
-                                     .duration_s = ours->duration_s});
+  return push(synth, to_event(*ours));
 }
+
+carillon_status carillon_vary_impulse(const carillon_bank* bank, double variation, uint64_t seed, uint64_t strike,
+                                      carillon_impulse* impulse) {
+  auto ours = read(impulse);
+  if (bank == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
+  return run(nullptr, 0, [&] {
+    stream::Impulse event = to_event(*ours);
+    if (!(variation >= 0.0 && variation <= 1.0) || stream::find_fault(event) != nullptr || event.triangle < 0 ||
+        static_cast<std::size_t>(event.triangle) >= bank->bank.triangles.size())
+      throw InputError("no strike that can be varied");
+    if (variation == 0.0) return;
+    synth::vary_strike(
+        bank->bank, [&](const bank::Vec3& point_m) { return bank->get_tree().find(point_m); }, variation, seed, strike, event);
+    ours->triangle = event.triangle;
+    ours->duration_s = event.duration_s;
+    std::copy(event.barycentric.begin(), event.barycentric.end(), ours->barycentric);
+    std::copy(event.impulse_n_s.begin(), event.impulse_n_s.end(), ours->impulse_n_s);
+    write(*ours, impulse);
+  });
+}
+
+uint64_t carillon_name_seed(const char* name) { return name == nullptr ? 0 : config::hash_name(name); }
 
 carillon_status carillon_push_contact(carillon_synth* synth, const carillon_contact* contact) {
   const auto ours = read(contact);

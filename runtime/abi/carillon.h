@@ -26,7 +26,7 @@ extern "C" {
 
 /* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
  * programs would have to be compiled again. */
-#define CARILLON_ABI_VERSION 3
+#define CARILLON_ABI_VERSION 4
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -277,6 +277,16 @@ CARILLON_API void carillon_contact_init_sized(carillon_contact* contact, size_t 
 CARILLON_API void carillon_motion_init_sized(carillon_motion* motion, size_t size);
 #define carillon_listener_init(listener) carillon_listener_init_sized((listener), sizeof(carillon_listener))
 CARILLON_API void carillon_listener_init_sized(carillon_listener* listener, size_t size);
+
+/* [any], not on an audio thread. Changes a strike as a hand would, so that equal strikes differ: its energy, place, direction and length.
+ * `variation`, 0 to 1, says by how much (docs/howto/scene-files.md); 0 leaves it as it is, to the bit. The same `seed` and number of the
+ * strike give the same change: those of a scene file are carillon_name_seed of the body's name, and 0 for its first strike. The bank is
+ * that of the body; its first strike makes the tree of carillon_bank_nearest_point. CARILLON_BAD_INPUT for another variation, a triangle
+ * that the bank does not have, and an impulse that cannot be played. */
+CARILLON_API carillon_status carillon_vary_impulse(const carillon_bank* bank, double variation, uint64_t seed, uint64_t strike,
+                                                   carillon_impulse* impulse);
+/* 64-bit FNV-1a of a name; 0 for NULL. [any] */
+CARILLON_API uint64_t carillon_name_seed(const char* name);
 
 /* [any] Events, in any order; those before carillon_horizon_s act late. CARILLON_BAD_INPUT for numbers that are not finite, and the like.
  */

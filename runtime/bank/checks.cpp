@@ -14,6 +14,7 @@
 #include <numeric>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/edges.hpp"
 #include "runtime/bank/faults.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/config/solids.hpp"
@@ -252,29 +253,15 @@ double calc_enclosed_volume(const Bank& bank, const Vec3& origin) {
 
 /// Edges that are not passed exactly once in each direction.
 void find_open_edges(const Bank& bank, Faults& faults) {
-  struct Edge {
-    std::int32_t low, high;
-    bool forward;
-    std::int64_t triangle;
-    auto key() const { return std::pair(low, high); }
-  };
-  std::vector<Edge> edges;
-  edges.reserve(3 * bank.triangles.size());
-  for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
-    for (int i = 0; i < 3; ++i) {
-      const std::int32_t a = bank.triangles[t][i], b = bank.triangles[t][(i + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), a < b, static_cast<std::int64_t>(t)});
-    }
-  }
-  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) { return a.key() < b.key(); });
-  for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
-    while (last < edges.size() && edges[last].key() == edges[first].key()) ++last;
-    if (last - first == 2 && edges[first].forward != edges[first + 1].forward) continue;
-    const char* what = last - first == 1   ? "belongs to one triangle only: the surface is open"
-                       : last - first == 2 ? "is passed twice in one direction: triangles are turned against each other"
-                                           : "belongs to more than two triangles";
-    faults.add("the edge of vertices {} and {} (triangle {}) {}", edges[first].low, edges[first].high, edges[first].triangle, what);
-  }
+  for_each_edge(bank.triangles, bank.vertex_count(), [&](std::int32_t low, const HalfEdge* first, const HalfEdge* last) {
+    const auto begins_low = [&](const HalfEdge& edge) { return bank.triangles[edge.number / 3][edge.number % 3] == low; };
+    const auto count = last - first;
+    if (count == 2 && begins_low(first[0]) != begins_low(first[1])) return;
+    const char* what = count == 1   ? "belongs to one triangle only: the surface is open"
+                       : count == 2 ? "is passed twice in one direction: triangles are turned against each other"
+                                    : "belongs to more than two triangles";
+    faults.add("the edge of vertices {} and {} (triangle {}) {}", low, first->upper, first->number / 3, what);
+  });
 }
 
 Check check_surface(const Bank& bank) {

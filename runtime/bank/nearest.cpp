@@ -10,6 +10,8 @@
 #include <limits>
 #include <numeric>
 
+#include "runtime/bank/triangle.hpp"
+
 namespace carillon::bank {
 namespace {
 
@@ -84,20 +86,7 @@ Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const
     return find_on_edges(p, {a, b, c});
   const Vec3 ap = subtract(p, a), bp = subtract(p, b), cp = subtract(p, c);
   const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d1 <= 0.0 && d2 <= 0.0) return {1.0, 0.0, 0.0};
-  if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0};
-  const double over_ab = d1 * d4 - d3 * d2;
-  if (over_ab <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return {1.0 - d1 / (d1 - d3), d1 / (d1 - d3), 0.0};
-  if (d6 >= 0.0 && d5 <= d6) return {0.0, 0.0, 1.0};
-  const double over_ac = d5 * d2 - d1 * d6;
-  if (over_ac <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return {1.0 - d2 / (d2 - d6), 0.0, d2 / (d2 - d6)};
-  const double over_bc = d3 * d6 - d5 * d4;
-  if (over_bc <= 0.0 && d4 >= d3 && d5 >= d6) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0.0, 1.0 - w, w};
-  }
-  const double sum = over_ab + over_ac + over_bc;
-  const Vec3 weight{over_bc / sum, over_ac / sum, over_ab / sum};
+  const Vec3 weight = weigh_corners(d1, d2, d3, d4, d5, d6);
   const bool is_inside = std::all_of(weight.begin(), weight.end(), [](double w) { return w >= 0.0 && w <= 1.0; });
   return is_inside ? weight : find_on_edges(p, {a, b, c});
 }

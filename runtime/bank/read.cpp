@@ -1,6 +1,6 @@
 // Reading banks from bytes that nobody vouches for.
-// Method: the seal tells where each array lies; the file is read once from front to back, hashed, and its arrays are copied out on the way.
-//   Only then is the digest compared and the content looked at.
+// Method: the seal tells where each array lies; the file is read once from front to back, its arrays straight to where they belong, and
+//   hashed on the way. Only then is the digest compared and the content looked at.
 // Deviations: HDF5 is not asked. libhdf5 1.10.8 was seen to crash (and to hang) on files with one changed byte, so its parser does not
 // belong
 //   between an untrusted file and a running game; the HDF5 structure of a bank is there for other programs.
@@ -17,6 +17,7 @@
 #include <numbers>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/large.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/seal.hpp"
 
@@ -101,8 +102,8 @@ void check_extent(const Field& wanted, const Extent& extent, const std::string& 
   }
 }
 
-/// Bytes of the file from first to last, in pieces: calls its argument with (offset, piece).
-using Pieces = std::function<void(const std::function<void(std::uint64_t, std::span<const std::byte>)>&)>;
+/// Fills `bytes` from `offset` of the file.
+using Source = std::function<void(std::uint64_t offset, std::span<std::byte> bytes)>;
 
 struct Loaded {
   Bank bank;
@@ -176,7 +177,7 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   if (bank.shape_bytes == 1) {
     form.narrow_shape.resize(vertices * modes * 3);
   } else {
-    bank.shape.resize(vertices * modes * 3);
+    reserve_large(bank.shape, vertices * modes * 3);  // load() appends
   }
   const auto make_text = [&](const std::string& field, std::string& text) {
     const Extent& extent = get_extent(seal, field, name);
@@ -195,8 +196,8 @@ std::string trim(std::string_view text) {
   return std::string(text.substr(0, last == std::string_view::npos ? 0 : last + 1));
 }
 
-/// Copies the arrays out of the pieces and compares the digest.
-Loaded load(const Seal& seal, const std::string& name, const Pieces& for_each_piece) {
+/// Reads the file from front to back, every array to where it belongs, and compares the digest.
+Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   Loaded loaded;
   allocate(seal, name, loaded);
   struct Target {
@@ -210,16 +211,32 @@ Loaded load(const Seal& seal, const std::string& name, const Pieces& for_each_pi
     // The table points to const for the writer's sake; what it points to is `loaded`, which is ours to fill.
     if (extent.bytes > 0) targets.push_back({extent.offset, extent.bytes, static_cast<std::byte*>(const_cast<void*>(field.data))});
   }
+  std::sort(targets.begin(), targets.end(), [](const Target& a, const Target& b) { return a.offset < b.offset; });
+  targets.push_back({seal.length, 0, nullptr});
+
+  constexpr std::uint64_t kPiece = 1 << 18;  // is still in the cache when it is hashed
   Digest digest;
-  for_each_piece([&](std::uint64_t offset, std::span<const std::byte> piece) {
-    digest.update(offset == 0 ? piece.first(kTextBytes) : piece);
-    if (offset == 0) digest.update(piece.subspan(kSealBytes));
-    for (const Target& target : targets) {
-      const std::uint64_t begin = std::max(offset, target.offset);
-      const std::uint64_t end = std::min(offset + piece.size(), target.offset + target.bytes);
-      if (begin < end) std::memcpy(target.data + (begin - target.offset), piece.data() + (begin - offset), end - begin);
+  std::vector<std::byte> buffer(std::min(seal.length, kPiece));
+  std::uint64_t place = 0;
+  const auto take = [&](std::byte* data, std::uint64_t bytes, bool is_shape = false) {
+    for (std::uint64_t done = 0, step = 0; done < bytes; done += step, place += step) {
+      step = std::min(bytes - done, kPiece);
+      const std::span piece(data != nullptr ? data + done : buffer.data(), step);
+      read(place, piece);
+      digest.update(piece);
+      if (!is_shape) continue;
+      const auto* steps = reinterpret_cast<const std::int16_t*>(piece.data());
+      loaded.bank.shape.insert(loaded.bank.shape.end(), steps, steps + piece.size() / sizeof *steps);
     }
-  });
+  };
+  take(nullptr, kTextBytes);
+  place = kSealBytes;  // the digest is not part of itself
+  for (const Target& target : targets) {
+    if (target.offset < place) throw InputError(name + ": damaged seal: two arrays overlap; copy or write the bank again");
+    take(nullptr, target.offset - place);
+    const bool is_shape = target.bytes > 0 && target.data == reinterpret_cast<std::byte*>(loaded.bank.shape.data());
+    take(is_shape ? nullptr : target.data, target.bytes, is_shape);
+  }
   if (digest.finish() != seal.digest) {
     throw InputError(name +
                      ": checksum differs: bytes were changed since the bank was sealed; copy or write the bank again (or, if you changed "
@@ -266,16 +283,7 @@ void require_sane(const Bank& bank, const std::string& name) {
 Bank read_bank_unchecked(const std::filesystem::path& path) {
   const File file(path);
   const Seal seal = file.read_seal();
-  Loaded loaded = load(seal, file.name(), [&](const auto& take) {
-    std::vector<std::byte> buffer(std::min<std::uint64_t>(file.length(), 1 << 20));
-    for (std::uint64_t offset = 0; offset < file.length();) {
-      const std::span piece = std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), file.length() - offset));
-      file.read(offset, piece);
-      take(offset, piece);
-      offset += piece.size();
-    }
-  });
-  return finish(std::move(loaded), file.name());
+  return finish(load(seal, file.name(), [&](std::uint64_t offset, std::span<std::byte> bytes) { file.read(offset, bytes); }), file.name());
 }
 
 Bank read_bank(const std::filesystem::path& path) {
@@ -287,7 +295,8 @@ Bank read_bank(const std::filesystem::path& path) {
 Bank parse_bank(std::span<const std::byte> bytes, const std::string& name) {
   const auto head = bytes.first(std::min(bytes.size(), kSealBytes));
   const Seal seal = parse_seal({reinterpret_cast<const char*>(head.data()), head.size()}, bytes.size(), name);
-  Bank bank = finish(load(seal, name, [&](const auto& take) { take(0, bytes); }), name);
+  const auto copy = [&](std::uint64_t offset, std::span<std::byte> to) { std::memcpy(to.data(), bytes.data() + offset, to.size()); };
+  Bank bank = finish(load(seal, name, copy), name);
   require_sane(bank, name);
   return bank;
 }

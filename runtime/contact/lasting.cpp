@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/config/chance.hpp"
 #include "runtime/contact/resting.hpp"
 
 namespace carillon::contact {
@@ -156,20 +157,10 @@ void record(const Engine& engine, const Snapshot& now, const Group& g, Spot& spo
   }
 }
 
-std::uint64_t scramble(std::uint64_t z) {  // splitmix64 (Steele, Lea and Flood 2014)
-  z += 0x9e3779b97f4a7c15U;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-  return z ^ (z >> 31);
-}
+std::uint64_t scramble(std::uint64_t state) { return config::draw(state); }
 
-/// FNV-1a (Fowler, Noll and Vo 1991) of a body's name; 0 for the ground.
-std::uint64_t hash_name(const Engine& engine, int body) {
-  if (body < 0) return 0;
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : engine.world().bodies[body].name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  return hash;
-}
+/// 0 for the ground.
+std::uint64_t hash_name(const Engine& engine, int body) { return body < 0 ? 0 : config::hash_name(engine.world().bodies[body].name); }
 
 }  // namespace
 

@@ -1,6 +1,5 @@
-// Method: half-edges are put into buckets by their lower vertex, where their partners are next to them. The tree halves the faces at the
-//   median of their centroids along the longest side of their box, down to four. Nearest places by branch and bound; boxes of two meshes by
-//   the fifteen separating axes.
+// Method: the tree halves the faces at the median of their centroids along the longest side of their box, down to four. Nearest places by
+//   branch and bound; boxes of two meshes by the fifteen separating axes.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5 (nearest point of a triangle), 4.4 (boxes), 6.1 (trees); T. Moeller and
 //   B. Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
 // Deviations: none.
@@ -8,6 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+
+#include "runtime/bank/edges.hpp"
+#include "runtime/bank/triangle.hpp"
 
 namespace carillon::contact {
 namespace {
@@ -22,63 +24,27 @@ constexpr double kSame = 1e-13;  // relative: distances that are equal
 
 /// Barycentric coordinates of the place of a triangle that is nearest to x.
 Vec3 find_nearest_barycentric(const Vec3& x, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ax = x - a;
-  const double d1 = dot(ab, ax), d2 = dot(ac, ax);
-  if (d1 <= 0.0 && d2 <= 0.0) return {1, 0, 0};
-  const Vec3 bx = x - b;
-  const double d3 = dot(ab, bx), d4 = dot(ac, bx);
-  if (d3 >= 0.0 && d4 <= d3) return {0, 1, 0};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return {1.0 - d1 / (d1 - d3), d1 / (d1 - d3), 0.0};
-  const Vec3 cx = x - c;
-  const double d5 = dot(ab, cx), d6 = dot(ac, cx);
-  if (d6 >= 0.0 && d5 <= d6) return {0, 0, 1};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return {1.0 - d2 / (d2 - d6), 0.0, d2 / (d2 - d6)};
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0.0, 1.0 - w, w};
-  }
-  const double sum = va + vb + vc;
-  return {va / sum, vb / sum, vc / sum};
+  const Vec3 ab = b - a, ac = c - a, ax = x - a, bx = x - b, cx = x - c;
+  const auto w = bank::weigh_corners(dot(ab, ax), dot(ac, ax), dot(ab, bx), dot(ac, bx), dot(ab, cx), dot(ac, cx));
+  return {w[0], w[1], w[2]};
 }
 
 }  // namespace
 
 std::vector<std::int32_t> find_opposite_edges(const std::vector<Face>& triangles, std::size_t vertices) {
-  std::vector<std::int32_t> begin(vertices + 1, 0), edges(3 * triangles.size()), opposite(3 * triangles.size(), -1);
-  const auto from = [&](std::int32_t e) { return triangles[e / 3][e % 3]; };
-  const auto to = [&](std::int32_t e) { return triangles[e / 3][(e % 3 + 1) % 3]; };
-  const auto upper = [&](std::int32_t e) { return std::max(from(e), to(e)); };
-  const auto count = static_cast<std::int32_t>(edges.size());
-  for (std::int32_t e = 0; e < count; ++e) ++begin[std::min(from(e), to(e)) + 1];
-  for (std::size_t v = 0; v < vertices; ++v) begin[v + 1] += begin[v];
-  std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
-  for (std::int32_t e = 0; e < count; ++e) edges[next[std::min(from(e), to(e))]++] = e;
-  for (std::size_t v = 0; v < vertices; ++v) {
-    std::sort(edges.begin() + begin[v], edges.begin() + begin[v + 1],
-              [&](std::int32_t e, std::int32_t f) { return upper(e) != upper(f) ? upper(e) < upper(f) : e < f; });
-    for (std::int32_t i = begin[v], j = i; i < begin[v + 1]; i = j) {
-      while (j < begin[v + 1] && upper(edges[j]) == upper(edges[i])) ++j;
-      const std::int32_t e = edges[i];
-      if (j - i == 1 && from(e) != to(e)) continue;
-      if (j - i == 2 && from(e) == to(edges[i + 1]) && from(e) != to(e)) {
-        opposite[e] = edges[i + 1];
-        opposite[edges[i + 1]] = e;
-        continue;
-      }
-      for (std::int32_t k = i; k < j; ++k) opposite[edges[k]] = -2;
+  std::vector<std::int32_t> opposite(3 * triangles.size(), -1);
+  bank::for_each_edge(triangles, vertices, [&](std::int32_t low, const bank::HalfEdge* first, const bank::HalfEdge* last) {
+    const auto begins_low = [&](const bank::HalfEdge& edge) { return triangles[edge.number / 3][edge.number % 3] == low; };
+    const bool is_edge = low != first->upper;
+    if (last - first == 1 && is_edge) return;
+    if (last - first == 2 && is_edge && begins_low(first[0]) != begins_low(first[1])) {
+      opposite[first[0].number] = first[1].number;
+      opposite[first[1].number] = first[0].number;
+      return;
     }
-  }
+    for (const bank::HalfEdge* edge = first; edge < last; ++edge) opposite[edge->number] = -2;
+  });
   return opposite;
-}
-
-void Box::add(const Vec3& x) {
-  for (int k = 0; k < 3; ++k) {
-    low[k] = std::min(low[k], x[k]);
-    high[k] = std::max(high[k], x[k]);
-  }
 }
 
 bool Box::contains(const Vec3& x) const {
@@ -122,6 +88,8 @@ bool are_boxes_near(const Box& a, const Box& b, const SimTK::Transform& X_ba, do
 }
 
 Mesh::Mesh(std::vector<Vec3> vertices, std::vector<Face> faces) : vertices_(std::move(vertices)), faces_(std::move(faces)) {
+  normals_.reserve(faces_.size());
+  edges_.reserve(3 * faces_.size() / 2);
   for (const Face& f : faces_) {
     const Vec3 n = cross(vertices_[f[1]] - vertices_[f[0]], vertices_[f[2]] - vertices_[f[0]]);
     normals_.push_back(n / n.norm());
@@ -136,23 +104,31 @@ Mesh::Mesh(std::vector<Vec3> vertices, std::vector<Face> faces) : vertices_(std:
 Vec3 Mesh::calc_centroid(int f) const { return (vertices_[faces_[f][0]] + vertices_[faces_[f][1]] + vertices_[faces_[f][2]]) / 3.0; }
 
 void Mesh::make_tree() {
-  std::vector<Vec3> middles;
+  struct Key {
+    double at;
+    int face;
+    bool operator<(const Key& other) const { return at != other.at ? at < other.at : face < other.face; }
+  };
+  std::vector<Vec3> middles(faces_.size());
+  std::vector<Box> boxes(faces_.size());
+  std::vector<Key> keys(faces_.size());
+  order_.resize(faces_.size());
   for (int f = 0; f < face_count(); ++f) {
-    order_.push_back(f);
-    middles.push_back(calc_centroid(f));
+    order_[f] = f;
+    middles[f] = calc_centroid(f);
+    for (const int v : faces_[f]) boxes[f].add(vertices_[v]);
   }
   nodes_.push_back({Box(), 0, face_count(), -1});
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
     Node node = nodes_[n];
-    for (int i = 0; i < node.count; ++i)
-      for (const int v : faces_[order_[node.first + i]]) node.box.add(vertices_[v]);
+    for (int i = node.first; i < node.first + node.count; ++i) node.box.add(boxes[order_[i]]);
     if (node.count > kLeaf) {
       const Vec3 size = node.box.high - node.box.low;
       const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
       const int half = node.count / 2;
-      const auto begin = order_.begin() + node.first;
-      std::nth_element(begin, begin + half, begin + node.count,
-                       [&](int f, int g) { return middles[f][axis] != middles[g][axis] ? middles[f][axis] < middles[g][axis] : f < g; });
+      for (int i = 0; i < node.count; ++i) keys[i] = {middles[order_[node.first + i]][axis], order_[node.first + i]};
+      std::nth_element(keys.begin(), keys.begin() + half, keys.begin() + node.count);
+      for (int i = 0; i < node.count; ++i) order_[node.first + i] = keys[i].face;
       node.child = static_cast<int>(nodes_.size());
       nodes_.push_back({Box(), node.first, half, -1});
       nodes_.push_back({Box(), node.first + half, node.count - half, -1});

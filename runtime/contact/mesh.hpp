@@ -3,6 +3,7 @@
 
 #include <SimTKcommon.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <utility>
@@ -19,7 +20,13 @@ std::vector<std::int32_t> find_opposite_edges(const std::vector<Face>& triangles
 /// A box along the axes of its mesh.
 struct Box {
   SimTK::Vec3 low{SimTK::Infinity}, high{-SimTK::Infinity};
-  void add(const SimTK::Vec3& x);
+  void add(const SimTK::Vec3& x) { add(Box{x, x}); }
+  void add(const Box& other) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], other.low[k]);
+      high[k] = std::max(high[k], other.high[k]);
+    }
+  }
   bool contains(const SimTK::Vec3& x) const;
   double calc_distance2(const SimTK::Vec3& x) const;
 };

@@ -153,8 +153,14 @@ Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std
     : mesh_(make_mesh(vertices, triangles, body, bank_triangle_)) {
   neighbours_.resize(mesh_.vertex_count());
   face_ridges_.resize(mesh_.face_count());
+  face_middles_m_.reserve(mesh_.face_count());
   for (int f = 0; f < mesh_.face_count(); ++f) face_middles_m_.push_back(mesh_.calc_centroid(f));
+  std::vector<int> valence(mesh_.vertex_count(), 0);
+  for (const Mesh::Edge& edge : mesh_.edges())
+    for (const int v : edge.vertices) ++valence[v];
+  for (int v = 0; v < mesh_.vertex_count(); ++v) neighbours_[v].reserve(valence[v]);
   std::vector<double> lengths;
+  lengths.reserve(mesh_.edges().size());
   for (const Mesh::Edge& edge : mesh_.edges()) {
     const auto [a, b] = edge.vertices;
     neighbours_[a].push_back(b);
@@ -163,14 +169,19 @@ Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std
     lengths.push_back(along.norm());
     RidgeEdge ridge;
     ridge.vertices = edge.vertices;
-    for (int k = 0; k < 2; ++k) {
+    const auto find_into_face = [&](int k) -> Vec3 {
       Vec3 in = face_middles_m_[edge.faces[k]] - vertex(a);
       in -= along * (SimTK::dot(in, along) / along.normSqr());
-      ridge.into_face[k] = in / in.norm();
-    }
+      return in / in.norm();
+    };
+    ridge.into_face[1] = find_into_face(1);
     // A flat or hollow edge can never be the one that touches first.
     if (SimTK::dot(mesh_.normal(edge.faces[0]), ridge.into_face[1]) > -1e-3) continue;
-    for (const int f : edge.faces) face_ridges_[f].push_back(static_cast<int>(ridges_.size()));
+    ridge.into_face[0] = find_into_face(0);
+    for (const int f : edge.faces) {
+      if (face_ridges_[f].empty()) face_ridges_[f].reserve(3);
+      face_ridges_[f].push_back(static_cast<int>(ridges_.size()));
+    }
     ridges_.push_back(ridge);
   }
   std::nth_element(lengths.begin(), lengths.begin() + lengths.size() / 2, lengths.end());
@@ -194,19 +205,21 @@ void Surface::find_corners() {
   std::vector<int> any_face(count, -1);
   for (int f = 0; f < mesh_.face_count(); ++f) {
     for (const int v : mesh_.face(f)) {
+      if (is_corner_[v] != 0) continue;
       if (any_face[v] < 0) any_face[v] = f;
       const Vec3 bend = mesh_.normal(f) - mesh_.normal(any_face[v]);
       if (bend.norm() > kStraight) is_corner_[v] = 1;
     }
   }
+  std::vector<Vec3> ways;  // to its neighbours, unit vectors
   for (int v = 0; v < count; ++v) {
-    const auto& around = neighbours_[v];
-    for (std::size_t i = 0; i < around.size() && is_corner_[v] != 0; ++i) {
-      const Vec3 to = vertex(around[i]) - vertex(v);
-      for (std::size_t j = 0; j < i; ++j) {
-        const Vec3 fro = vertex(around[j]) - vertex(v);
-        if ((to / to.norm() + fro / fro.norm()).norm() < kStraight) is_corner_[v] = 0;
-      }
+    if (is_corner_[v] == 0) continue;
+    ways.clear();
+    for (const int w : neighbours_[v]) {
+      const Vec3 way = vertex(w) - vertex(v);
+      for (const Vec3& other : ways)  // the first test is quick
+        if (SimTK::dot(way, other) < 0.0 && (way / way.norm() + other).norm() < kStraight) is_corner_[v] = 0;
+      ways.push_back(way / way.norm());
     }
   }
 }

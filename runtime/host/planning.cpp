@@ -4,16 +4,14 @@
 #include <limits>
 #include <optional>
 
+#include "runtime/config/chance.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/synth/pulse.hpp"
 
 namespace carillon::host {
 
 synth::Surface make_surface(const SceneBody& body) {
-  // FNV-1a (Fowler, Noll and Vo 1991).
-  std::uint64_t seed = 0xcbf29ce484222325U;
-  for (const char c : body.name) seed = (seed ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = seed};
+  return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = config::hash_name(body.name)};
 }
 
 synth::Surface make_ground(const Scene& scene) {
@@ -43,6 +41,7 @@ plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, 
         std::any_of(scene.strikes.begin(), scene.strikes.end(), [i](const SceneStrike& strike) { return strike.body == i; });
     facts.bodies.push_back({.name = body.name,
                             .bank = body.spec.bank,
+                            .sphere_radius_m = body.sphere_radius_m,
                             .fixed = body.spec.fixed,
                             .struck = struck,
                             .position_m = calc_world_point(body.spec.initial, body.spec.bank->rigid.centre_m),

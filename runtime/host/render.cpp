@@ -203,8 +203,9 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     std::shared_ptr<const synth::Model>& model = models[banks[i]];
     if (!model) {
       const bool clicks = options.plan != nullptr || scene.effects.has(Effect::kAccelerationNoise);
-      model =
-          synth::Model::make(*banks[i], {.rate_hz = rate_hz, .sphere_radius_m = clicks ? radiation::calc_sphere_radius_m(*banks[i]) : 0.0});
+      double radius_m = clicks ? scene.bodies[i].sphere_radius_m : 0.0;
+      if (clicks && radius_m == 0.0) radius_m = radiation::calc_sphere_radius_m(*banks[i]);
+      model = synth::Model::make(*banks[i], {.rate_hz = rate_hz, .sphere_radius_m = radius_m});
     }
     body_models.push_back(model);
     sound.body_modes.push_back(model->get_mode_count());

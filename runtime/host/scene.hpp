@@ -34,10 +34,11 @@ inline constexpr synth::EffectSet kDefaultEffects = synth::kUsualEffects;
 
 struct SceneBody {
   std::string name;
-  std::filesystem::path bank;  // absolute
-  contact::BodySpec spec;      // spec.bank is filled when the banks are read
-  plan::Wish wish;             // its own key "effects", or the scene's
-  double variation = 0.0;      // its own key "variation", or the scene's: how much equal strikes differ, 0..1
+  std::filesystem::path bank;    // absolute
+  contact::BodySpec spec;        // spec.bank is filled when the banks are read
+  plan::Wish wish;               // its own key "effects", or the scene's
+  double sphere_radius_m = 0.0;  // of its bank, when that is read: radiation::calc_sphere_radius_m()
+  double variation = 0.0;        // its own key "variation", or the scene's: how much equal strikes differ, 0..1
 };
 
 /// A blow that the scene gives without physics. Point and impulse are in the frame of the body's mesh.

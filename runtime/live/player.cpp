@@ -137,8 +137,7 @@ void play(const PlayerOptions& options) {
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const contact::BodySpec& spec = scene.bodies[i].spec;
     auto& model = models[spec.bank];
-    if (model == nullptr)
-      model = synth::Model::make(*spec.bank, {.rate_hz = rate_hz, .sphere_radius_m = radiation::calc_sphere_radius_m(*spec.bank)});
+    if (model == nullptr) model = synth::Model::make(*spec.bank, {.rate_hz = rate_hz, .sphere_radius_m = scene.bodies[i].sphere_radius_m});
     // Without time to plan a body has all that it might call for.
     const synth::EffectSet effects = plans ? synth::EffectSet{} : planner.get_possible(static_cast<int>(i));
     synthesiser.add_body(model, {.position_m = host::calc_world_point(spec.initial, spec.bank->rigid.centre_m),

@@ -62,7 +62,8 @@ double calc_level_db(double exposure_pa2_s) noexcept {
   return 10.0 * std::log10(std::max(exposure_pa2_s, 0.0) / (kEarS * kReferencePa * kReferencePa));
 }
 
-BankLevels::BankLevels(const bank::Bank& bank, double rate_hz) : bank_(&bank), highest_hz_(std::min(kHighestHz, 0.5 * rate_hz)) {
+BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_radius_m)
+    : bank_(&bank), highest_hz_(std::min(kHighestHz, 0.5 * rate_hz)) {
   double lowest_hz = 0.0;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const double freq = bank.freq_hz(m), omega = 2.0 * pi * freq, d = bank.decay_per_s[m];
@@ -73,7 +74,7 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz) : bank_(&bank), h
     const double slow = d > omega ? d - std::sqrt((d - omega) * (d + omega)) : d;
     modes_.push_back({static_cast<int>(m), freq, std::max(slow, 1e-9), std::abs(bank.radiation_gain[m]), calc_a_weight(freq)});
   }
-  radius_m_ = radiation::calc_sphere_radius_m(bank);
+  radius_m_ = sphere_radius_m > 0.0 ? sphere_radius_m : radiation::calc_sphere_radius_m(bank);
   // p(f) = rho c a / m T |s T / ((s T)^2 + 2 s T + 2)| J P(f) at 1 m, T = a / c; its exposure is twice the integral of |p|^2 over f > 0.
   const double turn = radius_m_ / bank::kSoundSpeedMs;
   const double gain = bank::kAirDensityKgM3 * bank::kSoundSpeedMs * radius_m_ / bank.rigid.mass_kg * turn;

@@ -34,7 +34,7 @@ struct ClickLevels {
 class BankLevels {
  public:
   /// Modes from kLowestHz to the lower of kHighestHz and half the rate. `bank` with the gains that it is played with; it must outlive this.
-  BankLevels(const bank::Bank& bank, double rate_hz);
+  BankLevels(const bank::Bank& bank, double rate_hz, double sphere_radius_m = 0.0);
 
   struct Mode {
     int index = 0;  // in the bank

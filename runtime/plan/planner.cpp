@@ -138,7 +138,7 @@ Planner::Planner(SceneFacts facts, const Costs& costs) : state_(std::make_unique
     const BodyFacts& of = s.facts.bodies[i];
     if (of.bank == nullptr) throw InputError(fmt::format("the plan of \"{}\" needs its bank", of.name));
     auto& levels = s.banks[of.bank];
-    if (!levels) levels = std::make_unique<BankLevels>(*of.bank, s.facts.rate_hz);
+    if (!levels) levels = std::make_unique<BankLevels>(*of.bank, s.facts.rate_hz, of.sphere_radius_m);
     State::Body& body = s.bodies[i];
     body.bank = levels.get();
     body.position_m = of.position_m;

@@ -66,6 +66,7 @@ struct Wish {
 struct BodyFacts {
   std::string name;
   const bank::Bank* bank = nullptr;  // with the gains that it is played with; must outlive the planner
+  double sphere_radius_m = 0.0;      // radiation::calc_sphere_radius_m(*bank); 0: to be worked out
   bool fixed = false;
   bool struck = false;  // by the scene itself
   Vec3 position_m{};    // of the centre of mass, at the beginning

@@ -1,7 +1,9 @@
-// The inner loop of calc_gains, once for each instruction set.
+// The inner loops of calc_gains, once for each instruction set.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 
 namespace carillon::radiation {
 
@@ -16,5 +18,20 @@ using AddFlow = void (*)(const float* through, const float* harmonic, std::size_
 void add_flow_plain(const float* through, const float* harmonic, std::size_t rows, double* flow);
 void add_flow_avx2(const float* through, const float* harmonic, std::size_t rows, double* flow);
 void add_flow_avx512(const float* through, const float* harmonic, std::size_t rows, double* flow);
+
+/// A triangle: the rows of its corners in the shapes of the bank (modes, 3), and what a motion of one step along each axis sends through
+/// it.
+struct Corners {
+  std::array<const std::int16_t*, 3> steps{};
+  std::array<float, 3> share{};
+  float per_share = 0.0F;  // of the square of a flow, in `squares`
+};
+
+/// The flow of every mode through a triangle, (modes), and its square times per_share added to `squares`, (modes).
+using CalcThrough = void (*)(const Corners& corners, std::size_t modes, float* through, float* squares);
+
+void calc_through_plain(const Corners& corners, std::size_t modes, float* through, float* squares);
+void calc_through_avx2(const Corners& corners, std::size_t modes, float* through, float* squares);
+void calc_through_avx512(const Corners& corners, std::size_t modes, float* through, float* squares);
 
 }  // namespace carillon::radiation

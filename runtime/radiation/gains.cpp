@@ -30,10 +30,27 @@ constexpr std::size_t kHarmonics = kOrders * kOrders;
 
 double calc_dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
+/// The factors of the recurrences of calc_harmonics.
+struct Recurrence {
+  std::array<std::array<double, kOrders>, kOrders> a{}, b{};  // [m][l]
+  std::array<double, kOrders> diagonal{};
+  Recurrence() {
+    for (int m = 0; m <= kMostLobes; ++m) {
+      const double m2 = static_cast<double>(m) * m;
+      for (int l = m; l <= kMostLobes; ++l) {
+        const double l1 = l + 1.0;
+        a[m][l] = std::sqrt((4.0 * l1 * l1 - 1.0) / (l1 * l1 - m2));
+        b[m][l] = l == m ? 0.0 : std::sqrt((static_cast<double>(l) * l - m2) / (4.0 * l * l - 1.0));
+      }
+      diagonal[m] = std::sqrt((2.0 * m + 3.0) / (2.0 * m + 2.0));
+    }
+  }
+};
+
 /// Real orthonormal spherical harmonics of a unit vector at l^2 + l + m, by the recurrence of the normalised associated Legendre functions.
-std::array<double, kHarmonics> calc_harmonics(const Vec3& direction) {
+std::array<double, kHarmonics> calc_harmonics(const Recurrence& recurrence, const Vec3& direction) {
   const auto [x, y, z] = direction;
-  std::array<double, kHarmonics> harmonics{};
+  std::array<double, kHarmonics> harmonics;
   double cosine = 1.0, sine = 0.0;         // sin(theta)^m times cos(m phi) and sin(m phi)
   double diagonal = std::sqrt(0.25 / pi);  // P_mm / sin(theta)^m
   for (int m = 0; m <= kMostLobes; ++m) {
@@ -42,17 +59,14 @@ std::array<double, kHarmonics> calc_harmonics(const Vec3& direction) {
       const double scale = m == 0 ? 1.0 : std::numbers::sqrt2;
       harmonics[l * l + l + m] = scale * here * cosine;
       if (m > 0) harmonics[l * l + l - m] = scale * here * sine;
-      const double l1 = l + 1.0, m2 = static_cast<double>(m) * m;
-      const double a = std::sqrt((4.0 * l1 * l1 - 1.0) / (l1 * l1 - m2));
-      const double b = l == m ? 0.0 : std::sqrt((static_cast<double>(l) * l - m2) / (4.0 * l * l - 1.0));
-      const double next = a * (z * here - b * before);
+      const double next = recurrence.a[m][l] * (z * here - recurrence.b[m][l] * before);
       before = here;
       here = next;
     }
     const double turned = x * cosine - y * sine;
     sine = y * cosine + x * sine;
     cosine = turned;
-    diagonal *= std::sqrt((2.0 * m + 3.0) / (2.0 * m + 2.0));
+    diagonal *= recurrence.diagonal[m];
   }
   return harmonics;
 }
@@ -108,12 +122,18 @@ Skin make_skin(const bank::Bank& bank) {
   return skin;
 }
 
-AddFlow find_add_flow() {
+struct Loops {
+  AddFlow add_flow = add_flow_plain;
+  CalcThrough calc_through = calc_through_plain;
+};
+
+Loops find_loops() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) return add_flow_avx512;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return add_flow_avx2;
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
+    return {add_flow_avx512, calc_through_avx512};
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return {add_flow_avx2, calc_through_avx2};
 #endif
-  return add_flow_plain;
+  return {};
 }
 
 /// What one mode sends out in each order: U_l^2 summed over m, and the rest.
@@ -121,12 +141,12 @@ using Power = std::array<double, kOrders + 1>;
 
 std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
   static_assert(kHarmonics <= kFlowColumns);
-  const AddFlow add_flow = find_add_flow();
+  const Loops loops = find_loops();
+  const Recurrence recurrence;
   const std::size_t modes = bank.mode_count(), rows = (modes + kFlowRows - 1) / kFlowRows * kFlowRows;
   const double per_area = 1.0 / (skin.radius_m * skin.radius_m);
   std::vector<double> flow(rows * kFlowColumns), squares(modes);  // in integer steps of the shapes
   std::vector<float> through(kFlowBlock * rows), harmonic(kFlowBlock * kFlowColumns), block_squares(modes);
-  std::vector<std::int32_t> motion(3 * modes);  // of the three corners together
   for (std::size_t first = 0; first < skin.triangles.size(); first += kFlowBlock) {
     std::fill(through.begin(), through.end(), 0.0F);
     std::fill(harmonic.begin(), harmonic.end(), 0.0F);
@@ -143,23 +163,16 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
       }
       const double length = std::sqrt(calc_dot(direction, direction));
       for (double& x : direction) x = length > 0.0 ? x / length : 0.0;
-      const std::array<double, kHarmonics> harmonics = calc_harmonics(direction);
+      const std::array<double, kHarmonics> harmonics = calc_harmonics(recurrence, direction);
       std::copy(harmonics.begin(), harmonics.end(), harmonic.begin() + static_cast<std::ptrdiff_t>((t - first) * kFlowColumns));
-      const std::int16_t* a = &bank.shape[static_cast<std::size_t>(corners[0]) * modes * 3];
-      const std::int16_t* b = &bank.shape[static_cast<std::size_t>(corners[1]) * modes * 3];
-      const std::int16_t* c = &bank.shape[static_cast<std::size_t>(corners[2]) * modes * 3];
-      for (std::size_t i = 0; i < motion.size(); ++i) motion[i] = a[i] + b[i] + c[i];
-      std::array<float, 3> share{};
-      for (int k = 0; k < 3; ++k) share[k] = static_cast<float>(normal[k] / 3.0 * per_area);
-      const auto per_share = static_cast<float>(1.0 / (area * per_area));
-      float* row = &through[(t - first) * rows];
-      for (std::size_t m = 0; m < modes; ++m) {
-        row[m] = share[0] * static_cast<float>(motion[3 * m]) + share[1] * static_cast<float>(motion[3 * m + 1]) +
-                 share[2] * static_cast<float>(motion[3 * m + 2]);
+      Corners motion{.per_share = static_cast<float>(1.0 / (area * per_area))};
+      for (std::size_t k = 0; k < 3; ++k) {
+        motion.steps[k] = &bank.shape[static_cast<std::size_t>(corners[k]) * modes * 3];
+        motion.share[k] = static_cast<float>(normal[k] / 3.0 * per_area);
       }
-      for (std::size_t m = 0; m < modes; ++m) block_squares[m] += row[m] * row[m] * per_share;
+      loops.calc_through(motion, modes, &through[(t - first) * rows], block_squares.data());
     }
-    add_flow(through.data(), harmonic.data(), rows, flow.data());
+    loops.add_flow(through.data(), harmonic.data(), rows, flow.data());
     for (std::size_t m = 0; m < modes; ++m) squares[m] += static_cast<double>(block_squares[m]);
   }
   std::vector<Power> powers(modes);
@@ -175,20 +188,7 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
   return powers;
 }
 
-void check_sizes(const bank::Bank& bank) {
-  const std::size_t modes = bank.mode_count(), vertices = bank.vertex_count();
-  bool inside = bank.shape.size() == 3 * vertices * modes && bank.shape_scale.size() == modes && bank.radiation_gain.size() == modes;
-  for (const bank::Triangle& triangle : bank.triangles)
-    for (const std::int32_t v : triangle) inside = inside && v >= 0 && static_cast<std::size_t>(v) < vertices;
-  if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
-}
-
-}  // namespace
-
-std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
-  check_sizes(bank);
-  if (kind == GainKind::kOsg02) return bank.radiation_gain;
-  const Skin skin = make_skin(bank);
+std::vector<double> calc_gains_of_skin(const bank::Bank& bank, const Skin& skin) {
   const std::vector<Power> powers = calc_powers(bank, skin);
   std::vector<double> gains(bank.mode_count());
   for (std::size_t m = 0; m < gains.size(); ++m) {
@@ -201,9 +201,32 @@ std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
   return gains;
 }
 
+double calc_sphere_radius_of_skin(const Skin& skin) { return std::cbrt(skin.volume_m3 * 3.0 / (4.0 * pi)); }
+
+void check_sizes(const bank::Bank& bank) {
+  const std::size_t modes = bank.mode_count(), vertices = bank.vertex_count();
+  bool inside = bank.shape.size() == 3 * vertices * modes && bank.shape_scale.size() == modes && bank.radiation_gain.size() == modes;
+  for (const bank::Triangle& triangle : bank.triangles)
+    for (const std::int32_t v : triangle) inside = inside && v >= 0 && static_cast<std::size_t>(v) < vertices;
+  if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
+}
+
+}  // namespace
+
+std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
+  check_sizes(bank);
+  return kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, make_skin(bank));
+}
+
+Radiation calc_radiation(const bank::Bank& bank, GainKind kind) {
+  check_sizes(bank);
+  const Skin skin = make_skin(bank);
+  return {kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, skin), calc_sphere_radius_of_skin(skin)};
+}
+
 double calc_sphere_radius_m(const bank::Bank& bank) {
   check_sizes(bank);
-  return std::cbrt(make_skin(bank).volume_m3 * 3.0 / (4.0 * pi));
+  return calc_sphere_radius_of_skin(make_skin(bank));
 }
 
 }  // namespace carillon::radiation

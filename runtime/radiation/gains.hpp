@@ -21,6 +21,13 @@ inline constexpr int kMostLobes = 8;
 /// Throws InputError when arrays of the bank disagree or its surface has no outside. Not for an audio thread; any other, several at once.
 std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind);
 
+/// Both of a bank at once, for the price of one: the gains as calc_gains() gives them, and calc_sphere_radius_m().
+struct Radiation {
+  std::vector<double> gains;
+  double sphere_radius_m = 0.0;
+};
+Radiation calc_radiation(const bank::Bank& bank, GainKind kind);
+
 /// Radius [m] of the sphere that has the volume inside the outer surface, cavities and all. InputError as above.
 double calc_sphere_radius_m(const bank::Bank& bank);
 

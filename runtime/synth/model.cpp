@@ -12,6 +12,7 @@
 #include <limits>
 #include <numbers>
 
+#include "runtime/bank/large.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/synth/oscillator.hpp"
 
@@ -195,8 +196,9 @@ void Model::add_damped_modes(std::vector<Mode> modes) {
 
 void Model::copy_shapes(const bank::Bank& bank) {
   columns_ = sound_.size() * kGroup + damped_.size();
-  shape_.assign(bank.vertex_count() * 3 * columns_, 0);
-  std::vector<std::uint32_t> first, column;  // of each mode: its place in a vertex's row of the bank, and here
+  bank::reserve_large(shape_, bank.vertex_count() * 3 * columns_);
+  std::vector<std::int16_t> row(3 * columns_, 0);  // of a vertex; lanes without a mode stay 0
+  std::vector<std::uint32_t> first, column;        // of each mode: its place in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     first.push_back(3 * static_cast<std::uint32_t>(modes_[i].bank_mode));
     column.push_back(static_cast<std::uint32_t>(
@@ -205,12 +207,13 @@ void Model::copy_shapes(const bank::Bank& bank) {
   largest_.assign(sound_.size() * kGroup, 0.0F);
   for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) {
     const std::int16_t* from = &bank.shape[vertex * bank.mode_count() * 3];
-    std::int16_t *x = &shape_[vertex * 3 * columns_], *y = x + columns_, *z = y + columns_;
+    std::int16_t *x = row.data(), *y = x + columns_, *z = y + columns_;
     for (std::size_t i = 0; i < modes_.size(); ++i) {
       x[column[i]] = from[first[i]];
       y[column[i]] = from[first[i] + 1];
       z[column[i]] = from[first[i] + 2];
     }
+    shape_.insert(shape_.end(), row.begin(), row.end());
     for (std::size_t c = 0; c < largest_.size(); ++c) {
       const auto fx = static_cast<float>(x[c]), fy = static_cast<float>(y[c]), fz = static_cast<float>(z[c]);
       largest_[c] = std::max(largest_[c], fx * fx + fy * fy + fz * fz);

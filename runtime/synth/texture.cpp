@@ -20,6 +20,8 @@
 #include <numbers>
 #include <vector>
 
+#include "runtime/config/chance.hpp"
+
 namespace carillon::synth {
 namespace {
 
@@ -32,13 +34,6 @@ constexpr double kFadeFrom = 0.4, kFadeTo = 0.5;  // of the rate: where the shor
 constexpr double kHighestM = 1.0;                 // rms height; keeps what follows within floats
 constexpr float kLeast = 1e-4F;                   // of an octave: below, it is left out
 constexpr float kFraction = 1.0F / static_cast<float>(1U << 24);
-
-std::uint64_t scramble(std::uint64_t& state) noexcept {  // splitmix64 (Steele, Lea and Flood 2014)
-  std::uint64_t z = state += 0x9e3779b97f4a7c15U;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
-  return z ^ (z >> 31);
-}
 
 /// x[n] = sum over k of X[k] e^{2 pi i k n / N}, in place; N a power of two (Cooley and Tukey 1965).
 void transform(std::vector<std::complex<double>>& x) {
@@ -72,7 +67,7 @@ struct Tables {
       const double amplitude = std::pow(static_cast<double>(k) / kWaves, -0.5 * (1.0 + 2.0 * Texture::kHurst));
       const double spline = (2.0 + std::cos(2.0 * pi * k / kPoints)) / 3.0;
       power += 0.5 * amplitude * amplitude;
-      x[static_cast<std::size_t>(k)] = std::polar(amplitude / spline, 2.0 * pi * static_cast<double>(scramble(seed) >> 11) * 0x1p-53);
+      x[static_cast<std::size_t>(k)] = std::polar(amplitude / spline, 2.0 * pi * config::to_unit(config::draw(seed)));
     }
     transform(x);
     for (int n = 0; n < kPoints + 3; ++n) {
@@ -103,7 +98,7 @@ void Texture::make_tables() { get_tables(); }
 void Texture::start(double roughness_m, std::uint64_t seed) noexcept {
   roughness_m_ = std::clamp(roughness_m, 0.0, kHighestM);
   place_ = 0;
-  for (std::uint64_t& offset : offset_) offset = scramble(seed);
+  for (std::uint64_t& offset : offset_) offset = config::draw(seed);
 }
 
 Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, double give_rad_s, double rate_hz) const noexcept {

@@ -124,6 +124,54 @@ static void check_nearest(const carillon_bank* bank) {
   carillon_bank_centre_m(bank, NULL);
 }
 
+static void check_variation(const carillon_bank* bank) {
+  carillon_impulse first, other, same;
+  double energy = 0;
+  int32_t n;
+  int k;
+  CHECK(carillon_name_seed("") == 0xcbf29ce484222325ull && carillon_name_seed("a") == 0xaf63dc4c8601ec8cull); /* published: FNV-1a */
+  CHECK(carillon_name_seed(NULL) == 0);
+  carillon_impulse_init(&first);
+  first.time_s = 1;
+  first.duration_s = 1e-4;
+  first.impulse_n_s[2] = 0.01;
+  for (k = 0; k < 3; ++k) first.barycentric[k] = 1.0 / 3.0;
+  other = first;
+  CHECK(carillon_vary_impulse(bank, 0, 5, 7, &other) == CARILLON_OK && memcmp(&first, &other, sizeof first) == 0); /* off: to the bit */
+  for (n = 0; n < 1000; ++n) {
+    double size = 0, weight = 0;
+    other = same = first;
+    CHECK(carillon_vary_impulse(bank, 1, carillon_name_seed("bell"), n, &other) == CARILLON_OK);
+    CHECK(carillon_vary_impulse(bank, 1, carillon_name_seed("bell"), n, &same) == CARILLON_OK && memcmp(&same, &other, sizeof same) == 0);
+    CHECK(memcmp(&first, &other, sizeof first) != 0);
+    for (k = 0; k < 3; ++k) {
+      size += other.impulse_n_s[k] * other.impulse_n_s[k];
+      weight += other.barycentric[k];
+      CHECK(other.barycentric[k] >= 0);
+    }
+    CHECK(fabs(weight - 1) < 1e-12 && other.triangle >= 0 && other.triangle < carillon_bank_triangle_count(bank));
+    CHECK(other.time_s == first.time_s && other.duration_s > 0.7e-4 && other.duration_s < 1.3e-4);
+    CHECK(sqrt(size) > 0.005 && sqrt(size) < 0.014);
+    energy += size / 1e-4 / 1000;
+  }
+  CHECK(fabs(energy - 1) < 4 * 0.18 / sqrt(1000)); /* the mean energy stays: four standard errors */
+  same = first;
+  CHECK(carillon_vary_impulse(bank, 1, carillon_name_seed("gong"), 999, &same) == CARILLON_OK && memcmp(&same, &other, sizeof same) != 0);
+  other = first;
+  CHECK(carillon_vary_impulse(bank, 1.1, 0, 0, &other) == CARILLON_BAD_INPUT &&
+        carillon_vary_impulse(bank, -1, 0, 0, &other) == CARILLON_BAD_INPUT);
+  CHECK(carillon_vary_impulse(bank, nan(""), 0, 0, &other) == CARILLON_BAD_INPUT && memcmp(&first, &other, sizeof first) == 0);
+  other.triangle = carillon_bank_triangle_count(bank);
+  CHECK(carillon_vary_impulse(bank, 1, 0, 0, &other) == CARILLON_BAD_INPUT);
+  other.triangle = -1;
+  CHECK(carillon_vary_impulse(bank, 1, 0, 0, &other) == CARILLON_BAD_INPUT);
+  other = first;
+  other.impulse_n_s[1] = INFINITY;
+  CHECK(carillon_vary_impulse(bank, 1, 0, 0, &other) == CARILLON_BAD_INPUT);
+  CHECK(carillon_vary_impulse(NULL, 1, 0, 0, &first) == CARILLON_BAD_ARGUMENT &&
+        carillon_vary_impulse(bank, 1, 0, 0, NULL) == CARILLON_BAD_ARGUMENT);
+}
+
 static void check_models(const carillon_bank* bank, carillon_model** model) {
   carillon_model_options options;
   carillon_model* other;
@@ -490,6 +538,7 @@ int main(int argc, char** argv) {
   CHECK(carillon_abi_version() == CARILLON_ABI_VERSION);
   check_banks(argv[1], &bank);
   check_nearest(bank);
+  check_variation(bank);
   check_models(bank, &model);
   CHECK(strcmp(carillon_status_text(CARILLON_OK), "ok") == 0 && strlen(carillon_status_text(CARILLON_FULL)) > 3);
   CHECK(strlen(carillon_status_text((carillon_status)99)) > 3);

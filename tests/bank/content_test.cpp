@@ -4,12 +4,38 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <random>
 
+#include "runtime/bank/edges.hpp"
 #include "tests/bank/example_bank.hpp"
 
 namespace carillon::bank {
 namespace {
+
+TEST(Edges, AreThoseThatASearchOfAllFinds) {
+  std::mt19937 random(7);
+  for (const std::int32_t vertices : {4, 9, 60}) {  // crowded ones, too
+    std::vector<std::array<std::int32_t, 3>> triangles(100);
+    for (auto& corners : triangles)
+      for (std::int32_t& v : corners) v = static_cast<std::int32_t>(random() % static_cast<std::uint32_t>(vertices));
+    std::map<std::pair<std::int32_t, std::int32_t>, std::vector<std::int32_t>> expected;
+    for (std::int32_t e = 0; e < 300; ++e) {
+      const std::int32_t a = triangles[e / 3][e % 3], b = triangles[e / 3][(e % 3 + 1) % 3];
+      expected[{std::min(a, b), std::max(a, b)}].push_back(e);
+    }
+    auto next = expected.begin();
+    for_each_edge(triangles, static_cast<std::size_t>(vertices), [&](std::int32_t low, const HalfEdge* first, const HalfEdge* last) {
+      std::vector<std::int32_t> numbers;
+      for (const HalfEdge* edge = first; edge < last; ++edge) numbers.push_back(edge->number);
+      ASSERT_NE(next, expected.end());
+      EXPECT_EQ(std::pair(low, first->upper), next->first);
+      EXPECT_EQ(numbers, next->second);
+      ++next;
+    });
+    EXPECT_EQ(next, expected.end());
+  }
+}
 
 TEST(Quantise, NoComponentIsOffByMoreThanHalfAStep) {
   Bank bank = example::make_bank(4, 20);

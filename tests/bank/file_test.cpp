@@ -13,6 +13,7 @@
 
 #include "runtime/bank/reduce.hpp"
 #include "tests/bank/example_bank.hpp"
+#include "tests/bank/seal_again.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -217,16 +218,45 @@ TEST_F(BankFile, AnyHeaderByteWithAnyValueIsRefused) {
   }
 }
 
+/// What read(2) and pread(2) have delivered to this process.
+std::uint64_t read_so_far() {
+  std::ifstream stream("/proc/self/io");
+  std::string name;
+  std::uint64_t bytes = 0;
+  stream >> name >> bytes;  // "rchar: "
+  return bytes;
+}
+
+TEST_F(BankFile, EveryByteIsReadOnce) {
+  const Bank bank = example::make_bank(12, 100);
+  write_bank(bank, file_);
+  const std::uint64_t before = read_so_far();
+  const Bank back = read_bank(file_);
+  const std::uint64_t taken = read_so_far() - before;
+  ASSERT_GT(before, 0u) << "/proc/self/io cannot be read";
+  EXPECT_GT(fs::file_size(file_), 500'000u);
+  EXPECT_LT(taken, fs::file_size(file_) + kSealBytes + 1024u) << "and the seal twice";
+  EXPECT_EQ(back.shape, bank.shape);
+}
+
+TEST_F(BankFile, ArraysThatOverlapAreRefused) {
+  write_bank(example::make_bank(), file_);
+  std::string bytes = get();
+  const auto find_offset = [&](const std::string& field) {
+    const std::size_t begin = bytes.find("field " + field + " <f8 ") + ("field " + field + " <f8 ").size();
+    return std::pair(begin, bytes.substr(begin, bytes.find(' ', begin) - begin));
+  };
+  const auto [place, offset] = find_offset("modes/decay");
+  const auto [other_place, other] = find_offset("modes/residual");
+  ASSERT_EQ(offset.size(), other.size());
+  bytes.replace(place, offset.size(), other);
+  put(seal_again(bytes));
+  EXPECT_NE(message_of(file_).find("damaged seal: two arrays overlap"), std::string::npos) << message_of(file_);
+}
+
 TEST_F(BankFile, ARowIsReadWithoutTheRest) {
   const Bank bank = example::make_bank(12, 100);
   write_bank(bank, file_);
-  const auto read_so_far = [] {
-    std::ifstream stream("/proc/self/io");
-    std::string name;
-    std::uint64_t bytes = 0;
-    stream >> name >> bytes;  // "rchar: ", what read(2) and pread(2) delivered
-    return bytes;
-  };
   const std::uint64_t before = read_so_far();
   const std::vector<Vec3> row = read_shape_row(file_, 123);
   const std::uint64_t taken = read_so_far() - before;

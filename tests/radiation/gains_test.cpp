@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "runtime/config/error.hpp"
+#include "runtime/radiation/flow.hpp"
 #include "tests/radiation/sphere_bank.hpp"
 #include "tests/synth/cube_bank.hpp"
 
@@ -133,6 +135,46 @@ TEST(Gains, TheSphereOfABodyHasItsOuterVolume) {
   hollow.vertices_m.insert(hollow.vertices_m.end(), inner.vertices_m.begin(), inner.vertices_m.end());
   for (const auto& [a, b, c] : inner.triangles) hollow.triangles.push_back({outer + a, outer + c, outer + b});
   EXPECT_NEAR(calc_sphere_radius_m(hollow), kRadius, 1e-3 * kRadius);
+}
+
+TEST(Gains, ComeWithTheRadiusAsEachDoesAlone) {
+  bank::Bank bank = testing::make_lobed_sphere(read_rows(), kRadius, 2);
+  for (const GainKind kind : {GainKind::kOsg02, GainKind::kSphere}) {
+    const Radiation both = calc_radiation(bank, kind);
+    EXPECT_EQ(both.gains, calc_gains(bank, kind));
+    EXPECT_EQ(both.sphere_radius_m, calc_sphere_radius_m(bank));
+  }
+}
+
+TEST(Gains, EveryInstructionSetSendsTheSameThroughATriangle) {
+  std::vector<CalcThrough> kinds{calc_through_plain};
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) kinds.push_back(calc_through_avx2);
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
+    kinds.push_back(calc_through_avx512);
+#endif
+  std::mt19937 random(3);
+  for (const std::size_t modes : {0, 1, 15, 16, 47, 100}) {
+    std::array<std::vector<std::int16_t>, 3> rows;
+    for (auto& row : rows)
+      for (std::size_t i = 0; i < 3 * modes; ++i) row.push_back(static_cast<std::int16_t>(random()));
+    const Corners corners{{rows[0].data(), rows[1].data(), rows[2].data()}, {0.3F, -0.7F, 1.1F}, 0.01F};
+    std::vector<float> expected(modes), expected_squares(modes, 2.0F);
+    for (std::size_t m = 0; m < modes; ++m) {
+      std::array<float, 3> part{};
+      for (std::size_t k = 0; k < 3; ++k)
+        part[k] = corners.share[k] * static_cast<float>(rows[0][3 * m + k] + rows[1][3 * m + k] + rows[2][3 * m + k]);
+      expected[m] = part[0] + part[1] + part[2];
+      const float square = expected[m] * expected[m];
+      expected_squares[m] += square * 0.01F;
+    }
+    for (const CalcThrough calc_through : kinds) {
+      std::vector<float> through(modes), squares(modes, 2.0F);
+      calc_through(corners, modes, through.data(), squares.data());
+      EXPECT_EQ(through, expected) << modes;
+      EXPECT_EQ(squares, expected_squares) << modes;
+    }
+  }
 }
 
 TEST(Gains, Osg02IsTheFieldOfTheBank) {

@@ -137,6 +137,19 @@ TEST(Texture, IsNotFeltWhereTheBodiesGiveWay) {
   }
 }
 
+TEST(Texture, AnotherSpeedIsAnotherFactorAtAllFrequencies) {
+  Texture texture;
+  texture.start(kRoughness, 6);
+  const auto calc_db = [&](double speed, double freq) {
+    return 10.0 * std::log10(Texture::calc_density(texture.calc_gains(speed, 1e-9, 0.0, kRate), speed, freq));
+  };
+  for (double slow = 0.05; slow < 0.7; slow *= 2.0) {
+    const double factor_db = 20.0 * Texture::kHurst * std::log10(2.0);
+    for (double freq = 2.1 * slow / Texture::kLongestM; freq < 0.15 * kRate; freq *= 1.3)
+      EXPECT_NEAR(calc_db(2.0 * slow, freq) - calc_db(slow, freq), factor_db, 0.01) << slow << " m/s, " << freq << " Hz";
+  }
+}
+
 TEST(Texture, IsTheSameForTheSameSeedAndAnotherForAnother) {
   Texture a, b, c;
   a.start(kRoughness, 1), b.start(kRoughness, 1), c.start(kRoughness, 2);

@@ -29,9 +29,13 @@ def play(stage):
     tools.print_table([("sliding [s]", "speed [m/s]", "level [dB]", "mean frequency [Hz]")] +
                       [(f"{t:.1f}", f"{max(0.0, 1 - 1.68 * (t + 0.05)):.2f}", "silent" if level is None else f"{level:.1f}", f"{mean:.0f}") for t, level, mean in slide])
     levels = [level for _, level, _ in slide[:5]]
-    stage.expect("the sliding tile gets quieter as it slows down", levels == sorted(levels, reverse=True) and levels[0] - levels[4] > 10)
+    # A tenth of a second of noise has its level to a dB or two.
+    stage.expect("the sliding tile gets quieter as it slows down", all(later < sooner + 2 for sooner, later in zip(levels, levels[1:])) and levels[0] - levels[4] > 6)
     # At 0.75 m/s in the second tenth and 0.24 in the fifth: 20 log10 of their ratio to the power of 0.75 to 1 (docs/decisions/contact-sound.md), and 3 dB of chance.
     stage.expect("by 4 to 13 dB from 0.75 to 0.24 m/s", 4 < levels[1] - levels[4] < 13)
+    # Asperities of all sizes, of which none is longer than 6.4 mm (below 150 Hz) or too short to be heard: the force has the same spectrum at every speed.
+    means = [mean for _, _, mean in slide[:5]]
+    stage.expect("its band stays where it is", max(means) < 1.2 * min(means))
     stage.expect("at rest it is silent, sample by sample", not samples[int(1.05 * rate):].any())
 
     rate, samples, _ = stage.render("roll", tools.read_json(stage.folder / "roll.json"))
