@@ -162,7 +162,7 @@ Surface::Surface(const Vertices& vertices, const Triangles& triangles, const std
   std::vector<double> lengths;
   lengths.reserve(mesh_.edges().size());
   for (const Mesh::Edge& edge : mesh_.edges()) {
-    const auto [a, b] = edge.vertices;
+    const int a = edge.vertices[0], b = edge.vertices[1];
     neighbours_[a].push_back(b);
     neighbours_[b].push_back(a);
     const Vec3 along = vertex(b) - vertex(a);
