@@ -126,17 +126,12 @@ class Outlet {
 
   /// The next frames, by channels.
   void add(const std::vector<const float*>& channels, std::size_t count) {
-    frames_.clear();
     for (std::size_t n = 0; n < count; ++n)
       for (const float* channel : channels) frames_.push_back(channel[n]);
-    const auto before = static_cast<std::size_t>(std::min<std::uint64_t>(count, tail_begin_ - std::min(tail_begin_, taken_)));
-    const std::span<const float> all(frames_);
-    store(all.first(before * channels.size()));
-    const std::span<const float> rest = all.subspan(before * channels.size());
-    tail_.insert(tail_.end(), rest.begin(), rest.end());
-    taken_ += count;
+    if (frames_.size() >= kHeld * channels.size()) pass_on();
   }
   void finish(Sound& sound) {
+    pass_on();
     const auto peak = std::accumulate(tail_.begin(), tail_.end(), 0.0F, [](float most, float p) { return std::max(most, std::abs(p)); });
     const std::size_t channels = store_->get_channels(), count = tail_.size() / channels;
     if (peak > 0.0F && peak >= kFadeShare * std::max(meter_.get_peak_pa(), static_cast<double>(peak))) {
@@ -151,8 +146,24 @@ class Outlet {
     sound.levels = meter_.calc_levels();
     sound.frames = store_->get_frames();
   }
+  /// CPU time of what is not playing: of measuring and storing, up to now.
+  double get_seconds_cpu() const { return seconds_cpu_; }
 
  private:
+  static constexpr std::size_t kHeld = 8192;  // frames: the clock is asked twice for so many
+
+  void pass_on() {
+    const double began = get_cpu_seconds();
+    const std::size_t channels = store_->get_channels(), count = frames_.size() / channels;
+    const auto before = static_cast<std::size_t>(std::min<std::uint64_t>(count, tail_begin_ - std::min(tail_begin_, taken_)));
+    const std::span<const float> all(frames_);
+    store(all.first(before * channels));
+    const std::span<const float> rest = all.subspan(before * channels);
+    tail_.insert(tail_.end(), rest.begin(), rest.end());
+    taken_ += count;
+    frames_.clear();
+    seconds_cpu_ += get_cpu_seconds() - began;
+  }
   void store(std::span<const float> frames) {
     meter_.add(frames);
     store_->append(frames);
@@ -162,6 +173,7 @@ class Outlet {
   Meter meter_;
   std::uint64_t tail_begin_ = 0, taken_ = 0;
   std::vector<float> frames_, tail_;
+  double seconds_cpu_ = 0.0;
 };
 
 /// Below which pressure at 1 m a body sleeps: where the planner is free to say so, what nobody hears.
@@ -263,9 +275,9 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     outlet.add(heard, count - skipped);
     if (options.progress) options.progress(static_cast<double>(start + count) / static_cast<double>(samples));
   }
+  sound.seconds_playing_cpu = std::max(
+      0.0, get_cpu_seconds() - began - outlet.get_seconds_cpu() - 1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - asked_ns));
   outlet.finish(sound);
-  sound.seconds_playing_cpu =
-      std::max(0.0, get_cpu_seconds() - began - 1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - asked_ns));
   if (options.measures) sound.seconds_per_tick = 1e-9;
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
   sound.strikes = counters.strikes;
