@@ -1,4 +1,4 @@
-// Silence for CGAL: its handlers, and the standard error stream it also writes to.
+// Silence for CGAL: its handlers, and the streams of standard error that it also writes to.
 #include "precompute/mesher/quiet.hpp"
 
 #include <CGAL/assertions.h>
@@ -20,13 +20,14 @@ class Nowhere final : public std::streambuf {
 
 struct Quiet::Saved {
   Nowhere nowhere;
-  std::streambuf* cerr = nullptr;
+  std::streambuf *cerr = nullptr, *clog = nullptr;
   CGAL::Failure_function warning = nullptr, error = nullptr;
   CGAL::Failure_behaviour on_warning = CGAL::CONTINUE, on_error = CGAL::THROW_EXCEPTION;
 };
 
 Quiet::Quiet() : saved_(std::make_unique<Saved>()) {
   saved_->cerr = std::cerr.rdbuf(&saved_->nowhere);
+  saved_->clog = std::clog.rdbuf(&saved_->nowhere);
   saved_->warning = CGAL::set_warning_handler(say_nothing);
   saved_->error = CGAL::set_error_handler(say_nothing);
   saved_->on_warning = CGAL::set_warning_behaviour(CGAL::CONTINUE);
@@ -38,6 +39,7 @@ Quiet::~Quiet() {
   CGAL::set_warning_behaviour(saved_->on_warning);
   CGAL::set_error_handler(saved_->error);
   CGAL::set_warning_handler(saved_->warning);
+  std::clog.rdbuf(saved_->clog);
   std::cerr.rdbuf(saved_->cerr);
 }
 

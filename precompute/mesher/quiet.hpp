@@ -5,7 +5,7 @@
 
 namespace carillon::mesher {
 
-/// While it lives, CGAL's warnings and what anybody writes to std::cerr go nowhere; CGAL's errors still throw. One at a time.
+/// While it lives, CGAL's warnings and what is written to std::cerr and std::clog go nowhere; CGAL's errors still throw. One at a time.
 class Quiet {
  public:
   Quiet();

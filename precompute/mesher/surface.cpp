@@ -42,8 +42,8 @@ constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMostRounded = 100'000;  // triangles
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
-// Processor seconds after which the program gives up (guard_program). The hollow bunny of 37,000 nodes takes 7 s and is given 336 s.
-constexpr double kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
+// Processor seconds after which the program gives up (guard_program). The hollow bunny of 37,000 nodes takes 7 s and is given 225 s.
+constexpr double kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 2e-3;
 constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
 /// Tells the user of a phase and keeps its time.
@@ -493,7 +493,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
                                  options.surface.string(), edge, nodes, kMostNodes));
   const double least = calc_least_nodes(body);
-  if (!options.nodes && std::max(body.model.calc_nodes(edge), least) > nodes_asked) {
+  if (!options.nodes) {
     cpu_limit.reset();
     cpu_limit.emplace(kLeastCpu + kCpuPerTriangle * static_cast<double>(report.input_triangles) +
                       kCpuPerNode * std::max(body.model.calc_nodes(edge), least));

@@ -169,11 +169,12 @@ def damage_bytes(data, random):
 class Campaign:
     def __init__(self, options):
         self.options = options
-        self.bin = pathlib.Path(options.bin)
+        self.bin = pathlib.Path(options.bin).resolve()
         self.counts = collections.Counter()
         self.faults = []
         self.slowest = 0.0
         self.environment = {**os.environ, "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1", "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1"}
+        self.empty = tempfile.TemporaryDirectory()  # where the programs stand: they leave nothing there
         self.reader = next((p for p in (self.bin / "test_meshes", self.bin.parent / "tests/mesher/test_meshes") if p.exists()), None)
         if self.reader is None:
             sys.exit("mutate.py: test_meshes is not built")
@@ -183,7 +184,7 @@ class Campaign:
         begin = os.times()
         wall = 10 * self.options.seconds
         try:
-            done = subprocess.run(words, capture_output=True, timeout=wall, env=self.environment)
+            done = subprocess.run(words, capture_output=True, timeout=wall, env=self.environment, cwd=self.empty.name)
             code, said = done.returncode, done.stderr.decode(errors="replace")
         except subprocess.TimeoutExpired:
             code, said = None, ""
@@ -227,6 +228,9 @@ class Campaign:
             out.unlink(missing_ok=True)
             code, said, seconds = self.run([self.bin / "carillon-mesh", path, "-o", out, *words])
             shown = " ".join(words) + ": " + said
+            for left in pathlib.Path(self.empty.name).iterdir():
+                self.fault("surface leaves a file", path, f"{left.name}, {shown}")
+                left.unlink()
             if code is None:
                 self.fault("surface hangs", path, f"{seconds:.0f} s CPU, {shown}")
             elif self.is_crash(code, said):
