@@ -6,8 +6,8 @@
 // The template behind the two kinds of body; only delaunay_field.cpp and delaunay_surface.cpp include it.
 #pragma once
 
-// Where CGAL sees that a point is there already it throws, and before that it writes two files, dump-bug.mesh and dump-bug.binary.cgal, into
-// the folder where the program stands. Its header of that is taken as included, and what it would define does nothing.
+// Where CGAL sees that a point is there already it throws, and before that it writes two files, dump-bug.mesh and dump-bug.binary.cgal,
+// into the folder where the program stands. Its header of that is taken as included, and what it would define does nothing.
 #define CGAL_MESH_3_DUMP_C3T3_H
 #include <string>
 namespace CGAL {
