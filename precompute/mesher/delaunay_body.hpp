@@ -111,14 +111,7 @@ class Mesh3Body : public DelaunayBody {
                             p::cell_radius_edge_ratio = 2, p::cell_size = radius);
     // A bound on the nodes ends what would otherwise go on for ever: balls between curves that nearly touch.
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
-    // Its own call has no least size: balls shrink to nothing where curves cross, and what is between them is counted beyond any int.
-    if (!curves_.empty()) {
-      using Sizes = CGAL::Mesh_3::internal::Edge_criteria_sizing_field_wrapper<typename Criteria::Edge_criteria>;
-      CGAL::Mesh_3::Protect_edges_sizing_field<Complex, Domain, Sizes> protect(complex_, *domain_, Sizes(criteria.edge_criteria_object()),
-                                                                               kLeastBall * sizes.edge_m, sizes.most_nodes, &unused);
-      protect.set_nonlinear_growth_of_balls(false);
-      protect(true);
-    }
+    if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
     insert_first_points(sizes.edge_m);
     Watchdog watchdog(2 + 5e-4 * static_cast<double>(sizes.most_nodes));
     stop_ = &watchdog.stop;
@@ -166,7 +159,6 @@ class Mesh3Body : public DelaunayBody {
 
   // Mesh_3 bounds circumradii; the mean edge of the tetrahedra it makes is about 1.1 times that bound.
   static constexpr double kRadiusPerEdge = 0.9;
-  static constexpr double kLeastBall = 1e-5;  // of the edge length
 
   void insert_first_points(double edge_m) {
     auto& triangulation = complex_.triangulation();

@@ -42,8 +42,8 @@ constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMostRounded = 100'000;  // triangles
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
-// Processor seconds after which the program gives up (guard_program). The hollow bunny of 37,000 nodes takes 7 s and is given 225 s.
-constexpr double kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 2e-3;
+// Processor seconds after which the program gives up (guard_program). The hollow bunny of 37,000 nodes takes 7 s and is given 336 s.
+constexpr double kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
 constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
 /// Tells the user of a phase and keeps its time.
