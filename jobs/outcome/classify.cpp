@@ -96,7 +96,7 @@ Verdict classify(const Ending& ending) {
     return {Cause::hung, fmt::format("hung: no progress and no work for {:.0f} s, and was killed", ending.hang_s), 0.0};
   if (error.empty() && ending.was_out_of_time) {
     const bool is_saved = code == kExitCheckpointed;
-    return {Cause::time_limit, fmt::format("time limit reached; {}", is_saved ? "saved, and goes on from there" : "nothing was saved"),
+    return {Cause::time_limit, fmt::format("time limit reached; {}", is_saved ? "saved, and resumes from there" : "nothing was saved"),
             0.0};
   }
   if (error.empty() && ending.was_asked_to_stop) return {Cause::stopped, code == kExitCheckpointed ? "stopped and saved" : "stopped", 0.0};

@@ -20,7 +20,7 @@ void add_count(Facts& facts, const Json::Value& in, const char* key, const char*
 }
 
 /// Only where there were any.
-void add_repaired(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark) {
+void add_if_any(Facts& facts, const Json::Value& in, const char* key, const char* what, const char* remark) {
   if (find_count(in, key).value_or(0) > 0) add_count(facts, in, key, what, remark);
 }
 
@@ -98,14 +98,14 @@ Html make_mesh_section(const Subject& subject) {
   facts.add("connected parts", html("{}", format_count(bank.counts.components)));
   facts.add("surface", html("{} triangles", format_count(static_cast<std::int64_t>(bank.triangles.size()))),
             fmt::format("{} vertices", format_count(static_cast<std::int64_t>(bank.vertex_count()))));
-  add_repaired(facts, mesh, "held_nodes", "held nodes", "by the job");
+  add_if_any(facts, mesh, "held_nodes", "fixed nodes", "by the job");
   add_count(facts, mesh, "file_nodes", "nodes of the file");
-  add_repaired(facts, mesh, "refinements", "refined", "times");
-  add_repaired(facts, mesh, "reoriented", "turned round", "elements that were inside out");
-  add_repaired(facts, mesh, "unreferenced", "unused", "nodes of the file");
-  add_repaired(facts, mesh, "welded", "welded", "nodes that lay on others");
-  add_repaired(facts, mesh, "curved", "curved", "elements");
-  add_repaired(facts, mesh, "straightened", "straightened", "elements that were bent too far");
+  add_if_any(facts, mesh, "refinements", "refined", "times");
+  add_if_any(facts, mesh, "reoriented", "turned round", "elements that were inside out");
+  add_if_any(facts, mesh, "unreferenced", "unused", "nodes of the file");
+  add_if_any(facts, mesh, "welded", "welded", "nodes that lay on others");
+  add_if_any(facts, mesh, "curved", "curved", "elements");
+  add_if_any(facts, mesh, "straightened", "straightened", "elements that were bent too far");
   facts.add("mass", html("{} kg", format_plain(bank.rigid.mass_kg)), fmt::format("{} m\u00b3", format_plain(bank.rigid.volume_m3)));
   out += facts.finish();
   out += make_surface_part(bank);

@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "runtime/config/error.hpp"
+#include "runtime/config/file.hpp"
 
 namespace carillon::store {
 namespace {
@@ -35,7 +36,7 @@ void make_folder(const fs::path& folder) {
 }
 
 void throw_errno(const fs::path& path, const std::string& verb, int error) {
-  const char* advice = is_full_error(error)                                  ? kFullAdvice
+  const char* advice = config::is_full_error(error)                          ? kFullAdvice
                        : error == EACCES || error == EPERM || error == EROFS ? "check owner, group and rights"
                                                                              : "check the disk";
   throw SystemError(fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), advice));
@@ -50,8 +51,6 @@ bool append_text(const fs::path& file, const std::string& text) {
   ::close(fd);
   return is_written;
 }
-
-bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT; }
 
 bool is_disk_full(const fs::path& folder, std::string_view message) {
   const auto says = [&](int error) { return message.find(std::strerror(error)) != std::string_view::npos; };

@@ -1,3 +1,4 @@
+// One tree of folders and all that is done to it, by one rule of publication: longer than most files.
 // Method:     A store is a tree of folders whose names are hashes. What is added is made in tmp/, synced and renamed, so that it is there
 //             whole or not at all; two who add the same make the same, and the second rename says so.
 // Source:     rename(2), fsync(2), flock(2).
@@ -64,7 +65,7 @@ fs::path find_root(const fs::path& folder) {
 void make_root(const fs::path& root) {
   std::error_code error;
   fs::create_directories(root, error);
-  if (is_full_error(error.value())) throw_errno(root, "make this store", error.value());
+  if (config::is_full_error(error.value())) throw_errno(root, "make this store", error.value());
   if (error || !fs::is_directory(root, error))
     throw InputError(fmt::format("{}: cannot make this store: {}; choose another folder with --store", root.string(),
                                  error ? error.message() : "this is no folder"));
@@ -93,7 +94,7 @@ void check_rights(const fs::path& folder) {
   const int error = errno;
   struct stat info {};
   ::stat(folder.c_str(), &info);
-  if (is_full_error(error) || error == EROFS) throw_errno(folder, "write to this store", error);
+  if (config::is_full_error(error) || error == EROFS) throw_errno(folder, "write to this store", error);
   throw InputError(
       fmt::format("{}: you (user {}) may not write to this store: its folder belongs to user {} and group {}, rights {:04o}; a store for a "
                   "group is made with "
@@ -416,9 +417,9 @@ std::optional<std::string> Store::find_record_change(const Id& id) const {
     if (!is_ours) continue;
     const auto info = folder.look_at(name);
     if (!info) return fmt::format("its {} is missing", name);
-    if (hash_record(folder, name.c_str()) != sha256 && (!S_ISREG(info->st_mode) || info->st_size == 0))
-      return fmt::format("its {} is {}", name, S_ISREG(info->st_mode) ? "empty" : "no regular file");
-    if (hash_record(folder, name.c_str()) != sha256) return fmt::format("its {} is not what was published", name);
+    if (!S_ISREG(info->st_mode)) return fmt::format("its {} is no regular file", name);
+    if (hash_record(folder, name.c_str()) != sha256)
+      return fmt::format("its {} is {}", name, info->st_size == 0 ? "empty" : "not what was published");
   }
   return std::nullopt;
 }

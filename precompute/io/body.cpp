@@ -17,7 +17,7 @@
 namespace carillon::io {
 namespace {
 
-// What is foreseen of a body before it is there.
+// What is known of a body before its mesh is made.
 constexpr std::int64_t kFileBytesPerTet = 50, kUsualNodes = 20000;
 constexpr double kMeshingSeconds = 5;
 

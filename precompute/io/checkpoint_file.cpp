@@ -308,7 +308,7 @@ void CheckpointFile::begin(const Setting& setting, const Fingerprint& system, co
   if (!trouble.empty()) return set_aside(trouble);
   checkpoint_.numbers = content_.numbers;
   checkpoint_.column_count = content_.columns;
-  stations_.say(fmt::format("goes on from {}", file_.string()));
+  stations_.say(fmt::format("resumes from {}", file_.string()));
 }
 
 /// Whether the columns are what they were.

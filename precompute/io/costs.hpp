@@ -1,4 +1,4 @@
-// What a run costs, foreseen from the size of its parts.
+// What a run costs, predicted from the size of its parts.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ struct Extent {
   std::int64_t surface_nodes = 0;
   bool is_quadratic = true;
   bool is_lumped = false;       // M is diagonal
-  bool is_thin = false;         // the lowest modes are mended: walls a hundred times as wide as thick
+  bool is_thin = false;         // the lowest modes need a correction: walls a hundred times as wide as thick
   bool is_read_by_all = false;  // the file is read by all ranks
   double read_seconds = 0;      // what reading or meshing took, or will
   double factor_flops = 0;      // of one factorisation

@@ -2,8 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <pthread.h>
-#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "precompute/io/worker.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::io {
@@ -55,13 +54,8 @@ const char* name_phase(eigen::Phase phase) {
 }  // namespace
 
 ProgressFile::ProgressFile(const std::filesystem::path& file, int ranks)
-    : file_(open_to_append(file)), start_(std::chrono::steady_clock::now()), foresight_(ranks) {
-  // Signals are for the thread that computes.
-  sigset_t all, before;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &before);
-  writer_ = std::thread([this] { run(); });
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    : file_(open_to_append(file)), start_(std::chrono::steady_clock::now()), estimate_(ranks) {
+  writer_ = start_worker([this] { run(); });
 }
 
 ProgressFile::~ProgressFile() {
@@ -79,44 +73,44 @@ double ProgressFile::find_seconds() const { return std::chrono::duration<double>
 void ProgressFile::begin(const std::string& station) {
   const std::lock_guard lock(mutex_);
   phase_ = station;
-  foresight_.begin(station, find_seconds());
+  estimate_.begin(station, find_seconds());
   if (station != "modes") write_line();  // which begins with a phase of the solver's
 }
 
 void ProgressFile::learn(const Extent& extent) {
   const std::lock_guard lock(mutex_);
-  foresight_.learn(extent);
+  estimate_.learn(extent);
 }
 
 void ProgressFile::expect_trials() {
   const std::lock_guard lock(mutex_);
-  foresight_.expect_trials();
+  estimate_.expect_trials();
 }
 
 void ProgressFile::advance(const eigen::Progress& progress) {
   const std::lock_guard lock(mutex_);
   const bool is_new = phase_ != name_phase(progress.phase);
   phase_ = name_phase(progress.phase);
-  foresight_.advance(progress, find_seconds());
+  estimate_.advance(progress, find_seconds());
   if (is_new) write_line();
 }
 
 void ProgressFile::finish() {
   const std::lock_guard lock(mutex_);
   phase_ = "done";
-  foresight_.finish();
+  estimate_.finish();
   write_line();
 }
 
 /// What does not move is not said again. A disk that is full must not end the run.
 void ProgressFile::write_line() {
   const double seconds = find_seconds();
-  std::string text = fmt::format("{{\"phase\": \"{}\", \"percent\": {:.2f}, \"modes_done\": {}", phase_, foresight_.calc_percent(seconds),
-                                 std::min(foresight_.get_modes_done(), foresight_.get_modes_wanted()));
-  if (foresight_.get_modes_wanted() > 0) text += fmt::format(", \"modes_wanted\": {}", foresight_.get_modes_wanted());
+  std::string text = fmt::format("{{\"phase\": \"{}\", \"percent\": {:.2f}, \"modes_done\": {}", phase_, estimate_.calc_percent(seconds),
+                                 std::min(estimate_.get_modes_done(), estimate_.get_modes_wanted()));
+  if (estimate_.get_modes_wanted() > 0) text += fmt::format(", \"modes_wanted\": {}", estimate_.get_modes_wanted());
   if (text == last_ || is_broken_) return;
   last_ = text;
-  if (const auto left = foresight_.calc_seconds_left(seconds)) text += fmt::format(", \"seconds_left\": {:.1f}", *left);
+  if (const auto left = estimate_.calc_seconds_left(seconds)) text += fmt::format(", \"seconds_left\": {:.1f}", *left);
   text += fmt::format(", \"seconds\": {:.2f}}}\n", seconds);
   if (write(file_, text.data(), text.size()) == static_cast<ssize_t>(text.size())) return;
   is_broken_ = true;

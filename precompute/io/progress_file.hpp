@@ -11,7 +11,7 @@
 
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/io/costs.hpp"
-#include "precompute/io/foresight.hpp"
+#include "precompute/io/run_estimate.hpp"
 
 namespace carillon::io {
 
@@ -46,7 +46,7 @@ class ProgressFile {
   int file_ = -1;
   std::chrono::steady_clock::time_point start_;
   std::mutex mutex_;  // of all below
-  Foresight foresight_;
+  RunEstimate estimate_;
   std::string phase_;
   std::string last_;  // line, without its seconds
   bool is_broken_ = false;

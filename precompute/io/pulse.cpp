@@ -1,7 +1,6 @@
 #include "precompute/io/pulse.hpp"
 
 #include <fmt/core.h>
-#include <signal.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "precompute/io/worker.hpp"
 #include "runtime/config/printable.hpp"
 
 namespace carillon::io {
@@ -31,13 +31,7 @@ double find_process_seconds() {
 }
 
 Pulse::Pulse(bool speaks) : speaks_(speaks) {
-  if (!speaks_) return;
-  // Signals are for the main thread.
-  sigset_t all, before;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &before);
-  thread_ = std::thread([this] { beat(); });
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  if (speaks_) thread_ = start_worker([this] { beat(); });
 }
 
 Pulse::~Pulse() {

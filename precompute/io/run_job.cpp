@@ -178,7 +178,7 @@ RunSummary describe_stop(const Run& run) {
   RunSummary summary;
   summary.is_stopped = true;
   summary.result = fmt::format("stopped by {}; {}", find_stop_name(),
-                               run.checkpoint->was_saved() ? "the same command goes on from " + run.options.checkpoint.string()
+                               run.checkpoint->was_saved() ? "the same command resumes from " + run.options.checkpoint.string()
                                                            : "what the checkpoint held before, if anything, can be gone on from");
   return summary;
 }

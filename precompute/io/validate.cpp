@@ -1,6 +1,5 @@
-// Method:     The first half of a run, then the analysis of its factorisation. Memory of one rank: what is held after the assembly, as
-// measured
-//             here, and what the solver's own checks would ask for; of several ranks by factors measured on the bodies of
+// Method:     The first half of a run, then the analysis of its factorisation. Memory of one rank: what is allocated after the assembly, as
+//             measured here, and what the solver's own checks would ask for; of several ranks by factors measured on the bodies of
 //             tests/bench/predict. Time: the parts done here as measured, the others by costs.cpp at the pace of what was measured.
 //             The answer comes within --patience: a step is begun only if its cost by costs.cpp, on a processor that gives this process
 //             as little of its time as it did so far, fits what is left of it; else what the step would find is estimated.
@@ -31,9 +30,9 @@ namespace carillon::io {
 namespace {
 
 constexpr double kMeshShare = 0.7;   // of the patience: for the mesh of a surface
-constexpr double kMargin = 1.3;      // of a step's time as foreseen
+constexpr double kMargin = 1.3;      // of a step's predicted time
 constexpr double kTrustSeconds = 1;  // of the start, in which files are waited for
-constexpr double kVeryThin = 100;    // slenderness of bodies whose lowest modes are mended
+constexpr double kVeryThin = 100;    // slenderness of bodies whose lowest modes need a correction
 constexpr double kRoomUsed = 0.8;    // of the memory that is left, at most
 constexpr std::array<int, 3> kRanks{1, 2, 4};
 // All ranks together, over one: halos, the interface between the ranks, which is eliminated last, and what MPI holds for each.
@@ -109,7 +108,7 @@ class Validation {
   double assembled_s_ = 0;       // CPU seconds until then
   double speed_ = 1;
   bool is_analysed_ = false;
-  double needed_s_ = 0;          // of the clock, foreseen of the step that was not begun
+  double needed_s_ = 0;          // of the clock, predicted for the step that was not begun
   std::int64_t left_bytes_ = 0;  // for this rank and all it holds
   ModeEstimate estimate_;
   Extent extent_;
@@ -148,10 +147,10 @@ double Validation::get_pace() const {
   if (outlook_.factor_seconds <= 0) return 1 / speed_;
   Extent one = extent_;
   one.modes = 1;
-  const double foreseen = predict_costs(one).factor / static_cast<double>(predict_factorisations(1));
+  const double predicted = predict_costs(one).factor / static_cast<double>(predict_factorisations(1));
   // Small factorisations say little.
   constexpr double kTrustSeconds = 0.1;
-  return (outlook_.factor_seconds + kTrustSeconds / speed_) / (foreseen + kTrustSeconds);
+  return (outlook_.factor_seconds + kTrustSeconds / speed_) / (predicted + kTrustSeconds);
 }
 
 double Validation::find_seconds_left() const { return run_.options.patience_s - find_process_seconds(); }
@@ -369,11 +368,11 @@ void Validation::predict_memory() {
 void Validation::predict_time() {
   const double pace = get_pace();
   costs_ = predict_costs(extent_);
-  const double foreseen_here = costs_.read + costs_.partition + costs_.assemble;
+  const double predicted_here = costs_.read + costs_.partition + costs_.assemble;
   for (double Costs::*phase : {&Costs::analyse, &Costs::factor, &Costs::solve, &Costs::orthogonalise, &Costs::check, &Costs::errors,
                                &Costs::collect, &Costs::write})
     costs_.*phase *= pace;
-  const double here = assembled_s_ > 0 ? assembled_s_ / std::max(foreseen_here, 1e-9) : pace;
+  const double here = assembled_s_ > 0 ? assembled_s_ / std::max(predicted_here, 1e-9) : pace;
   for (double Costs::*phase : {&Costs::read, &Costs::partition, &Costs::assemble}) costs_.*phase *= here;
   for (std::size_t i = 0; i < kRanks.size(); ++i) wall_s_[i] = calc_wall(costs_, extent_, kRanks[i]).sum();
 }

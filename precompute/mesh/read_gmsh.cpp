@@ -1,3 +1,4 @@
+// One format, whose sections share one cursor and one set of tags: longer than most files.
 // Method: one pass over the sections of a .msh file, versions 2.0-2.2 and 4.1, text and binary in either byte order; sections that are not
 //   about the mesh are skipped. Tags become indices at the end (assemble_mesh), so the order of the sections is free.
 // Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Gmsh's quadratic tetrahedron swaps the last

@@ -48,6 +48,8 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
+bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT; }
+
 namespace {
 
 /// A regular file to read. `length` gets its bytes.
@@ -167,10 +169,9 @@ void WholeFile::refuse(int error) {
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;
   ::unlink(temporary_.c_str());
-  const bool is_full = error == ENOSPC || error == EDQUOT;
-  throw SystemError(
-      fmt::format("{}: cannot write: {}; {}", file_.string(), std::strerror(error),
-                  is_full ? "the disk or quota is full: make room on it" : "check the folder's rights and the space on the disk"));
+  throw SystemError(fmt::format(
+      "{}: cannot write: {}; {}", file_.string(), std::strerror(error),
+      is_full_error(error) ? "the disk or quota is full: make room on it" : "check the folder's rights and the space on the disk"));
 }
 
 void WholeFile::append(std::string_view bytes) {

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A run that is stopped or killed goes on from its checkpoint, on another number of ranks, and its bank is that of a run that was left alone.
+"""A run that is stopped or killed resumes from its checkpoint, on another number of ranks, and its bank is that of a run that was left alone.
 
 usage: checkpoint.py BIN_DIR stops|slices|kills|damage|disk|accuracy|replaced
 """
@@ -123,7 +123,7 @@ def stops(folder):
         check(not (folder / "out.bank").exists(), f"{name}: there is a bank")
         has_saved = (folder / "state").exists()
         resumed, worst = body.resume(then, f"{name}, then {then}")
-        check(not has_saved or "goes on from state" in resumed, f"{name}: the checkpoint was not used:\n{resumed}")
+        check(not has_saved or "resumes from state" in resumed, f"{name}: the checkpoint was not used:\n{resumed}")
         check("warning" not in heed(resumed), resumed)
         print(f"{name}, then {then}: {'gone on with' if has_saved else 'from the start'}, frequencies equal to {worst:.1e}")
     check(was_stopped >= 6, f"only {was_stopped} runs were stopped")
@@ -183,7 +183,7 @@ def kills(folder):
         ranks = 1 + turn % 3
         text, code = body.stop(ranks, "modes     ", generator.uniform(0.0, 0.8 * body.seconds), signal.SIGKILL, generator.randrange(ranks), "--checkpoint-every", 0.2)
         check("warning" not in heed(text), f"a killed run left what the next one could not use:\n{text}")
-        used += "goes on from state" in text
+        used += "resumes from state" in text
         if code == 0:
             check_bank(folder, "out.bank", body.expected, f"turn {turn}")
             (folder / "out.bank").unlink()
@@ -220,7 +220,7 @@ def damage(folder):
     check(len(whole) > 100000, "no checkpoint was seen")
     (folder / "state").write_bytes(whole)
     text, _ = body.resume(3, "whole")
-    check("goes on from" in text and "warning" not in heed(text), text)
+    check("resumes from" in text and "warning" not in heed(text), text)
     generator = random.Random(3)
     cases = [("cut", length) for length in (0, 1, 24, 255, 256, 257, 4095, 4096, len(whole) - 1, *generator.sample(range(len(whole)), 6))]
     cases += [("flipped", place) for place in (0, 30, 40, 70, 100, 161, 170, 178, 186, 194, 202, 215, 230, 260, 300, 4000, len(whole) - 1, *generator.sample(range(len(whole)), 10))]
@@ -357,7 +357,7 @@ def accuracy(folder):
     check(run.returncode in (STOPPED, 0), said)
     if run.returncode == STOPPED:
         text, worst = body.resume(1, "accuracy")
-        check("goes on from state" in text and "warning" not in heed(text), text)
+        check("resumes from state" in text and "warning" not in heed(text), text)
         print(f"stopped in trial {seen} of {trials}; frequencies equal to {worst:.1e}")
 
 

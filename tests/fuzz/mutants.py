@@ -4,7 +4,7 @@
 usage: mutants.py BIN_DIR KIND COUNT [--seed N] [--keep FOLDER]
 
 BIN_DIR holds the libFuzzer targets (preset fuzz). Every mutant goes through the target of its kind (fuzz_play_scene, fuzz_play_contacts, fuzz_job, fuzz_play_bank), which reads
-and plays it; under the sanitizers a fault ends the target, and so do 60 s on one input (some 20 s without them) or 3 GB. Exit code 1 and the mutant's name when one does; it is kept in --keep.
+and plays it; under the sanitizers a fault ends the target, and so do 20 s on one input or 3 GB. Exit code 1 and the mutant's name when one does; it is kept in --keep.
 """
 import argparse
 import collections
@@ -251,7 +251,7 @@ KINDS = {"scene": ("fuzz_play_scene", make_text), "contacts": ("fuzz_play_contac
 def run_batch(program, files):
     environment = {**os.environ, "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1", "ASAN_OPTIONS": "detect_leaks=1:allocator_may_return_null=0", "OPENBLAS_NUM_THREADS": "1"}
     with tempfile.TemporaryDirectory() as scratch:
-        return subprocess.run([str(program), "-timeout=60", "-rss_limit_mb=3000", "-close_fd_mask=1", f"-artifact_prefix={scratch}/", *map(str, files)], cwd=scratch, env=environment,
+        return subprocess.run([str(program), "-timeout=20", "-rss_limit_mb=3000", "-close_fd_mask=1", f"-artifact_prefix={scratch}/", *map(str, files)], cwd=scratch, env=environment,
                               capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL)
 
 

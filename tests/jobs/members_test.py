@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Two users of one store: `nobody` puts links where the store keeps its own, and root then works in it. Nothing of root's may change.
+"""Two users of one store: a member without privileges puts links where the store keeps its own, and root then works in it. Nothing of root's may change.
 
 usage: members_test.py BIN_DIR        does nothing but by root
 """
@@ -16,25 +16,25 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 from bench import BIN, Bench, make_job
 
-NOBODY = 65534
+MEMBER = 65534  # user and group without privileges
 SWAPS = 1000  # of each folder that is swapped while root works
 DEAD = f"{os.uname().nodename},0-1:2,999999999,1,0123456789ab"  # as a folder in tmp/ of a process that is gone
 
 
-def start_as_nobody(act):
-    """Runs act() in a process of the user nobody; its id."""
+def start_as_member(act):
+    """Runs act() in a process of the member; its id."""
     child = os.fork()
     if child == 0:
         code = 1
         try:
-            os.setgroups([NOBODY])
-            os.setgid(NOBODY)
-            os.setuid(NOBODY)
+            os.setgroups([MEMBER])
+            os.setgid(MEMBER)
+            os.setuid(MEMBER)
             os.umask(0o002)
             act()
             code = 0
         except OSError as error:
-            print(f"nobody: {error}", file=sys.stderr)
+            print(f"member: {error}", file=sys.stderr)
         finally:
             sys.stderr.flush()
             os._exit(code)
@@ -57,7 +57,7 @@ class Members(Bench):
         super().setUp()
         self.folder.chmod(0o755)
         self.store.mkdir()
-        os.chown(self.store, -1, NOBODY)
+        os.chown(self.store, -1, MEMBER)
         self.store.chmod(0o2775)
         self.environment["OMPI_ALLOW_RUN_AS_ROOT"] = self.environment["OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] = "1"
         self.done = self.write("done.json", make_job())
@@ -69,8 +69,8 @@ class Members(Bench):
         self.victim = self.folder / "root's own"
         self.victim.mkdir()
 
-    def as_nobody(self, act):
-        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(start_as_nobody(act), 0)[1]), 0)
+    def as_member(self, act):
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(start_as_member(act), 0)[1]), 0)
 
     def find(self, pattern):
         path, = self.store.glob(pattern)
@@ -94,7 +94,7 @@ class Members(Bench):
                     self.assertIn("remove it", line, f"{name}: {words}")
 
     def swap(self, path, target):
-        """nobody puts a link in place of a path, and puts it back."""
+        """The member puts a link in place of a path, and puts it back."""
         aside = path.with_name(path.name + ".aside")
         had = os.path.lexists(path)
 
@@ -112,14 +112,14 @@ class Members(Bench):
                 subprocess.run(["chmod", "-R", "u+w", aside], check=False)
                 shutil.rmtree(aside, ignore_errors=True)
 
-        self.as_nobody(put)
+        self.as_member(put)
         return put_back
 
     def test_what_one_makes_the_other_goes_on_with(self):
         for path in [self.store, *self.store.rglob("*")]:
             if DEAD not in path.name:
                 info = path.lstat()
-                self.assertEqual(info.st_gid, NOBODY, path)
+                self.assertEqual(info.st_gid, MEMBER, path)
                 self.assertTrue(not path.is_dir() or "banks" in path.parts or info.st_mode & 0o2070 == 0o2070, path)
         work = self.find("work/*/*")
         command, environment = self.command("run", "--quiet", "--no-pictures"), {**self.environment, "HOME": str(self.folder)}
@@ -128,11 +128,11 @@ class Members(Bench):
             if os.access(command[0], os.X_OK):
                 subprocess.run(command, check=True, env=environment, cwd="/", stdin=subprocess.DEVNULL, timeout=60)
 
-        self.as_nobody(run)
+        self.as_member(run)
         if work.exists():
-            self.skipTest("nobody may not start the program")
+            self.skipTest("the member may not start the program")
         bank = pathlib.Path(self.run_it("get", self.open_job).stdout.strip())
-        self.assertEqual(bank.stat().st_uid, NOBODY)
+        self.assertEqual(bank.stat().st_uid, MEMBER)
         self.assertEqual(self.ask("verify")["damaged"], [])
 
     def test_folders_of_the_store(self):
@@ -206,7 +206,7 @@ class Members(Bench):
                         if os.path.lexists(f"{path}.aside") and not os.path.lexists(path):
                             os.rename(f"{path}.aside", path)
 
-        child, rounds, is_over = start_as_nobody(swap_on), 0, False
+        child, rounds, is_over = start_as_member(swap_on), 0, False
         while not is_over or rounds < 3:
             rounds += 1
             is_over = is_over or os.waitpid(child, os.WNOHANG)[0] != 0

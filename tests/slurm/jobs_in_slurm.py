@@ -162,7 +162,7 @@ def time_limit(store):
     row = store.wait(job, "done", 150)
     check(row["slurm_job"] is None or row["slurm_job"] == slurm_job, f"another job of Slurm did it: {row}")
     check("Restarts=1" in subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout, "it was not queued again")
-    for words in ("time limit", "queued again in Slurm", "goes on from"):
+    for words in ("time limit", "queued again in Slurm", "resumes from"):
         check(words in store.log(job), lambda: f"the log does not say '{words}':\n{store.log(job)}")
     store.check_bank(job)
 

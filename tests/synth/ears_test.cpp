@@ -1,3 +1,4 @@
+// Every stage between a body and two ears, in the order of the sound's way, on one set of signals: longer than most files.
 #include "runtime/synth/ears.hpp"
 
 #include <gtest/gtest.h>

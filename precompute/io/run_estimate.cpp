@@ -1,9 +1,9 @@
-// Method:     Every part of the run has a foreseen cost in seconds of wall clock. What is done, at these prices, against the seconds it
+// Method:     Every part of the run has a predicted cost in seconds of wall clock. What is done, at these prices, against the seconds it
 //             really took gives the pace; the pace times the prices of what is left gives the seconds left, and
 //             percent = 100 gone / (gone + left). Within a factorisation the clock says how far it is; within the iteration the number of
 //             right-hand sides does.
 // Source:     none. Deviations: none.
-#include "precompute/io/foresight.hpp"
+#include "precompute/io/run_estimate.hpp"
 
 #include <algorithm>
 #include <array>
@@ -32,7 +32,7 @@ double calc_factorisations(const eigen::Progress& progress) {
 
 }  // namespace
 
-void Foresight::begin(const std::string& station, double seconds) {
+void RunEstimate::begin(const std::string& station, double seconds) {
   const auto found = std::find(kStations.begin(), kStations.end(), station);
   if (found == kStations.end()) return;
   station_ = static_cast<int>(found - kStations.begin());
@@ -48,13 +48,13 @@ void Foresight::begin(const std::string& station, double seconds) {
   begun_s_ = seconds;
 }
 
-void Foresight::learn(const Extent& extent) {
+void RunEstimate::learn(const Extent& extent) {
   extent_ = extent;
   costs_ = calc_wall(predict_costs(extent), extent, ranks_);
   knows_extent_ = extent.tets > 0;
 }
 
-void Foresight::advance(const eigen::Progress& progress, double seconds) {
+void RunEstimate::advance(const eigen::Progress& progress, double seconds) {
   const bool is_news = progress.factor_flops != progress_.factor_flops || progress.modes_wanted != progress_.modes_wanted;
   progress_ = progress;
   begun_s_ = seconds;
@@ -66,7 +66,7 @@ void Foresight::advance(const eigen::Progress& progress, double seconds) {
 }
 
 /// At its price, without the step that is under way.
-double Foresight::calc_modes_done() const {
+double RunEstimate::calc_modes_done() const {
   if (progress_.phase == eigen::Phase::kRigid || progress_.phase == eigen::Phase::kAnalyse) return 0;
   if (progress_.phase == eigen::Phase::kCheck) return costs_.sum_modes() - costs_.check;
   const double factors = static_cast<double>(progress_.factorisations) / calc_factorisations(progress_);
@@ -76,7 +76,7 @@ double Foresight::calc_modes_done() const {
 }
 
 /// The price of the step under way.
-double Foresight::calc_step() const {
+double RunEstimate::calc_step() const {
   if (station_ != kModes) return list(costs_)[static_cast<std::size_t>(station_)];
   switch (progress_.phase) {
     case eigen::Phase::kRigid:
@@ -92,7 +92,7 @@ double Foresight::calc_step() const {
   }
 }
 
-Foresight::Share Foresight::calc_share(double seconds) const {
+RunEstimate::Share RunEstimate::calc_share(double seconds) const {
   const std::array<double, 7> prices = list(costs_);
   double done = 0;
   double all = 0;
@@ -108,7 +108,7 @@ Foresight::Share Foresight::calc_share(double seconds) const {
   return {gone, std::max(all - done, 0.0) * pace};
 }
 
-double Foresight::calc_percent(double seconds) {
+double RunEstimate::calc_percent(double seconds) {
   if (is_done_) return percent_ = 100;
   const Share share = calc_share(seconds);
   const double part = share.done / std::max(share.done + share.left, 1e-9);
@@ -117,7 +117,7 @@ double Foresight::calc_percent(double seconds) {
   return percent_;
 }
 
-std::optional<double> Foresight::calc_seconds_left(double seconds) const {
+std::optional<double> RunEstimate::calc_seconds_left(double seconds) const {
   if (is_done_) return 0.0;
   if (!knows_extent_ || is_trial_) return std::nullopt;
   return calc_share(seconds).left;

@@ -1,4 +1,4 @@
-// The share of a run that is done, from the costs foreseen of its parts and the time they really took.
+// The share of a run that is done, from the predicted costs of its parts and the time they really took.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,12 @@
 
 namespace carillon::io {
 
-/// Knows no clock: every call says how many seconds the run has gone on.
-class Foresight {
+/// Knows no clock: every call says how many seconds the run has taken.
+class RunEstimate {
  public:
-  explicit Foresight(int ranks) : ranks_(ranks) {}
+  explicit RunEstimate(int ranks) : ranks_(ranks) {}
 
-  /// From now on trials may follow that nobody can count.
+  /// From now on trials may follow, of unknown number.
   void expect_trials() { is_trial_ = true; }
   /// A station of Stations begins ("read", "partition", "assemble", "modes", "errors", "collect", "write").
   void begin(const std::string& station, double seconds);
@@ -25,7 +25,7 @@ class Foresight {
 
   /// Never less than at an earlier call; 100 only after finish().
   double calc_percent(double seconds);
-  /// Of wall clock. Empty while it is anybody's guess: before the mesh is known, and while trials may follow.
+  /// Of wall clock. Empty while it is not known: before the mesh is known, and while trials may follow.
   std::optional<double> calc_seconds_left(double seconds) const;
 
   std::int64_t get_modes_done() const { return progress_.modes_done; }

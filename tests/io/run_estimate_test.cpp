@@ -1,5 +1,5 @@
-// Percent and seconds left, for courses of events that the prices did not foresee; and the estimates of modes against known counts.
-#include "precompute/io/foresight.hpp"
+// Percent and seconds left, for courses of events that the prices did not predict; and the estimates of modes against known counts.
+#include "precompute/io/run_estimate.hpp"
 
 #include <gtest/gtest.h>
 
@@ -21,86 +21,86 @@ Extent make_extent() {
   return extent;
 }
 
-TEST(Foresight, never_falls_and_ends_at_100_whatever_happens) {
+TEST(RunEstimate, never_falls_and_ends_at_100_whatever_happens) {
   for (unsigned seed = 0; seed < 200; ++seed) {
     std::mt19937 random(seed);
     const auto draw = [&](double most) { return std::uniform_real_distribution<>(0, most)(random); };
-    Foresight foresight(1 + static_cast<int>(seed % 4));
-    if (seed % 3 == 0) foresight.expect_trials();
+    RunEstimate estimate(1 + static_cast<int>(seed % 4));
+    if (seed % 3 == 0) estimate.expect_trials();
     double seconds = 0, before = 0;
     const auto look = [&] {
-      const double percent = foresight.calc_percent(seconds);
+      const double percent = estimate.calc_percent(seconds);
       ASSERT_GE(percent, before) << "seed " << seed;
       ASSERT_LT(percent, 100) << "seed " << seed;
-      const auto left = foresight.calc_seconds_left(seconds);
+      const auto left = estimate.calc_seconds_left(seconds);
       ASSERT_GE(left.value_or(0), 0) << "seed " << seed;
       before = percent;
       seconds += draw(20);
     };
     for (int trial = 0; trial < (seed % 3 == 0 ? 3 : 1); ++trial) {
       for (const char* station : {"read", "partition", "assemble"}) {
-        foresight.begin(station, seconds);
+        estimate.begin(station, seconds);
         look();
-        if (draw(1) < 0.5) foresight.learn(make_extent());
+        if (draw(1) < 0.5) estimate.learn(make_extent());
         look();
       }
-      foresight.begin("modes", seconds);
+      estimate.begin("modes", seconds);
       eigen::Progress progress;
       for (const eigen::Phase phase : {eigen::Phase::kRigid, eigen::Phase::kAnalyse, eigen::Phase::kCount, eigen::Phase::kFactor}) {
         progress.phase = phase;
         progress.factorisations += static_cast<std::int64_t>(draw(4));
         if (phase == eigen::Phase::kFactor) progress.modes_wanted = static_cast<std::int64_t>(draw(900));
         if (phase == eigen::Phase::kFactor) progress.factor_flops = draw(1e12);
-        foresight.advance(progress, seconds);
+        estimate.advance(progress, seconds);
         look();
         look();
       }
       progress.phase = eigen::Phase::kIterate;
       for (int step = 0; step < 20; ++step) {
         progress.solves += 16 + static_cast<std::int64_t>(draw(100));
-        foresight.advance(progress, seconds);
+        estimate.advance(progress, seconds);
         look();
       }
       progress.phase = eigen::Phase::kCheck;
-      foresight.advance(progress, seconds);
+      estimate.advance(progress, seconds);
       look();
-      foresight.begin("errors", seconds);
+      estimate.begin("errors", seconds);
       look();
     }
     for (const char* station : {"collect", "write"}) {
-      foresight.begin(station, seconds);
+      estimate.begin(station, seconds);
       look();
     }
-    foresight.finish();
-    EXPECT_EQ(foresight.calc_percent(seconds), 100);
-    EXPECT_EQ(foresight.calc_seconds_left(seconds), 0);
+    estimate.finish();
+    EXPECT_EQ(estimate.calc_percent(seconds), 100);
+    EXPECT_EQ(estimate.calc_seconds_left(seconds), 0);
   }
 }
 
-TEST(Foresight, a_run_at_the_prices_foreseen_is_half_done_after_half_the_time) {
+TEST(RunEstimate, a_run_at_the_predicted_prices_is_half_done_after_half_the_time) {
   Extent extent = make_extent();
   extent.factor_flops = 2e10;
   extent.factor_entries = 25000000;
   extent.modes = 200;
   const Costs costs = calc_wall(predict_costs(extent), extent, 1);
-  Foresight foresight(1);
-  foresight.learn(extent);
+  RunEstimate estimate(1);
+  estimate.learn(extent);
   double seconds = 0;
-  foresight.begin("read", seconds);
-  foresight.begin("partition", seconds += costs.read);
-  foresight.begin("assemble", seconds += costs.partition);
-  foresight.begin("modes", seconds += costs.assemble);
+  estimate.begin("read", seconds);
+  estimate.begin("partition", seconds += costs.read);
+  estimate.begin("assemble", seconds += costs.partition);
+  estimate.begin("modes", seconds += costs.assemble);
   eigen::Progress progress;
   progress.modes_wanted = 200;
   progress.phase = eigen::Phase::kAnalyse;
-  foresight.advance(progress, seconds);
+  estimate.advance(progress, seconds);
   progress.phase = eigen::Phase::kFactor;
-  foresight.advance(progress, seconds += costs.analyse);
+  estimate.advance(progress, seconds += costs.analyse);
   progress.phase = eigen::Phase::kIterate;
   progress.factorisations = predict_factorisations(200);
-  foresight.advance(progress, seconds += costs.factor);
-  EXPECT_NEAR(foresight.calc_percent(seconds), 100 * seconds / costs.sum(), 2);
-  EXPECT_NEAR(*foresight.calc_seconds_left(seconds), costs.sum() - seconds, 0.05 * costs.sum());
+  estimate.advance(progress, seconds += costs.factor);
+  EXPECT_NEAR(estimate.calc_percent(seconds), 100 * seconds / costs.sum(), 2);
+  EXPECT_NEAR(*estimate.calc_seconds_left(seconds), costs.sum() - seconds, 0.05 * costs.sum());
 }
 
 // What is known of a long bar,
