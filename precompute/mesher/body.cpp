@@ -13,8 +13,8 @@
 namespace carillon::mesher {
 namespace {
 
-// Curves closer than this part of the diagonal, but for their common ends, cannot be parted by elements.
-constexpr double kSameCurve = 1e-6;
+// Curves closer than this part of an edge, but for their common ends, would take hundreds of balls for every element between them.
+constexpr double kSameCurve = 0.01;
 
 [[noreturn]] void throw_solid(const SurfaceOptions& options, double deepest_m) {
   throw InputError(
@@ -71,7 +71,7 @@ std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& op
       curves.insert(curves.end(), inset.begin(), inset.end());
     }
   }
-  curves = untangle_curves(std::move(curves), kSameCurve * calc_box(body.mended.surface.points).diagonal());
+  curves = untangle_curves(std::move(curves), kSameCurve * edge_m);
   return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.mended.surface, curves);
 }
 

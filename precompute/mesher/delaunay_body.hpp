@@ -42,7 +42,7 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 namespace carillon::mesher {
 
 /// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can turn on the spot for ever where skins
-/// touch at a point; only this ends it. The limit is far above what a sound body takes, so that meshes do not depend on it.
+/// touch at a point; only this ends it. A sound body takes a tenth of the limit, so that meshes do not depend on it.
 class Watchdog {
  public:
   explicit Watchdog(double limit_s) {
@@ -81,6 +81,25 @@ class Watchdog {
   std::thread thread_;
 };
 
+/// A domain of CGAL with a bound on the balls that are placed on its curves: where curves cannot be parted, CGAL places ever smaller ones,
+/// without a look at its own bound on the vertices.
+template <class Base>
+class BoundedCurves : public Base {
+ public:
+  using Base::Base;
+  explicit BoundedCurves(Base base) : Base(std::move(base)) {}
+
+  std::size_t most_balls = 0;
+  typename Base::Point_3 construct_point_on_curve(const typename Base::Point_3& start, const typename Base::Curve_index& curve,
+                                                  typename Base::FT distance) const {
+    if (++balls_ > most_balls) throw std::runtime_error("the sharp edges lie too close to each other");
+    return Base::construct_point_on_curve(start, curve, distance);
+  }
+
+ private:
+  mutable std::size_t balls_ = 0;
+};
+
 template <class Domain, class Index>
 class Mesh3Body : public DelaunayBody {
   using Triangulation = typename CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
@@ -97,14 +116,12 @@ class Mesh3Body : public DelaunayBody {
     CGAL::get_default_random() = CGAL::Random(0);
     stop_ = nullptr;
     make_domain(sizes.most_nodes);
+    // The nodes on the sharp edges and twice as many more: they are part of a fifth of most_nodes.
+    domain_->most_balls = 2000 + sizes.most_nodes / 8;
     complex_ = Complex();
     const double radius = kRadiusPerEdge * sizes.edge_m;
     narrow_ = calc_curve_sizes(polylines_, sizes.edge_m);
-    // Every ball on a curve asks for its size at least once; without a bound, balls that are shrunk in turn would go on for minutes.
-    const auto asked = std::make_shared<std::size_t>(0);
-    const std::size_t most_asked = 20'000 + 4 * sizes.most_nodes;
-    const auto calc_edge = [this, edge_m = sizes.edge_m, asked, most_asked](const Point& at, int, const TriangulationIndex&) -> double {
-      if (++*asked > most_asked) throw std::runtime_error("the sharp edges lie too close to each other");
+    const auto calc_edge = [this, edge_m = sizes.edge_m](const Point& at, int, const TriangulationIndex&) -> double {
       return calc_size(narrow_, edge_m, {at.x(), at.y(), at.z()});
     };
     const Criteria criteria(p::edge_size = calc_edge, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
@@ -113,7 +130,7 @@ class Mesh3Body : public DelaunayBody {
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
     if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
     insert_first_points(sizes.edge_m);
-    Watchdog watchdog(2 + 5e-4 * static_cast<double>(sizes.most_nodes));
+    Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.most_nodes));
     stop_ = &watchdog.stop;
     CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
                         p::mesh_3_options(p::maximal_number_of_vertices = sizes.most_nodes, p::pointer_to_error_code = &unused,

@@ -13,7 +13,7 @@ namespace carillon::mesher {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Domain = CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_domain_3<Kernel>>;
+using Domain = BoundedCurves<CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_domain_3<Kernel>>>;
 
 class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
  public:
@@ -22,11 +22,14 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
 
  private:
   void make_domain(std::size_t most_nodes) override {
-    most_evaluations_ = kEvaluationsAtLeast + kEvaluationsPerNode * most_nodes;
+    most_refining_ = kEvaluationsAtLeast + kEvaluationsPerNode * most_nodes;
+    most_evaluations_ = most_refining_ + kEvaluationsToOptimise * most_nodes;
     // Refinement can try for ever to part what touches at a point; no node comes of it, so their bound does not end it.
     evaluations_ = 0;
     const auto body = [this](const Kernel::Point_3& p) {
-      if (++evaluations_ > most_evaluations_ || (stop_ && *stop_)) throw std::runtime_error("parts of its surface touch, or nearly so");
+      // stop_ is set while elements are refined.
+      if (++evaluations_ > (stop_ ? most_refining_ : most_evaluations_) || (stop_ && *stop_))
+        throw std::runtime_error("parts of its surface touch, or nearly so");
       return calc_body(field_, wall_m_, {p.x(), p.y(), p.z()});
     };
     const Vec3 low = field_.origin;
@@ -66,13 +69,13 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
     return points;
   }
 
-  // A sound body takes about 180 evaluations a node (the hollow bunny of 37,000 nodes), and the bound on the nodes is five times the
-  // target.
-  static constexpr std::size_t kEvaluationsAtLeast = 1'000'000, kEvaluationsPerNode = 400;
+  // Sound bodies take 180 (the hollow bunny of 37,000 nodes) to 280 evaluations a node (a box with a wall of one element), to remove
+  // slivers up to 900, and the bound on the nodes is at least four times what they have.
+  static constexpr std::size_t kEvaluationsAtLeast = 1'000'000, kEvaluationsPerNode = 120, kEvaluationsToOptimise = 400;
 
   const DistanceField& field_;
   double wall_m_;
-  std::size_t evaluations_ = 0, most_evaluations_ = 0;
+  std::size_t evaluations_ = 0, most_refining_ = 0, most_evaluations_ = 0;
 };
 
 }  // namespace

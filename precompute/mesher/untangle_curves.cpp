@@ -1,4 +1,4 @@
-// Method: segments sorted along an axis; each is compared with those whose boxes it meets.
+// Method: curves end where they turn back; segments sorted along an axis; each is compared with those whose boxes it meets.
 // Source: distance of two segments: Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
 // Deviations: none.
 #include "precompute/mesher/untangle_curves.hpp"
@@ -9,6 +9,9 @@
 
 namespace carillon::mesher {
 namespace {
+
+// The sine of 1.7 degrees: to part curves that leave their common end in a smaller angle takes thousands of balls.
+constexpr double kSameDirection = 0.03;
 
 struct Segment {
   Vec3 a{}, b{};
@@ -42,8 +45,7 @@ bool is_tangled(const Segment& s, const Segment& t, double same_m) {
   if (common > 1) return true;
   if (common == 0) return calc_distance(s, t) <= same_m;
   const Vec3 u = ends[0] || ends[1] ? s.b - s.a : s.a - s.b, v = ends[0] || ends[2] ? t.b - t.a : t.a - t.b;
-  // The sine of a tenth of a degree.
-  return dot(u, v) > 0 && norm(cross(u, v)) <= 0.0017 * norm(u) * norm(v);
+  return dot(u, v) > 0 && norm(cross(u, v)) <= kSameDirection * norm(u) * norm(v);
 }
 
 /// Points in order, none closer than same_m to the one before; ends stay.
@@ -59,6 +61,29 @@ Polyline thin_out(const Polyline& curve, double same_m) {
   return out;
 }
 
+/// Whether the curve turns back at b: the mesher's balls on the two sides of such a bend shrink without end, unless one stands on it.
+bool turns_back(const Vec3& a, const Vec3& b, const Vec3& c) { return dot(b - a, c - b) < 0; }
+
+/// The curve in pieces that end where it turns back; a closed one begins at such a bend and has two pieces at least.
+std::vector<Polyline> split_at_bends(Polyline curve) {
+  if (curve.size() > 3 && curve.front() == curve.back() && !turns_back(curve[curve.size() - 2], curve[0], curve[1]))
+    for (std::size_t i = 1; i + 1 < curve.size(); ++i)
+      if (turns_back(curve[i - 1], curve[i], curve[i + 1])) {
+        curve.pop_back();
+        std::rotate(curve.begin(), curve.begin() + static_cast<std::ptrdiff_t>(i), curve.end());
+        curve.push_back(curve.front());
+        break;
+      }
+  const bool closed = curve.size() > 3 && curve.front() == curve.back() && turns_back(curve[curve.size() - 2], curve[0], curve[1]);
+  std::vector<Polyline> out{{curve.front()}};
+  for (std::size_t i = 1; i < curve.size(); ++i) {
+    out.back().push_back(curve[i]);
+    const bool last = i + 1 == curve.size();
+    if (!last && (turns_back(curve[i - 1], curve[i], curve[i + 1]) || (closed && i == curve.size() / 2))) out.push_back({curve[i]});
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<Polyline> untangle_curves(std::vector<Polyline> curves, double same_m) {
@@ -68,7 +93,12 @@ std::vector<Polyline> untangle_curves(std::vector<Polyline> curves, double same_
   for (std::size_t i = 0; i < ends.size(); ++i)
     for (std::size_t j = i + 1; j < ends.size() && (*ends[j])[0] - (*ends[i])[0] <= same_m; ++j)
       if (norm(*ends[j] - *ends[i]) <= same_m) *ends[j] = *ends[i];
-  for (Polyline& curve : curves) curve = thin_out(curve, same_m);
+  std::vector<Polyline> pieces;
+  for (const Polyline& curve : curves) {
+    auto split = split_at_bends(thin_out(curve, same_m));
+    std::move(split.begin(), split.end(), std::back_inserter(pieces));
+  }
+  curves = std::move(pieces);
   std::erase_if(curves, [](const Polyline& curve) { return curve.size() < 2 || (curve.front() == curve.back() && curve.size() < 4); });
 
   std::vector<Segment> segments;
