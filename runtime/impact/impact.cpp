@@ -1,0 +1,579 @@
+// Method: see impact.hpp. A row is a direction of relative motion at a contact; phi of a row has the sign of the body in it, so that the
+// motion of row r is  free_r + sum_s A_rs f_s,   A = h^2/2 J M^-1 J^T + sum over modes phi_r g phi_s.
+// One pass over the modes of a step takes the force in and finds where they go freely in the next.
+// Source: discrete gradients, Gonzalez 1996 (J. Nonlinear Sci. 6, 449); modes inside an impact of a ball and a beam, Timoshenko 1913.
+// Deviations: frames and mobilities are constant in one impact; gyroscopic couples act as the constant accelerations given.
+#include "runtime/impact/impact.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+namespace carillon::impact {
+namespace {
+
+constexpr double kSlowest = 1e-6;  // m/s: speed for which the step is chosen where nothing approaches
+
+std::size_t pad(int n) { return static_cast<std::size_t>((n + kLanes - 1) / kLanes * kLanes); }
+bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
+
+/// Inverse of a symmetric positive definite matrix; zero for what is not.
+Mat3 calc_inverse(const Mat3& m) {
+  const Mat3 minors{cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
+  const double determinant = dot(m[0], minors[0]);
+  if (!(determinant > 0.0)) return {};
+  Mat3 inverse{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) inverse[i][j] = minors[j][i] / determinant;
+  return inverse;
+}
+
+/// A unit vector across `n`, along the axis that it is least along.
+Vec3 make_tangent(const Vec3& n) {
+  std::size_t least = 0;
+  for (std::size_t i = 1; i < 3; ++i)
+    if (std::abs(n[i]) < std::abs(n[least])) least = i;
+  Vec3 axis{};
+  axis[least] = 1.0;
+  const Vec3 t = axis - dot(axis, n) * n;
+  return 1.0 / std::sqrt(dot(t, t)) * t;
+}
+
+struct State {
+  const double *a, *b, *c, *e, *g;
+  const double* phi;
+  double *q, *v, *x;
+  std::size_t padded;
+};
+
+/// q, v over one step under the forces f of the rows; x: where q goes freely in the next; w_free = phi x. kRows = 0: `rows` of them.
+template <int kRows>
+void move_modes(const State& s, int rows, const double* __restrict f, double* __restrict w_free, double* __restrict lanes) {
+  const int n = kRows ? kRows : rows;
+  for (int r = 0; r < n * kLanes; ++r) lanes[r] = 0.0;
+  for (std::size_t i = 0; i < s.padded; i += kLanes) {
+    double drive[kLanes] = {}, next[kLanes];
+    for (int r = 0; r < n; ++r) {
+      const double* __restrict phi = s.phi + static_cast<std::size_t>(r) * s.padded + i;
+      for (int l = 0; l < kLanes; ++l) drive[l] += phi[l] * f[r];
+    }
+    for (int l = 0; l < kLanes; ++l) {
+      const std::size_t k = i + static_cast<std::size_t>(l);
+      const double q = s.x[k] + s.g[k] * drive[l], v = s.c[k] * s.q[k] + s.e[k] * s.v[k] + s.b[k] * drive[l];
+      next[l] = s.a[k] * q + s.b[k] * v;
+      s.q[k] = q;
+      s.v[k] = v;
+      s.x[k] = next[l];
+    }
+    for (int r = 0; r < n; ++r) {
+      const double* __restrict phi = s.phi + static_cast<std::size_t>(r) * s.padded + i;
+      for (int l = 0; l < kLanes; ++l) lanes[r * kLanes + l] += phi[l] * next[l];
+    }
+  }
+  for (int r = 0; r < n; ++r) {
+    const double* sum = lanes + r * kLanes;
+    w_free[r] = ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
+  }
+}
+
+double calc_dot(const double* x, const double* y, std::size_t padded) {
+  double lanes[kLanes] = {};
+  for (std::size_t i = 0; i < padded; i += kLanes)
+    for (std::size_t l = 0; l < kLanes; ++l) lanes[l] += x[i + l] * y[i + l];
+  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
+}
+
+double calc_dot(const double* x, const double* y, const double* z, std::size_t padded) {
+  double lanes[kLanes] = {};
+  for (std::size_t i = 0; i < padded; i += kLanes)
+    for (std::size_t l = 0; l < kLanes; ++l) lanes[l] += x[i + l] * y[i + l] * z[i + l];
+  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
+}
+
+void check(bool right, const char* what) {
+  if (!right) throw std::invalid_argument(std::string("impact: ") + what);
+}
+
+}  // namespace
+
+double Books::calc_error() const {
+  const double end = rigid + spring + modal + dissipated_modes + dissipated_contact + dissipated_friction + above_band;
+  const double largest = std::max({std::abs(start), std::abs(given), std::abs(end), rigid, 1e-300});
+  return (start + given - end) / largest;
+}
+
+Impact::Impact(std::vector<Body> bodies, std::vector<Contact> contacts, const Options& options) : above_band_(options.above_band) {
+  check(!contacts.empty(), "there is no contact");
+  check(options.steps_per_pulse >= 1.0 && options.longest_step_s > 0.0 && options.part_s >= 0.0, "options out of range");
+  for (Body& body : bodies) place_body(std::move(body));
+  for (const Contact& contact : contacts) add_contact(contact);
+  choose_step(options);
+  set_up_step();
+  books_.start += calc_rigid_energy() + calc_spring_energies();
+}
+
+/// Takes a body in, and the energy of its modes into the books.
+void Impact::place_body(Body body) {
+  check_body(body);
+  const auto modes = body.modes ? static_cast<std::size_t>(body.modes->size()) : 0;
+  if (body.q.empty()) body.q.assign(modes, 0.0);
+  if (body.q_dot.empty()) body.q_dot.assign(modes, 0.0);
+  check(body.q.size() == modes && body.q_dot.size() == modes, "a modal state has another size than the modes");
+  body.moved_m = body.turned_rad = {};
+  inverse_inertia_.push_back(body.mass_kg > 0.0 ? calc_inverse(body.inertia_kg_m2) : Mat3{});
+  if (modes > 0) {
+    Group group;
+    group.body = static_cast<int>(bodies_.size());
+    group.q = body.q;
+    group.v = body.q_dot;
+    group.q.resize(pad(body.modes->size()), 0.0);
+    group.v.resize(group.q.size(), 0.0);
+    group.energy = body.modes->calc_energy(body.q, body.q_dot);
+    books_.start += group.energy;
+    groups_.push_back(std::move(group));
+  }
+  bodies_.push_back(std::move(body));
+}
+
+int Impact::join(const Body& body) {
+  const double before = calc_rigid_energy();
+  place_body(body);
+  books_.start += calc_rigid_energy() - before;
+  set_up_step();
+  return static_cast<int>(bodies_.size()) - 1;
+}
+
+void Impact::check_contact(const Contact& contact) const {
+  const auto count = static_cast<int>(bodies_.size());
+  check(contact.a >= 0 && contact.a < count && contact.b >= -1 && contact.b < count && contact.a != contact.b,
+        "a contact names no two bodies");
+  check(std::abs(dot(contact.normal, contact.normal) - 1.0) < 1e-6, "a normal is not of length 1");
+  check(is_finite(contact.where_m) && std::isfinite(contact.gap_m), "a contact's place is not finite");
+  check(contact.spring.stiffness > 0.0 && std::isfinite(contact.spring.stiffness) && contact.spring.exponent >= 1.0, "a spring is not one");
+  check(contact.restitution >= 0.0 && contact.friction >= 0.0 && contact.tangential_ratio > 0.0, "a contact's law is out of range");
+  for (const bool first : {true, false}) {
+    const int body = first ? contact.a : contact.b;
+    const std::span<const double> shape = first ? contact.shape_a : contact.shape_b;
+    check(shape.empty() || (body >= 0 && shape.size() == 3 * bodies_[static_cast<std::size_t>(body)].q.size()),
+          "shape values of another number than the body's modes");
+  }
+}
+
+void Impact::check_body(const Body& body) {
+  check(std::isfinite(body.mass_kg) && body.mass_kg >= 0.0, "a mass is negative or not finite");
+  check(is_finite(body.centre_m) && is_finite(body.velocity_m_s) && is_finite(body.spin_rad_s) && is_finite(body.acceleration_m_s2) &&
+            is_finite(body.spin_acceleration_rad_s2) && is_finite(body.inertia_kg_m2[0]) && is_finite(body.inertia_kg_m2[1]) &&
+            is_finite(body.inertia_kg_m2[2]),
+        "a body's motion is not finite");
+}
+
+void Impact::add_contact(const Contact& contact) {
+  check_contact(contact);
+  Touch touch;
+  touch.spring = contact.spring;
+  touch.friction = contact.friction;
+  touch.compression_m = -contact.gap_m;
+  touch.row = static_cast<int>(rows_.size());
+  rows_.resize(rows_.size() + (contact.friction > 0.0 ? 3 : 1));
+  force_.resize(rows_.size(), 0.0);
+  place_contact(contact, static_cast<int>(contacts_.size()), touch.row);
+  touches_.push_back(touch);
+  contacts_.push_back(contact);
+  contacts_.back().shape_a = contacts_.back().shape_b = {};  // they are in the groups now
+  pulses_.emplace_back().contact = static_cast<int>(contacts_.size()) - 1;
+  silent_.push_back(0);
+  normal_impulse_.push_back(0.0);
+}
+
+/// Axes, mobilities and shape values of a contact, new or moved; its rows begin with `row`.
+void Impact::place_contact(const Contact& contact, int index, int row) {
+  const Vec3 n = contact.normal, t = make_tangent(n), axes[3] = {n, t, cross(n, t)};
+  const int rows = contact.friction > 0.0 ? 3 : 1;
+  for (int k = 0; k < rows; ++k) {
+    Row one;
+    one.contact = index;
+    one.axis = axes[k];
+    for (std::size_t side = 0; side < 2; ++side) {
+      const int body = side == 0 ? contact.a : contact.b;
+      if (body < 0) continue;
+      const auto b = static_cast<std::size_t>(body);
+      one.body[side] = body;
+      if (!(bodies_[b].mass_kg > 0.0)) continue;
+      one.linear[side] = (side == 0 ? 1.0 : -1.0) * axes[k];
+      one.to_velocity[side] = 1.0 / bodies_[b].mass_kg * one.linear[side];
+      one.angular[side] = cross(contact.where_m - bodies_[b].centre_m, one.linear[side]);
+      one.to_spin[side] = inverse_inertia_[b] * one.angular[side];
+      if (dot(one.to_spin[side], one.to_spin[side]) == 0.0) one.angular[side] = {};
+    }
+    rows_[static_cast<std::size_t>(row + k)] = one;
+  }
+  for (const bool first : {true, false}) {
+    const int body = first ? contact.a : contact.b;
+    const std::span<const double> shape = first ? contact.shape_a : contact.shape_b;
+    if (body >= 0 && !shape.empty()) place_shapes(body, shape, first ? 1.0 : -1.0, row, rows);
+  }
+}
+
+/// The rows' shape values of one side into the body's group, and those above its band into a group of their own.
+void Impact::place_shapes(int body, std::span<const double> shape, double sign, int row, int rows) {
+  const auto find = [&](bool tail) {
+    return std::find_if(groups_.begin(), groups_.end(),
+                        [&](const Group& g) { return g.body == body && g.tail == tail && (!tail || g.rows.front() == row); });
+  };
+  Group& group = *find(false);
+  const Modes& modes = *bodies_[static_cast<std::size_t>(body)].modes;
+  const auto n = static_cast<std::size_t>(modes.size()), padded = pad(modes.size());
+  const auto place = static_cast<std::size_t>(std::find(group.rows.begin(), group.rows.end(), row) - group.rows.begin());
+  if (place == group.rows.size()) {
+    for (int k = 0; k < rows; ++k) group.rows.push_back(row + k);
+    group.phi.resize(group.rows.size() * padded, 0.0);
+  }
+  for (int k = 0; k < rows; ++k) {
+    const Vec3 axis = sign * rows_[static_cast<std::size_t>(row + k)].axis;
+    double* phi = group.phi.data() + (place + static_cast<std::size_t>(k)) * padded;
+    for (std::size_t i = 0; i < n; ++i) phi[i] = axis[0] * shape[3 * i] + axis[1] * shape[3 * i + 1] + axis[2] * shape[3 * i + 2];
+  }
+  if (!above_band_ || !modes.has_tail()) return;
+  std::vector<double> above = modes.calc_tail_shapes(modes.calc_tail_compliance({group.phi.data() + place * padded, n}));
+  above.resize(pad(kTailModes), 0.0);
+  const auto known = find(true);
+  if (known != groups_.end()) {
+    known->phi = std::move(above);
+    return;
+  }
+  Group tail;
+  tail.body = body;
+  tail.tail = true;
+  tail.rows = {row};
+  tail.phi = std::move(above);
+  tail.q.assign(tail.phi.size(), 0.0);
+  tail.v = tail.q;
+  groups_.push_back(std::move(tail));
+}
+
+double Impact::calc_row_speed(const Row& row) const {
+  double speed = 0.0;
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (row.body[side] < 0) continue;
+    const Body& body = bodies_[static_cast<std::size_t>(row.body[side])];
+    speed += dot(row.linear[side], body.velocity_m_s) + dot(row.angular[side], body.spin_rad_s);
+  }
+  return speed;
+}
+
+double Impact::calc_approach(int contact) const {
+  return -calc_row_speed(rows_[static_cast<std::size_t>(touches_[static_cast<std::size_t>(contact)].row)]);
+}
+
+/// Step length, hysteresis and anchor springs, from the elastic pulses that the rigid bodies would have. With h_ set: only of new contacts.
+void Impact::choose_step(const Options& options) {
+  const std::size_t first = h_ > 0.0 ? touches_.size() - 1 : 0;
+  std::vector<double> speed(touches_.size(), 0.0), inverse_mass(touches_.size(), 0.0);
+  for (std::size_t c = first; c < touches_.size(); ++c) {
+    const Row& row = rows_[static_cast<std::size_t>(touches_[c].row)];
+    speed[c] = -calc_row_speed(row);
+    for (std::size_t side = 0; side < 2; ++side)
+      inverse_mass[c] += dot(row.linear[side], row.to_velocity[side]) + dot(row.angular[side], row.to_spin[side]);
+    double modal = 0.0;
+    for (const Group& group : groups_)
+      for (std::size_t r = 0; r < group.rows.size(); ++r) {
+        if (group.rows[r] != touches_[c].row) continue;
+        const double* phi = group.phi.data() + r * group.q.size();
+        speed[c] -= calc_dot(phi, group.v.data(), group.q.size());
+        modal += calc_dot(phi, phi, group.q.size());
+      }
+    if (inverse_mass[c] == 0.0) inverse_mass[c] = modal;
+    fastest_ = std::max(fastest_, speed[c]);
+  }
+  fastest_ = std::max(fastest_, kSlowest);
+  double shortest = options.longest_step_s * options.steps_per_pulse;
+  for (std::size_t c = first; c < touches_.size(); ++c) {
+    if (!(inverse_mass[c] > 0.0)) continue;
+    Touch& touch = touches_[c];
+    // What is pushed by its neighbours and does not approach by itself is taken at the fastest speed.
+    const double v = speed[c] > 0.01 * fastest_ ? speed[c] : fastest_;
+    const ElasticPulse pulse = calc_elastic_pulse(touch.spring, 1.0 / inverse_mass[c], v);
+    shortest = std::min(shortest, pulse.length_s);
+    part_s_ = std::max(part_s_, pulse.length_s);
+    touch.spring.hysteresis_s_m = calc_hysteresis(contacts_[c].restitution, v);
+    const double peak = std::max(pulse.compression_m, touch.compression_m);
+    touch.tangential_n_m = contacts_[c].tangential_ratio * touch.spring.stiffness * std::pow(peak, touch.spring.exponent - 1.0);
+  }
+  if (h_ > 0.0) return;
+  if (options.part_s > 0.0) part_s_ = options.part_s;
+  double longest = std::min(shortest / options.steps_per_pulse, options.longest_step_s);
+  for (const Group& group : groups_) {
+    const double band = bodies_[static_cast<std::size_t>(group.body)].modes->get_band();
+    if (!group.rows.empty() && band > 0.0) longest = std::min(longest, 0.5 * std::numbers::pi / band);  // 1/(4 f_c)
+  }
+  step_index_ = find_step(longest);
+  h_ = get_step(step_index_);
+}
+
+/// Propagators, A and the free motion of the first step with these contacts.
+void Impact::set_up_step() {
+  const std::size_t n = rows_.size();
+  A_.assign(n * n, 0.0);
+  free_.assign(n, 0.0);
+  moved_.assign(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      for (std::size_t s = 0; s < 2; ++s)
+        for (std::size_t t = 0; t < 2; ++t)
+          if (rows_[i].body[s] >= 0 && rows_[i].body[s] == rows_[j].body[t])
+            A_[i * n + j] +=
+                0.5 * h_ * h_ * (dot(rows_[i].linear[s], rows_[j].to_velocity[t]) + dot(rows_[i].angular[s], rows_[j].to_spin[t]));
+  for (Group& group : groups_) {
+    const Modes& modes = *bodies_[static_cast<std::size_t>(group.body)].modes;
+    group.p = group.tail ? modes.find_tail_propagator(step_index_) : modes.find_propagator(step_index_);
+    const std::size_t padded = group.q.size(), m = group.rows.size();
+    group.x.resize(padded);
+    for (std::size_t i = 0; i < padded; ++i) group.x[i] = group.p->a[i] * group.q[i] + group.p->b[i] * group.v[i];
+    group.w.assign(m, 0.0);
+    group.w_free.assign(m, 0.0);
+    group.compliance.assign(m * m, 0.0);
+    for (std::size_t r = 0; r < m; ++r) {
+      const double* phi = group.phi.data() + r * padded;
+      group.w[r] = calc_dot(phi, group.q.data(), padded);
+      group.w_free[r] = calc_dot(phi, group.x.data(), padded);
+      for (std::size_t s = 0; s <= r; ++s) {
+        const double compliance = calc_dot(phi, group.p->g.data(), group.phi.data() + s * padded, padded);
+        const auto i = static_cast<std::size_t>(group.rows[r]), j = static_cast<std::size_t>(group.rows[s]);
+        group.compliance[r * m + s] = group.compliance[s * m + r] = compliance;
+        A_[i * n + j] += compliance;
+        if (r != s) A_[j * n + i] += compliance;
+      }
+    }
+  }
+}
+
+void Impact::step() {
+  const std::size_t n = rows_.size();
+  const double half = 0.5 * h_ * h_;
+  for (std::size_t r = 0; r < n; ++r) {
+    free_[r] = h_ * calc_row_speed(rows_[r]);
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (rows_[r].body[side] < 0) continue;
+      const Body& body = bodies_[static_cast<std::size_t>(rows_[r].body[side])];
+      free_[r] += half * (dot(rows_[r].linear[side], body.acceleration_m_s2) + dot(rows_[r].angular[side], body.spin_acceleration_rad_s2));
+    }
+  }
+  for (const Group& group : groups_)
+    for (std::size_t r = 0; r < group.rows.size(); ++r) free_[static_cast<std::size_t>(group.rows[r])] += group.w_free[r] - group.w[r];
+
+  const bool reached = std::any_of(touches_.begin(), touches_.end(), [&](const Touch& t) {
+    return t.compression_m > 0.0 || t.compression_m - free_[static_cast<std::size_t>(t.row)] > 0.0;
+  });
+  if (!reached)
+    std::fill(force_.begin(), force_.end(), 0.0);
+  else if (!solver_.solve(touches_, A_, free_, h_, force_))
+    ++misses_;
+
+  bool pushed = false;
+  for (std::size_t i = 0; i < n; ++i) {
+    moved_[i] = free_[i];
+    for (std::size_t j = 0; j < n; ++j) moved_[i] += A_[i * n + j] * force_[j];
+    pushed = pushed || force_[i] != 0.0;
+  }
+  for (std::size_t c = 0; c < touches_.size(); ++c) {
+    Touch& t = touches_[c];
+    const auto row = static_cast<std::size_t>(t.row);
+    const double before = t.compression_m;
+    t.compression_m -= moved_[row];
+    books_.dissipated_contact -=
+        force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before));
+    Vec3 impulse = h_ * force_[row] * rows_[row].axis;
+    normal_impulse_[c] += h_ * force_[row];
+    if (t.friction > 0.0) {
+      const std::array<double, 2> u0 = t.stretch;
+      t.stretch = calc_shortened({u0[0] + moved_[row + 1], u0[1] + moved_[row + 2]}, t.friction * force_[row] / t.tangential_n_m);
+      for (std::size_t k = 0; k < 2; ++k) {
+        books_.dissipated_friction -=
+            force_[row + 1 + k] * moved_[row + 1 + k] + 0.5 * t.tangential_n_m * (t.stretch[k] * t.stretch[k] - u0[k] * u0[k]);
+        impulse = impulse + h_ * force_[row + 1 + k] * rows_[row + 1 + k].axis;
+      }
+    }
+    Pulse& pulse = pulses_[c];
+    if (dot(impulse, impulse) > 0.0) {
+      if (pulse.impulse_n_s.empty()) pulse.start_s = get_time();
+      pulse.step_s = h_;
+      pulse.impulse_n_s.resize(pulse.impulse_n_s.size() + static_cast<std::size_t>(silent_[c]));
+      pulse.impulse_n_s.push_back(impulse);
+      silent_[c] = 0;
+    } else if (!pulse.impulse_n_s.empty()) {
+      ++silent_[c];
+    }
+  }
+  // Rigid motion: accelerations of the step are constant.
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    Body& body = bodies_[b];
+    if (!(body.mass_kg > 0.0)) continue;
+    Vec3 linear = body.acceleration_m_s2, angular = body.spin_acceleration_rad_s2;
+    for (std::size_t r = 0; r < n && pushed; ++r)
+      for (std::size_t side = 0; side < 2; ++side)
+        if (rows_[r].body[side] == static_cast<int>(b)) {
+          linear = linear + force_[r] * rows_[r].to_velocity[side];
+          angular = angular + force_[r] * rows_[r].to_spin[side];
+        }
+    const Vec3 moved = h_ * body.velocity_m_s + half * linear, turned = h_ * body.spin_rad_s + half * angular;
+    body.velocity_m_s = body.velocity_m_s + h_ * linear;
+    body.spin_rad_s = body.spin_rad_s + h_ * angular;
+    body.moved_m = body.moved_m + moved;
+    body.turned_rad = body.turned_rad + turned;
+    books_.given += body.mass_kg * dot(body.acceleration_m_s2, moved) + dot(body.inertia_kg_m2 * body.spin_acceleration_rad_s2, turned);
+  }
+  for (Group& group : groups_) {
+    const std::size_t m = group.rows.size();
+    group.f.resize(m);
+    group.lanes.resize(m * kLanes);
+    for (std::size_t r = 0; r < m; ++r) group.f[r] = force_[static_cast<std::size_t>(group.rows[r])];
+    for (std::size_t r = 0; r < m; ++r) {
+      double w = group.w_free[r];
+      for (std::size_t s = 0; s < m; ++s) w += group.compliance[r * m + s] * group.f[s];
+      group.work += group.f[r] * (w - group.w[r]);
+      group.w[r] = w;
+    }
+    const Propagator& p = *group.p;
+    const State state{p.a.data(),       p.b.data(),     p.c.data(),     p.e.data(),     p.g.data(),
+                      group.phi.data(), group.q.data(), group.v.data(), group.x.data(), group.q.size()};
+    const auto move = m == 1 ? move_modes<1> : m == 3 ? move_modes<3> : move_modes<0>;
+    move(state, static_cast<int>(m), group.f.data(), group.w_free.data(), group.lanes.data());
+  }
+  ++steps_;
+  quiet_ = pushed ? 0 : quiet_ + 1;
+}
+
+bool Impact::advance(double until_s) {
+  while (!ended_ && get_time() < until_s) {
+    step();
+    ended_ = quiet_ * h_ >= part_s_ && std::all_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.compression_m <= 0.0; });
+  }
+  return ended_;
+}
+
+void Impact::join(const Contact& contact) {
+  add_contact(contact);
+  choose_step({});
+  set_up_step();
+  books_.start += calc_spring_energy(touches_.back().spring, touches_.back().compression_m);
+  ended_ = false;
+}
+
+void Impact::push(int body, const Vec3& velocity_m_s, const Vec3& spin_rad_s) {
+  check(body >= 0 && static_cast<std::size_t>(body) < bodies_.size(), "there is no such body");
+  check(is_finite(velocity_m_s) && is_finite(spin_rad_s), "a push is not finite");
+  const double before = calc_rigid_energy();
+  Body& b = bodies_[static_cast<std::size_t>(body)];
+  b.velocity_m_s = b.velocity_m_s + velocity_m_s;
+  b.spin_rad_s = b.spin_rad_s + spin_rad_s;
+  books_.given += calc_rigid_energy() - before;
+}
+
+void Impact::update(std::span<const Body> bodies, std::span<const Contact> contacts) {
+  check(bodies.size() == bodies_.size() && contacts.size() == contacts_.size(), "an update has other bodies or contacts");
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    check_body(bodies[b]);
+    check((bodies[b].mass_kg > 0.0) == (bodies_[b].mass_kg > 0.0), "an update frees or fixes a body");
+  }
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    check_contact(contacts[c]);
+    check(
+        contacts[c].a == contacts_[c].a && contacts[c].b == contacts_[c].b && (contacts[c].friction > 0.0) == (contacts_[c].friction > 0.0),
+        "an update has other contacts");
+  }
+  const double before = calc_rigid_energy();
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    Body& body = bodies_[b];
+    body.centre_m = bodies[b].centre_m;
+    body.inertia_kg_m2 = bodies[b].inertia_kg_m2;
+    body.acceleration_m_s2 = bodies[b].acceleration_m_s2;
+    body.spin_acceleration_rad_s2 = bodies[b].spin_acceleration_rad_s2;
+    body.moved_m = body.turned_rad = {};
+    inverse_inertia_[b] = body.mass_kg > 0.0 ? calc_inverse(body.inertia_kg_m2) : Mat3{};
+  }
+  books_.given += calc_rigid_energy() - before;
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    Touch& t = touches_[c];
+    const auto row = static_cast<std::size_t>(t.row);
+    const bool rubs = t.friction > 0.0;
+    const Vec3 stretch = rubs ? t.stretch[0] * rows_[row + 1].axis + t.stretch[1] * rows_[row + 2].axis : Vec3{};
+    Contact contact = contacts_[c];
+    contact.where_m = contacts[c].where_m;
+    contact.normal = contacts[c].normal;
+    contact.shape_a = contacts[c].shape_a;
+    contact.shape_b = contacts[c].shape_b;
+    place_contact(contact, static_cast<int>(c), t.row);
+    contact.shape_a = contact.shape_b = {};
+    contacts_[c] = contact;
+    if (!rubs) continue;
+    // What of the anchor spring is along the new normal is lost.
+    t.stretch = {dot(stretch, rows_[row + 1].axis), dot(stretch, rows_[row + 2].axis)};
+    books_.dissipated_friction +=
+        0.5 * t.tangential_n_m * (dot(stretch, stretch) - t.stretch[0] * t.stretch[0] - t.stretch[1] * t.stretch[1]);
+  }
+  set_up_step();
+}
+
+Vec3 Impact::get_force(int contact) const {
+  Vec3 force{};
+  for (std::size_t r = 0; r < rows_.size(); ++r)
+    if (rows_[r].contact == contact) force = force + force_[r] * rows_[r].axis;
+  return force;
+}
+
+double Impact::calc_rigid_energy() const {
+  double sum = 0.0;
+  for (const Body& body : bodies_)
+    sum += 0.5 * (body.mass_kg * dot(body.velocity_m_s, body.velocity_m_s) + dot(body.spin_rad_s, body.inertia_kg_m2 * body.spin_rad_s));
+  return sum;
+}
+
+double Impact::calc_spring_energies() const {
+  double sum = 0.0;
+  for (const Touch& t : touches_)
+    sum += calc_spring_energy(t.spring, t.compression_m) +
+           0.5 * t.tangential_n_m * (t.stretch[0] * t.stretch[0] + t.stretch[1] * t.stretch[1]);
+  return sum;
+}
+
+std::vector<Body> Impact::get_bodies() const {
+  std::vector<Body> bodies = bodies_;
+  for (const Group& group : groups_) {
+    if (group.tail) continue;
+    Body& body = bodies[static_cast<std::size_t>(group.body)];
+    body.q.assign(group.q.begin(), group.q.begin() + body.modes->size());
+    body.q_dot.assign(group.v.begin(), group.v.begin() + body.modes->size());
+  }
+  return bodies;
+}
+
+Books Impact::get_books() const {
+  Books books = books_;
+  books.rigid = calc_rigid_energy();
+  books.spring = calc_spring_energies();
+  for (const Group& group : groups_) {
+    if (group.tail) {
+      books.above_band += group.work;
+      continue;
+    }
+    const auto n = static_cast<std::size_t>(bodies_[static_cast<std::size_t>(group.body)].modes->size());
+    const double modal = bodies_[static_cast<std::size_t>(group.body)].modes->calc_energy({group.q.data(), n}, {group.v.data(), n});
+    books.modal += modal;
+    books.dissipated_modes += group.energy + group.work - modal;
+  }
+  return books;
+}
+
+std::vector<Pulse> Impact::take_pulses() {
+  std::vector<Pulse> taken;
+  for (std::size_t c = 0; c < pulses_.size(); ++c) {
+    if (!pulses_[c].impulse_n_s.empty()) taken.push_back(pulses_[c]);
+    pulses_[c].impulse_n_s.clear();
+    silent_[c] = 0;
+  }
+  return taken;
+}
+
+}  // namespace carillon::impact

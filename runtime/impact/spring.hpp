@@ -1,0 +1,39 @@
+// The spring of a contact: Hertz and felt, its work in a step, its loss, how long a pulse of it lasts.
+#pragma once
+
+namespace carillon::impact {
+
+/// F = K y^p for y > 0, none for y < 0. Hertz: p = 1.5, K = 4/3 E* sqrt(R). Felt of mallets and hammers: p of 2.2 to 3.5.
+/// With hysteresis chi: F = K y^p (1 + chi y'), never negative (Hunt and Crossley 1975).
+struct Spring {
+  double stiffness = 0.0;       // K [N/m^p]
+  double exponent = 1.5;        // p >= 1
+  double hysteresis_s_m = 0.0;  // chi >= 0
+};
+
+/// 4/3 E* sqrt(R) [N/m^1.5] of two bodies: Young's moduli [Pa], Poisson's ratios, R [m] of the summed curvatures.
+double calc_hertz_stiffness(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double radius_m);
+
+/// V(y) = K y^(p+1)/(p+1) [J]; 0 for y < 0.
+double calc_spring_energy(const Spring& spring, double y);
+
+/// The force of a step from y0 to y1 in h: (V(y1) - V(y0))/(y1 - y0) (1 + chi (y1 - y0)/h), the first factor without cancellation, the
+/// second not below 0; and its derivative by y1. The work of this force over the step is V(y1) - V(y0) plus a loss >= 0, whatever h.
+/// Grows with y1.
+struct StepForce {
+  double force = 0.0, slope = 0.0;  // N, N/m
+};
+StepForce calc_step_force(const Spring& spring, double y0, double y1, double h_s);
+
+/// The hysteresis chi [s/m] at which a rebound has the restitution e at the approach speed v. From the energies of compression and of
+/// rebound, x - ln(1 + x) = -ln(1 - e x) - e x with x = chi v, for every exponent. e >= 1: 0; e is taken as at least 0.002. v > 0.
+double calc_hysteresis(double restitution, double speed_m_s);
+
+/// The elastic pulse of a mass m [kg] with speed v [m/s] on this spring: greatest compression ((p+1)/2 m v^2/K)^(1/(p+1)) and length
+/// 2 y_max/v sqrt(pi) G(1 + 1/(p+1))/G(1/2 + 1/(p+1)) (Hertz 1882: 3.218 (m/(K sqrt v))^(2/5)).
+struct ElasticPulse {
+  double compression_m = 0.0, length_s = 0.0;
+};
+ElasticPulse calc_elastic_pulse(const Spring& spring, double mass_kg, double speed_m_s);
+
+}  // namespace carillon::impact
