@@ -1,0 +1,40 @@
+// A sparse grid about a mesh that tells how far it is at least, and which face is near.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/shape/mesh.hpp"
+
+namespace carillon::shape {
+
+class Grid {
+ public:
+  explicit Grid(const Mesh& mesh);
+
+  struct Near {
+    double at_least_m = 0.0;  // no face is nearer
+    int face = -1;            // one that is near; -1 far away
+  };
+  Near find_near(const Vec3& x) const;
+  double get_cell_m() const { return cell_m_; }
+
+ private:
+  static constexpr int kBrick = 4;  // nodes along a side: smaller bricks keep fewer nodes that are far from the surface
+  struct Node {
+    float distance_m = 0.0F;
+    std::int32_t face = -1;
+  };
+  struct Brick {
+    float distance_m = 0.0F;  // of its middle
+    std::int32_t first = -1;  // of nodes_; -1: far from the surface
+  };
+  Box box_;  // of the mesh
+  Vec3 low_{};
+  double cell_m_ = 0.0;
+  std::array<int, 3> bricks_along_{};
+  std::vector<Brick> bricks_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace carillon::shape

@@ -1,0 +1,168 @@
+// Method: corners of a polyhedron by their height; of any other body the samples nearer than the margin, those of them that no neighbour is
+//   lower than, each moved to the lowest place of the skin about it.
+// Source: none.
+// Deviations: none.
+#include "runtime/shape/mesh.hpp"
+#include "runtime/shape/polyhedron.hpp"
+#include "runtime/shape/reduce.hpp"
+#include "runtime/shape/search.hpp"
+#include "runtime/shape/skin.hpp"
+
+namespace carillon::shape {
+namespace {
+
+constexpr double kFlat = 0.02;   // slope: how far below the plane a neighbour may be, so that what lands nearly flat lands with all of it
+constexpr double kFlush = 0.01;  // slope of a skin that is not at its lowest place, but nearly parallel
+
+Touch make_ground_touch(const Shape& a, const Frame& fa, const Vec3& x, double height) {
+  Touch t;
+  t.station_a = x;
+  t.normal = {0, 0, 1};
+  t.axis_b = {0, 0, 1};
+  const Vec3 at = to_world(fa, x);
+  t.station_b = {at[0], at[1], height};
+  t.gap_m = at[2] - height;
+  t.where_m = {at[0], at[1], 0.5 * (at[2] + height)};
+  t.curvature_a_per_m = a.get_corner_curvature_per_m();
+  return t;
+}
+
+void find_candidates(const Shape& a, const Frame& fa, double height, double margin, std::vector<Touch>& out) {
+  const Samples& s = a.samples();
+  const Mesh& mesh = a.mesh();
+  const Vec3& up = fa.rotation[2];  // of the world, in the frame of a
+  const double below = height + margin - fa.position_m[2];
+  std::vector<int> open{0};
+  while (!open.empty()) {
+    const Ball& ball = s.sample_tree[open.back()];
+    open.pop_back();
+    if (dot(up, ball.middle) - ball.radius_m > below) continue;
+    if (ball.child >= 0) {
+      open.push_back(ball.child + 1);
+      open.push_back(ball.child);
+      continue;
+    }
+    for (int i = ball.first; i < ball.first + ball.count; ++i) {
+      const Sample& sample = s.samples[i];
+      const double h = dot(up, sample.point);
+      if (h - sample.reach_m > below) continue;
+      bool lowest = true;
+      if (sample.kind == VertexKind::smooth) {
+        for (int k = 0; k < sample.neighbours && lowest; ++k) {
+          const Vec3& x = s.samples[s.neighbours[sample.first_neighbour + k]].point;
+          lowest = dot(up, x) - h >= -kFlat * norm(x - sample.point);
+        }
+      } else {
+        lowest = carries(mesh, sample.vertex, up);
+      }
+      if (!lowest) continue;
+      Touch t = make_ground_touch(a, fa, sample.point, height);
+      t.id = make_id(Feature::corner_a, sample.vertex, 0);
+      if (sample.kind != VertexKind::corner && !a.skin().is_flat(sample.face)) {
+        t.side_a = Side::skin;
+        t.face_a = sample.face;
+        t.smooth = true;
+        const double reach = kWalk * std::max(1.5 * sample.reach_m, 2.0 * s.spacing_m);
+        const Touch before = t;
+        if (!settle(t, a, fa, nullptr, fa, reach)) {
+          // Falling on beyond its reach: of another sample, unless it is nearly parallel to the ground.
+          t = before;
+          const Spot spot = a.skin().locate(t.station_a, t.face_a);
+          if (norm(a.skin().calc_normal(spot.face, spot.weights) + up) > kFlush) continue;
+        } else {
+          settle(t, a, fa, nullptr, fa, reach);  // the spring's centre is now there
+        }
+      }
+      if (t.gap_m <= margin) out.push_back(t);
+    }
+  }
+}
+
+}  // namespace
+
+bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
+  const int start = mesh.any_half_edge[vertex];
+  int e = start;
+  do {
+    const Vec3 d = mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[vertex];
+    const double h = dot(d, normal);
+    if (h < 0.0 && h * h > kFlat * kFlat * norm2(d)) return false;
+    e = Mesh::next(mesh.opposite[e]);
+  } while (e != start);
+  return true;
+}
+
+bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position, const Shape& a, double margin) {
+  if (!memory.known) return false;
+  double turned = 0.0;
+  Vec3 moved = position - memory.position_m;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 row = rotation[i] - memory.rotation[i];
+    turned += norm2(row);
+    moved[i] += dot(row, a.get_middle_m());
+  }
+  return margin + norm(moved) + std::sqrt(turned) * a.get_radius_m() <= memory.reach_m;
+}
+
+void thin(std::vector<Touch>& touches, double spacing, double patch) {
+  std::vector<Touch> apart;
+  for (const Touch& t : touches) {
+    bool same = false;
+    for (Touch& other : apart) {
+      if (t.smooth || other.smooth) {
+        if (norm2(t.where_m - other.where_m) > 0.09 * spacing * spacing || dot(t.normal, other.normal) < 0.9) continue;
+      } else if (t.id != other.id) {
+        continue;
+      }
+      same = true;
+      if (t.gap_m < other.gap_m) other = t;
+      break;
+    }
+    if (!same) apart.push_back(t);
+  }
+  touches.swap(apart);
+  reduce(touches, patch);
+}
+
+void answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, bool moved, PairMemory& memory,
+            std::vector<Touch>& out) {
+  const double size = b != nullptr ? std::min(a.get_size_m(), b->get_size_m()) : a.get_size_m();
+  for (const Touch& candidate : memory.candidates) {
+    out.push_back(candidate);
+    if (moved) settle(out.back(), a, fa, b, fb, 0.1 * size);
+    if (out.back().gap_m > margin) out.pop_back();
+  }
+  if (moved) thin(out, 0.02 * size, kPatch * size);
+  name(out, 0.1 * size, memory);
+}
+
+void find_ground_touches(const Shape& a, const Frame& fa, double height, double margin, PairMemory& memory, std::vector<Touch>& out) {
+  out.clear();
+  if (to_world(fa, a.get_middle_m())[2] - a.get_radius_m() > height + margin) return;
+  if (const Polyhedron* body = a.polyhedron()) {
+    for (std::size_t c = 0; c < body->corners.size(); ++c) {
+      const double h = dot(fa.rotation[2], body->corners[c]) + fa.position_m[2] - height;
+      if (h > margin || !carries(a.mesh(), body->corner_vertices[c], fa.rotation[2])) continue;
+      out.push_back(make_ground_touch(a, fa, body->corners[c], height));
+      out.back().id = make_id(Feature::corner_a, body->corner_vertices[c], 0);
+    }
+    reduce(out, Box::kFar);
+    return;
+  }
+  const Vec3 position = {0.0, 0.0, fa.position_m[2] - height};  // sideways and about the vertical nothing changes, but stations do
+  const Mat3 rotation = {Vec3{}, Vec3{}, fa.rotation[2]};
+  if (!recall(memory, rotation, position, a, margin)) {
+    memory.known = true;
+    memory.rotation = rotation;
+    memory.position_m = position;
+    memory.reach_m = margin + choose_slack(margin, a.get_size_m());
+    memory.candidates.clear();
+    find_candidates(a, fa, height, memory.reach_m, memory.candidates);
+    thin(memory.candidates, a.samples().spacing_m, kPatch * a.get_size_m());
+    answer(a, fa, nullptr, fa, margin, false, memory, out);
+  } else {
+    answer(a, fa, nullptr, fa, margin, true, memory, out);
+  }
+}
+
+}  // namespace carillon::shape

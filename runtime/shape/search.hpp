@@ -1,0 +1,42 @@
+// The parts of a search for touches.
+#pragma once
+
+#include "runtime/shape/samples.hpp"
+#include "runtime/shape/touch.hpp"
+
+namespace carillon::shape {
+
+enum class Feature : std::uint64_t { corner_a = 1, corner_b = 2, edges = 3 };
+inline std::uint64_t make_id(Feature feature, int i, int j) {
+  return static_cast<std::uint64_t>(feature) << 56 | static_cast<std::uint64_t>(static_cast<std::uint32_t>(i) & 0xfffffffU) << 28 |
+         (static_cast<std::uint32_t>(j) & 0xfffffffU);
+}
+
+/// Two convex polyhedra: separating axes and clipping. Fills `out`.
+void find_polyhedra_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
+                            std::vector<Touch>& out);
+
+/// May a corner or ridge vertex of the skin be the first to touch what has this outward normal (mesh frame)? No neighbour is lower.
+bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
+
+inline constexpr int kFirst = 12, kAgain = 2;  // iterations between two curved sides, in a search and near a place known
+
+/// Moves the touch to where its two sides face each other, from where they are now, and fills gap, where, normal and stations. False where
+/// the touch left its features (the end of a line, a skin that goes on falling beyond `reach_m`).
+bool settle(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m,
+            int iterations = kAgain);
+
+/// Is all that is nearer than margin_m now among the candidates of the last search?
+bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position_m, const Shape& a, double margin_m);
+/// Keeps of touches that travel and have met one, the deepest; then few of a patch.
+void thin(std::vector<Touch>& touches, double spacing_m, double patch_m);
+/// The candidates of the memory that are nearer than the margin now, with names; `moved`: they have not been settled since.
+void answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, bool moved, PairMemory& memory,
+            std::vector<Touch>& out);
+
+/// Of two bodies at a distance of 0 to `size`: how far a search looks beyond the margin, so that the next ones can be spared.
+inline double choose_slack(double margin_m, double size_m) { return std::max(margin_m, 1e-3 * size_m); }
+inline constexpr double kWalk = 4.0;    // reaches of a sample: how far the lowest place may be, at a tip that no sample is near
+inline constexpr double kPatch = 0.25;  // of the smaller body: what is further apart are different patches
+
+}  // namespace carillon::shape

@@ -1,0 +1,80 @@
+// Method: the kind of body follows from the mesh; see the parts.
+// Source: none.
+// Deviations: none.
+#include "runtime/shape/shape.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "runtime/shape/grid.hpp"
+#include "runtime/shape/polyhedron.hpp"
+#include "runtime/shape/samples.hpp"
+
+namespace carillon::shape {
+
+Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int32_t, 3>> triangles)
+    : mesh_(std::make_unique<const Mesh>(vertices, triangles)), skin_(std::make_unique<const Skin>(*mesh_)) {
+  constexpr int kMostFacets = 26;
+  const Vec3 side = mesh_->box.high - mesh_->box.low;
+  size_m_ = norm(side);
+  thickness_m_ = std::min({side[0], side[1], side[2]});
+  middle_m_ = 0.5 * (mesh_->box.low + mesh_->box.high);
+  radius_m_ = calc_radius_m(middle_m_);
+  if (std::optional<Polyhedron> made = make_polyhedron(*mesh_, *skin_, kMostFacets)) {
+    polyhedron_ = std::make_unique<const Polyhedron>(std::move(*made));
+  }
+}
+
+Shape::~Shape() = default;
+
+double Shape::calc_radius_m(const Vec3& centre) const {
+  double most = 0.0;
+  for (const Vec3& x : mesh_->vertices) most = std::max(most, norm2(x - centre));
+  return std::sqrt(most) + skin_->get_sag_m();
+}
+
+Box Shape::calc_box(const Frame& frame) const {
+  const Vec3 middle = to_world(frame, middle_m_), half = 0.5 * (mesh_->box.high - mesh_->box.low);
+  Box box{middle, middle};
+  for (int i = 0; i < 3; ++i) {
+    double reach = skin_->get_sag_m();
+    for (int k = 0; k < 3; ++k) reach += std::abs(frame.rotation[i][k]) * half[k];
+    box.low[i] -= reach;
+    box.high[i] += reach;
+  }
+  return box;
+}
+
+Place Shape::find_place(const Vec3& point, const Vec3& outward) const {
+  const Nearest nearest = mesh_->find_nearest(point, Box::kFar, -1);
+  // At an edge or a corner, and under a curved skin, several faces are near: the one that looks the way asked.
+  const double reach = std::sqrt(nearest.distance2) + 1e-6 * size_m_;
+  Nearest best = nearest;
+  double most = dot(mesh_->normals[nearest.face], outward);
+  mesh_->for_ball(point, reach, [&](int f) {
+    const double along = dot(mesh_->normals[f], outward);
+    if (along <= most) return;
+    const Nearest on = mesh_->find_nearest_on_face(point, f);
+    if (on.distance2 > reach * reach) return;
+    most = along;
+    best = on;
+  });
+  return {mesh_->given[best.face], best.weights, skin_->calc_mean_curvature(best.face, best.weights)};
+}
+
+void Shape::prepare() const {
+  samples();
+  if (!polyhedron_) grid();
+}
+
+const Samples& Shape::samples() const {
+  if (!samples_) samples_ = std::make_unique<const Samples>(*mesh_, *skin_);
+  return *samples_;
+}
+
+const Grid& Shape::grid() const {
+  if (!grid_) grid_ = std::make_unique<const Grid>(*mesh_);
+  return *grid_;
+}
+
+}  // namespace carillon::shape

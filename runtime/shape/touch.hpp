@@ -1,0 +1,58 @@
+// Where two bodies touch, or a body and the ground.
+//
+//     find_touches(a, frame_a, b, frame_b, margin, memory, touches);      // at the search, 1 kHz
+//     refresh(touch, a, frame_a, &b, frame_b, memory);                    // at each small step
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/shape/shape.hpp"
+
+namespace carillon::shape {
+
+/// What one side of a touch is made of. skin: a curved surface; the touch travels. point: a corner. line: an edge; the touch travels along
+/// it. plane: a flat facet (or the ground).
+enum class Side : std::uint8_t { skin, point, line, plane };
+
+/// One point at which two bodies touch or are nearer than the margin. b may be the ground (half space).
+struct Touch {
+  std::uint64_t id = 0;           // of the features; the same as long as the same corner, edge pair or smooth patch pair touches
+  Vec3 where_m{}, normal{};       // world; unit, from b to a
+  double gap_m = 0.0;             // negative: inside
+  Vec3 station_a{}, station_b{};  // surface points in the mesh frames (b: world for the ground)
+  double curvature_a_per_m = 0.0, curvature_b_per_m = 0.0;  // for Hertz; 0 flat
+  bool smooth = false;                                      // the point travels over a curved surface while it rolls: refresh() moves it
+  // How refresh() goes on:
+  Side side_a = Side::point, side_b = Side::plane;
+  Vec3 axis_a{}, axis_b{};       // outward normal of a plane, direction of a line; in the frame of its body (world for the ground)
+  int face_a = -1, face_b = -1;  // of the fine mesh, where the skin search begins; -1: none
+};
+
+/// The caller's, one per pair: what makes the next search cheap and gives touches their names. Of no meaning to the caller.
+class PairMemory {
+ public:
+  bool known = false;
+  Mat3 rotation{};  // of a in b at the last search
+  Vec3 position_m{};
+  double reach_m = 0.0;             // margin of that search and what was added to it
+  std::vector<Touch> candidates;    // of it, nearer than reach_m
+  std::vector<Touch> last;          // touches given at the last call, to name those of the next
+  std::uint64_t serial = 0;         // of names given
+  std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
+};
+
+/// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
+void find_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
+                  std::vector<Touch>& out);
+/// The ground is the half space z <= height_m.
+void find_ground_touches(const Shape& a, const Frame& frame_a, double height_m, double margin_m, PairMemory& memory,
+                         std::vector<Touch>& out);
+
+/// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground.
+void refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, PairMemory& memory);
+
+/// How deep two bodies are inside each other [m]; 0 when they are apart. `where` gets the deepest point (world).
+double calc_overlap(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, Vec3& where);
+
+}  // namespace carillon::shape

@@ -1,0 +1,65 @@
+// Vectors, frames and boxes of collision geometry.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "runtime/impact/vector.hpp"
+
+namespace carillon::shape {
+
+using impact::cross;
+using impact::dot;
+using impact::Mat3;
+using impact::Vec3;
+using impact::operator+;
+using impact::operator-;
+using impact::operator*;
+
+inline double norm2(const Vec3& a) { return dot(a, a); }
+inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
+inline Vec3 normalise(const Vec3& a) { return (1.0 / norm(a)) * a; }
+/// M^T a.
+inline Vec3 turn_back(const Mat3& m, const Vec3& a) { return a[0] * m[0] + a[1] * m[1] + a[2] * m[2]; }
+/// A unit vector at right angles to n.
+inline Vec3 find_across(const Vec3& n) {
+  const Vec3 axis = std::abs(n[0]) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+  return normalise(cross(n, axis));
+}
+
+/// Where a body is: x_world = R x + p, x in the frame of its mesh.
+struct Frame {
+  Mat3 rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  Vec3 position_m{};
+};
+inline Vec3 to_world(const Frame& f, const Vec3& x) { return f.rotation * x + f.position_m; }
+inline Vec3 to_body(const Frame& f, const Vec3& x) { return turn_back(f.rotation, x - f.position_m); }
+
+/// A box along axes.
+struct Box {
+  Vec3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+  void add(const Vec3& x) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], x[k]);
+      high[k] = std::max(high[k], x[k]);
+    }
+  }
+  void add(const Box& other) {
+    add(other.low);
+    add(other.high);
+  }
+  double calc_distance2(const Vec3& x) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double out = std::max({low[k] - x[k], x[k] - high[k], 0.0});
+      sum += out * out;
+    }
+    return sum;
+  }
+
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace carillon::shape
