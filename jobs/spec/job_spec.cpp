@@ -14,6 +14,7 @@ namespace fs = std::filesystem;
 
 constexpr double kMostHz = 1e12;
 constexpr std::size_t kMostFixed = 1000, kMostRegions = 10000;
+constexpr std::size_t kLongestName = 200;  // bytes
 constexpr long long kMostRanks = 1'000'000;
 constexpr double kMostGb = 1e9, kMostSeconds = 1e9;
 constexpr double kLeastScale = 1e-9, kMostScale = 1e6;
@@ -60,6 +61,13 @@ Fixed read_fixed(config::Object fixed) {
     }
     box->finish();
   }
+  if (fixed.has("name")) {
+    result.name = fixed.string("name");
+    if (result.name.size() > kLongestName ||
+        std::any_of(result.name.begin(), result.name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+      fixed.fail("name", fmt::format("is no name: at most {} bytes, and none of them a control character", kLongestName));
+  }
+  if (auto fixing = config::read_fixing(fixed)) result.fixing = *fixing;
   fixed.finish();
   if (result.node_set.has_value() == result.box_m.has_value()) {
     fixed.fail("", "\"fixed\" holds one of \"node_set\" (a name of the mesh) and \"box_m\" ({\"min\": [x, y, z], \"max\": [x, y, z]})");
@@ -71,7 +79,7 @@ Fixed read_fixed(config::Object fixed) {
 std::vector<Fixed> read_all_fixed(config::Object& job) {
   std::vector<Fixed> list;
   for (config::Entry& entry : job.entries("fixed", kMostFixed)) {
-    Fixed& fixed = list.emplace_back(entry.object ? read_fixed(*entry.object) : Fixed{entry.text, {}, {}});
+    Fixed& fixed = list.emplace_back(entry.object ? read_fixed(*entry.object) : Fixed{entry.text, {}, {}, {}, {}});
     fixed.place = entry.place;
   }
   return list;

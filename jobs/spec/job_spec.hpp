@@ -10,6 +10,7 @@
 
 #include "jobs/spec/material.hpp"
 #include "runtime/config/document.hpp"
+#include "runtime/config/supports.hpp"
 
 namespace carillon::spec {
 
@@ -25,6 +26,8 @@ struct Fixed {
   std::optional<std::string> node_set = {};
   std::optional<std::array<std::array<double, 3>, 2>> box_m = {};  // {min, max}
   std::string place = {};                                          // "file:line" of the job, for messages
+  std::string name = {};                                           // of the support in the bank; empty: the node set's, or "box N"
+  config::Fixing fixing = {};                                      // what is behind these nodes; a scene may choose another
 };
 
 /// A body that the program meshes itself, in place of a mesh file: a parametric shape or a closed surface, as carillon-mesh takes them.

@@ -88,6 +88,16 @@ Json::Value write_body(const Body& body, const fs::path& base) {
   return root;
 }
 
+/// The members of a JSON object, added to `entry`.
+void add_members(const std::string& members, Json::Value& entry) {
+  if (members.empty()) return;
+  Json::Value added;
+  std::istringstream stream("{" + members + "}");
+  std::string errors;
+  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &added, &errors)) throw SolveError("internal: not JSON: " + errors);
+  for (const std::string& key : added.getMemberNames()) entry[key] = added[key];
+}
+
 Json::Value write_fixed(const std::vector<Fixed>& list) {
   Json::Value root(Json::arrayValue);
   for (const Fixed& fixed : list) {
@@ -97,6 +107,8 @@ Json::Value write_fixed(const std::vector<Fixed>& list) {
       entry["box_m"]["min"] = to_json((*fixed.box_m)[0]);
       entry["box_m"]["max"] = to_json((*fixed.box_m)[1]);
     }
+    if (!fixed.name.empty()) entry["name"] = fixed.name;
+    add_members(config::write_fixing(fixed.fixing), entry);
   }
   return root.size() == 1 ? root[0] : root;
 }

@@ -24,6 +24,7 @@ struct LocalMesh {
   std::vector<std::int32_t> node_in_mesh;  // (n) number in the whole mesh
   std::vector<std::int32_t> row;           // (n) global number among the free nodes of all ranks; -1: held
   std::vector<std::int32_t> component;     // (n) connected component
+  std::vector<std::int32_t> fixed_by;      // (n) which entry of the job's "fixed" fixes the node, -1: free; empty: nothing is fixed
   std::int32_t free_nodes = 0;             // the leading nodes that are owned and free; their rows are first_row, first_row + 1, ...
   std::int32_t owned_nodes = 0;            // the leading nodes that are owned
   std::int32_t first_row = 0;

@@ -1,8 +1,10 @@
 #include "precompute/io/bank_content.hpp"
 
+#include <fmt/core.h>
 #include <json/json.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "precompute/io/describe_run.hpp"
@@ -66,6 +68,29 @@ std::string make_regions(const SolvedBody& solved) {
   return is_plain ? std::string() : write_json(describe_materials(materials, solved.volume_m3));
 }
 
+/// Names are those of the job, or what the nodes are; of several patches of one entry each has a number.
+bank::Supports make_supports(const spec::JobSpec& job, const fem::Supports& found) {
+  bank::Supports supports;
+  std::map<std::int32_t, int> patches, seen;
+  for (const fem::Support& support : found.list) ++patches[support.entry];
+  for (const fem::Support& support : found.list) {
+    const spec::Fixed& fixed = job.fixed[static_cast<std::size_t>(support.entry)];
+    std::string name = !fixed.name.empty() ? fixed.name : fixed.node_set ? *fixed.node_set : fmt::format("box {}", support.entry + 1);
+    if (patches[support.entry] > 1) name += fmt::format(":{}", ++seen[support.entry]);
+    const std::string members = config::write_fixing(fixed.fixing);
+    supports.text += fmt::format("{}{{\"name\": {}{}{}}}", supports.text.empty() ? "{\"supports\": [" : ", ", config::quote(name),
+                                 members.empty() ? "" : ", ", members);
+    supports.centre_m.push_back(support.centre_m);
+    supports.normal.push_back(support.normal);
+    supports.area_m2.push_back(support.area_m2);
+    supports.thickness_m.push_back(support.thickness_m);
+  }
+  if (!supports.text.empty()) supports.text += "]}";
+  supports.reaction = found.reaction;
+  supports.energy = found.energy;
+  return supports;
+}
+
 bank::Proof make_proof(const eigen::Modes& modes) {
   bank::Proof proof;
   for (const eigen::Count& count : modes.proof.counts) {
@@ -104,6 +129,7 @@ bank::Bank make_bank(const spec::JobSpec& job, const Setting& setting, Body& bod
   bank.material = make_material(solved);
   bank.damping = make_damping(solved.materials);
   bank.regions = make_regions(solved);
+  bank.supports = make_supports(job, solved.supports);
   bank.proof = make_proof(modes);
   bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
   bank.band_hz = {find_low_hz(job, modes), job.band_hz[1]};

@@ -21,21 +21,45 @@ namespace {
 constexpr std::int64_t kFileBytesPerTet = 50, kUsualNodes = 20000;
 constexpr double kMeshingSeconds = 5;
 
-/// The nodes of all sets and boxes that the job holds, each once.
-std::vector<std::int32_t> find_held_nodes(const mesh::TetMesh& mesh, const spec::JobSpec& job) {
-  std::vector<std::int32_t> held;
-  for (const spec::Fixed& fixed : job.fixed) {
+/// A fixed node, and the first entry of the job's "fixed" that names it.
+struct FixedNode {
+  std::int32_t node, entry;
+};
+
+/// The nodes of all sets and boxes that the job fixes, each once, ascending.
+std::vector<FixedNode> find_fixed_nodes(const mesh::TetMesh& mesh, const spec::JobSpec& job) {
+  std::vector<FixedNode> list;
+  for (std::size_t entry = 0; entry < job.fixed.size(); ++entry) {
+    const spec::Fixed& fixed = job.fixed[entry];
     try {
       const auto nodes = fixed.node_set ? mesh::find_fixed_nodes(mesh, *fixed.node_set)
                                         : mesh::find_fixed_nodes(mesh, (*fixed.box_m)[0], (*fixed.box_m)[1]);
-      held.insert(held.end(), nodes.begin(), nodes.end());
+      for (const std::int32_t node : nodes) list.push_back({node, static_cast<std::int32_t>(entry)});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: key 'fixed': {}", fixed.place.empty() ? job.file.string() : fixed.place, error.what()));
     }
   }
-  std::sort(held.begin(), held.end());
-  held.erase(std::unique(held.begin(), held.end()), held.end());
-  return held;
+  std::sort(list.begin(), list.end(),
+            [](const FixedNode& a, const FixedNode& b) { return std::pair(a.node, a.entry) < std::pair(b.node, b.entry); });
+  list.erase(std::unique(list.begin(), list.end(), [](const FixedNode& a, const FixedNode& b) { return a.node == b.node; }), list.end());
+  return list;
+}
+
+/// Tells every rank which entry fixes its nodes. `list` is read on rank 0. Collective.
+void share_fixed_nodes(MPI_Comm comm, std::vector<FixedNode> list, fem::LocalMesh& local) {
+  auto count = static_cast<std::int64_t>(list.size());
+  MPI_Bcast(&count, 1, MPI_INT64_T, 0, comm);
+  if (count == 0) return;
+  petsc::run_agreed(comm, [&] {
+    list.resize(static_cast<std::size_t>(count));
+    local.fixed_by.assign(local.nodes_m.size(), -1);
+  });
+  MPI_Bcast(list.data(), static_cast<int>(2 * count), MPI_INT32_T, 0, comm);
+  for (std::size_t i = 0; i < local.node_in_mesh.size(); ++i) {
+    const std::int32_t node = local.node_in_mesh[i];
+    const auto at = std::lower_bound(list.begin(), list.end(), node, [](const FixedNode& a, std::int32_t b) { return a.node < b; });
+    if (at != list.end() && at->node == node) local.fixed_by[i] = at->entry;
+  }
 }
 
 /// What the check of the mesh found; of an odd size, with the key of the job that corrects it. Rank 0.
@@ -123,12 +147,14 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m}) : run.job.mesh.string();
   run.stations.begin("read", body.source);
   mesh::TetMesh mesh;
+  std::vector<FixedNode> fixed;
   std::vector<std::int32_t> held;
   petsc::run_agreed(run.comm, [&] {
     if (run.rank != 0) return;
     mesh = read_checked_mesh(run, setting, body, patience);
     if (patience != nullptr && patience->estimate) return;
-    held = find_held_nodes(mesh, run.job);
+    fixed = find_fixed_nodes(mesh, run.job);
+    for (const FixedNode& one : fixed) held.push_back(one.node);
     body.held_nodes = static_cast<std::int64_t>(held.size());
     say_size(run, static_cast<std::int64_t>(mesh.nodes.size()), mesh.tet_count(), body.check.components, body.held_nodes);
   });
@@ -141,6 +167,7 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   run.stations.begin("partition", "METIS k-way on the dual graph");
   body.pieces = name_errors(body.source, run,
                             [&] { return fem::distribute(run.comm, mesh, held, {.elimination_order = wants_elimination_order(run.job)}); });
+  share_fixed_nodes(run.comm, std::move(fixed), body.pieces.local);
   mesh = {};
   for (std::int32_t& row : body.surface.row) row = body.pieces.row_of_node[row];
   body.pieces.row_of_node = {};

@@ -265,6 +265,8 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   run.stations.begin("errors", "error bars and decays");
   solved.decay_per_s =
       fem::calc_decay(run.comm, body.pieces.local, solved.materials, run.job.mass, solved.modes.lambda, solved.modes.shapes).decay_per_s;
+  solved.supports =
+      fem::calc_supports(run.comm, body.pieces.local, solved.materials, run.job.mass, solved.modes.lambda, solved.modes.shapes);
   solved.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, solved); });
   run.stations.end();
   keep(run, solved.modes);

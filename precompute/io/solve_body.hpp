@@ -7,6 +7,7 @@
 #include "precompute/estimate/error_bars.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/fem/materials.hpp"
+#include "precompute/fem/supports.hpp"
 #include "precompute/io/body.hpp"
 #include "precompute/io/run.hpp"
 
@@ -18,6 +19,7 @@ struct SolvedBody {
   fem::RigidBody rigid;
   eigen::Modes modes;
   std::vector<double> decay_per_s;  // (m)
+  fem::Supports supports;
   estimate::ErrorBars bars;
 };
 

@@ -1,5 +1,6 @@
 #include "precompute/slabs/held.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -9,6 +10,12 @@
 
 namespace carillon::slabs {
 namespace {
+
+/// A node that several entries hold belongs to the first of them.
+void hold_by(std::int32_t& held, std::size_t entry) {
+  const auto by = static_cast<std::int32_t>(entry) + 1;
+  held = held == 0 ? by : std::min(held, by);
+}
 
 std::string begin_message(const std::string& name, const Hold& hold) {
   return hold.place.empty() ? name : fmt::format("{}: {}", hold.place, name);
@@ -29,15 +36,16 @@ const Array* find_set(const Layout& layout, const std::string& set, std::optiona
 }
 
 /// Marks the nodes of a set; returns how many are on this rank.
-std::int64_t read_held_set(const Source& source, const std::string& name, const Layout& layout, const Hold& hold, std::int64_t begin,
-                           Slab& slab) {
+std::int64_t read_held_set(const Source& source, const std::string& name, const Layout& layout, const Wish& wish, std::size_t entry,
+                           std::int64_t begin, Slab& slab) {
+  const Hold& hold = wish.hold[entry];
   std::optional<std::int64_t> value;
   if (const Array* array = find_set(layout, *hold.node_set, value)) {
     const auto values = source.read<std::int64_t>(*array, begin, static_cast<std::int64_t>(slab.nodes_m.size()));
     std::int64_t count = 0;
     for (std::size_t i = 0; i < values.size(); ++i)
       if (value ? values[i] == *value : values[i] != 0) {
-        slab.held[i] = 1;
+        hold_by(slab.held[i], entry);
         ++count;
       }
     return count;
@@ -63,10 +71,11 @@ std::int64_t read_held_set(const Source& source, const std::string& name, const 
 void read_held_sets(MPI_Comm comm, const Source& source, const std::string& name, const Layout& layout, const Wish& wish,
                     std::int64_t begin, Slab& slab) {
   petsc::run_agreed(comm, [&] { slab.held.assign(slab.nodes_m.size(), 0); });
-  for (const Hold& hold : wish.hold) {
+  for (std::size_t entry = 0; entry < wish.hold.size(); ++entry) {
+    const Hold& hold = wish.hold[entry];
     if (!hold.node_set) continue;
     std::int64_t count = 0;
-    petsc::run_agreed(comm, [&] { count = read_held_set(source, name, layout, hold, begin, slab); });
+    petsc::run_agreed(comm, [&] { count = read_held_set(source, name, layout, wish, entry, begin, slab); });
     MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, comm);
     petsc::run_agreed(comm, [&] {
       if (count == 0)
@@ -90,7 +99,8 @@ void find_held_boxes(MPI_Comm comm, const std::string& name, const Wish& wish, S
   report.box_low = low;
   report.box_high = high;
   const double slack = mesh::calc_place_tolerance(low, high);
-  for (const Hold& hold : wish.hold) {
+  for (std::size_t entry = 0; entry < wish.hold.size(); ++entry) {
+    const Hold& hold = wish.hold[entry];
     if (!hold.box_m) continue;
     const std::array<double, 3>&from = hold.box_m->at(0), &to = hold.box_m->at(1);  // clang 14 takes no binding into a lambda
     std::int64_t count = 0;
@@ -98,7 +108,7 @@ void find_held_boxes(MPI_Comm comm, const std::string& name, const Wish& wish, S
       bool is_in = true;
       for (std::size_t k = 0; k < 3; ++k) is_in = is_in && slab.nodes_m[i][k] >= from[k] - slack && slab.nodes_m[i][k] <= to[k] + slack;
       if (!is_in) continue;
-      slab.held[i] = 1;
+      hold_by(slab.held[i], entry);
       ++count;
     }
     MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, comm);

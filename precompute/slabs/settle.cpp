@@ -70,7 +70,7 @@ struct NodeAnswer {
   Vec3 x;
   std::int32_t owner;
   std::int32_t is_shared;
-  std::int32_t is_held;
+  std::int32_t held;  // Slab::held
 };
 
 /// Owners of the nodes at home here: the highest rank that touches them, as fem::distribute has it. `arrived`: who touches them.
@@ -156,7 +156,8 @@ std::vector<std::vector<Vec3>> share_holding_points(MPI_Comm comm, const fem::Lo
 /// Everything of a node that this rank touches.
 struct LocalNode {
   std::int32_t number, owner, component;
-  bool is_held, is_shared;
+  std::int32_t held;  // Slab::held
+  bool is_shared;
   Vec3 x;
 };
 
@@ -166,7 +167,7 @@ fem::LocalMesh make_local(int rank, int order, Piece& piece, std::vector<LocalNo
   local.order = order;
   std::vector<std::int32_t> sorted(nodes.size());
   std::iota(sorted.begin(), sorted.end(), 0);
-  const auto kind = [&](const LocalNode& node) { return node.owner != rank ? 2 : node.is_held ? 1 : 0; };
+  const auto kind = [&](const LocalNode& node) { return node.owner != rank ? 2 : node.held != 0 ? 1 : 0; };
   std::sort(sorted.begin(), sorted.end(), [&](std::int32_t i, std::int32_t j) {
     const LocalNode &a = nodes[static_cast<std::size_t>(i)], &b = nodes[static_cast<std::size_t>(j)];
     return std::pair(kind(a), a.number) < std::pair(kind(b), b.number);
@@ -178,6 +179,7 @@ fem::LocalMesh make_local(int rank, int order, Piece& piece, std::vector<LocalNo
     local.nodes_m.push_back(node.x);
     local.node_in_mesh.push_back(node.number);
     local.component.push_back(node.component);
+    local.fixed_by.push_back(node.held - 1);
     is_shared.push_back(node.is_shared ? 1 : 0);
     local.free_nodes += kind(node) == 0;
     local.owned_nodes += kind(node) < 2;
@@ -257,7 +259,7 @@ fem::Distribution settle(MPI_Comm comm, const std::string& name, Slab& slab, con
   fem::Distribution pieces;
   pieces.nodes = slab.node_count();
   pieces.tets = slab.elements.total();
-  held_nodes = std::count(slab.held.begin(), slab.held.end(), 1);
+  held_nodes = std::count_if(slab.held.begin(), slab.held.end(), [](std::int32_t held) { return held != 0; });
   MPI_Allreduce(MPI_IN_PLACE, &held_nodes, 1, MPI_INT64_T, MPI_SUM, comm);
   Piece piece = slab.order == 1 ? move_elements<4>(comm, slab, part) : move_elements<10>(comm, slab, part);
 
@@ -316,8 +318,8 @@ fem::Distribution settle(MPI_Comm comm, const std::string& name, Slab& slab, con
     for (std::size_t k = 0; k < order.size(); ++k) {
       const std::size_t i = order[k];
       const NodeAnswer& answer = answers.items[k];
-      nodes[i] = {numbers[i],          answer.owner,          component[static_cast<std::size_t>(first_group + group[i])],
-                  answer.is_held != 0, answer.is_shared != 0, answer.x};
+      nodes[i] = {numbers[i],  answer.owner,          component[static_cast<std::size_t>(first_group + group[i])],
+                  answer.held, answer.is_shared != 0, answer.x};
     }
     pieces.local = make_local(rank, slab.order, piece, nodes, on_seam);
   });

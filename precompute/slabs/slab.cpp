@@ -262,7 +262,7 @@ void add_mid_nodes(MPI_Comm comm, Slab& slab, const std::string& name) {
                 0.5 * (low.x[0] + high.x[0]),
                 0.5 * (low.x[1] + high.x[1]),
                 0.5 * (low.x[2] + high.x[2]),
-                low.held != 0 && high.held != 0};
+                low.held != 0 && high.held != 0 ? std::min(low.held, high.held) : 0};
   };
   petsc::run_agreed(comm, [&] {
     edges.reserve(6 * count);
@@ -292,7 +292,7 @@ void add_mid_nodes(MPI_Comm comm, Slab& slab, const std::string& name) {
       replies.push_back(static_cast<std::int32_t>(first + (std::lower_bound(own.begin(), own.end(), edge) - own.begin())));
     for (const Edge& edge : own) {
       slab.nodes_m.push_back({edge.x, edge.y, edge.z});
-      slab.held.push_back(static_cast<char>(edge.held));
+      slab.held.push_back(edge.held);
     }
   });
   const auto numbers = exchange(comm, replies, arrived.count);

@@ -20,10 +20,10 @@ namespace carillon::slabs {
 /// file first, then mid nodes that were added; each kind has its own homes.
 struct Slab {
   int order = 1;
-  Homes corners;              // homes of the nodes of the file that are in use
-  Homes mids;                 // of those that were added, numbered from corners.total()
-  std::vector<Vec3> nodes_m;  // this rank's corners, then its mids
-  std::vector<char> held;     // of these
+  Homes corners;                   // homes of the nodes of the file that are in use
+  Homes mids;                      // of those that were added, numbered from corners.total()
+  std::vector<Vec3> nodes_m;       // this rank's corners, then its mids
+  std::vector<std::int32_t> held;  // of these: 0 free, else 1 + the first entry of Wish::hold that holds the node
   Homes elements;
   std::vector<std::int32_t> tets;  // (e, 4) or (e, 10) numbers of nodes
   std::vector<std::int32_t> regions;

@@ -17,7 +17,7 @@
 namespace carillon::bank {
 
 inline constexpr int kVersionMajor = 1;
-inline constexpr int kVersionMinor = 2;
+inline constexpr int kVersionMinor = 3;
 
 /// Air, as OCE01 section 4 has it: radiation gains are made with it and sound travels in it.
 inline constexpr double kAirDensityKgM3 = 1.21;
@@ -77,6 +77,19 @@ struct Proof {
   std::string method;                             // in words
 };
 
+/// What the modes do to that which fixes the body. S supports: patches of fixed nodes that belong together.
+struct Supports {
+  std::string text;             // JSON: {"supports": [{"name": ..., "on": ..., "joint": ..., "loss": ...}, ...]}; empty: nothing is fixed
+  std::vector<Vec3> centre_m;   // (S) of the patch
+  std::vector<Vec3> normal;     // (S) unit, out of the body; 0 where the nodes span no area
+  std::vector<double> area_m2;  // (S) 0 where the nodes span none
+  std::vector<double> thickness_m;  // (S) the short side of the patch
+  std::vector<double> reaction;     // (m, S, 6) N / (m kg^1/2), N m / (m kg^1/2): force on the body, couple about the centre
+  std::vector<double> energy;       // (m, S) share of the mode's strain energy within one thickness of the patch
+
+  std::size_t count() const { return area_m2.size(); }
+};
+
 /// Sizes of the solve behind the bank.
 struct Counts {
   std::int64_t nodes = 0;  // of the volume mesh as solved (mid-side nodes included)
@@ -104,6 +117,7 @@ struct Bank {
   std::vector<double> discretisation_error_cents;  // (m), or empty: unknown
 
   RigidBody rigid;
+  Supports supports;  // of a body with fixed nodes, since 1.3
   Material material;
   Damping damping;
   std::string regions;         // JSON text: materials by region of the mesh, as the job gives them; empty when there is but one

@@ -17,7 +17,9 @@
 #include "runtime/bank/edges.hpp"
 #include "runtime/bank/faults.hpp"
 #include "runtime/bank/surface.hpp"
+#include "runtime/config/document.hpp"
 #include "runtime/config/solids.hpp"
+#include "runtime/config/supports.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -25,6 +27,7 @@ namespace {
 constexpr double kResidualLimit = 1e-4;
 constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by the same formula
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
+constexpr double kShareTolerance = 1e-6;
 // Bounds that no body reaches. Lengths: from a nanometre to a small planet. Frequency and damping: what a job may ask for at most.
 constexpr double kLeastLengthM = 1e-9, kMostLengthM = 1e7, kFarthestM = 1e12;  // sizes; how far from the origin
 constexpr double kMostHz = 1e12;
@@ -57,6 +60,12 @@ Check check_arrays(const Bank& bank) {
     if (!cents->empty()) expect(name, cents->size(), modes);
   }
   expect("shape", bank.shape.size(), vertices * modes * 3);
+  const Supports& supports = bank.supports;
+  expect("supports/centre_m", supports.centre_m.size(), supports.count());
+  expect("supports/normal", supports.normal.size(), supports.count());
+  expect("supports/thickness_m", supports.thickness_m.size(), supports.count());
+  expect("support_reaction", supports.reaction.size(), modes * supports.count() * 6);
+  expect("support_energy", supports.energy.size(), modes * supports.count());
   if (vertices < 4 || bank.triangles.size() < 4) {
     faults.add("the surface has {} vertices and {} triangles; a solid has at least four of each", vertices, bank.triangles.size());
   }
@@ -98,6 +107,13 @@ Check check_numbers(const Bank& bank) {
   look_all("damping/power", bank.damping.power);
   look_all("damping/freq_hz", bank.damping.freq_hz);
   look_all("damping/loss_factor", bank.damping.loss_factor);
+  const Supports& supports = bank.supports;
+  look("supports/centre_m", supports.centre_m.empty() ? nullptr : supports.centre_m[0].data(), 3 * supports.count());
+  look("supports/normal", supports.normal.empty() ? nullptr : supports.normal[0].data(), 3 * supports.count());
+  look_all("supports/area_m2", supports.area_m2);
+  look_all("supports/thickness_m", supports.thickness_m);
+  look_all("support_reaction", supports.reaction);
+  look_all("support_energy", supports.energy);
   if (bank.proof) {
     look_all("proof/cut_hz", bank.proof->cut_hz);
     look_all("proof/margin", bank.proof->margin);
@@ -329,6 +345,62 @@ Check check_rigid_body(const Bank& bank) {
   return {"rigid body", fmt::format("{:.6g} kg, trace of inertia {:.6g} kg m^2, physically possible", rigid.mass_kg, trace), faults.take()};
 }
 
+/// What is wrong with the words about the supports; empty when nothing is.
+std::string find_text_fault(const Supports& supports) {
+  try {
+    const config::Document document = config::parse_document(supports.text, "supports/text");
+    config::Object root = document.root();
+    std::size_t count = 0;
+    for (config::Entry& entry : root.entries("supports", supports.count())) {
+      if (!entry.object) return "supports/text lists what is no object";
+      entry.object->string("name");
+      config::read_fixing(*entry.object);
+      entry.object->finish();
+      ++count;
+    }
+    root.finish();
+    return count == supports.count() ? "" : fmt::format("supports/text names {} supports, and there are {}", count, supports.count());
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+/// The force of all patches together is -lambda times the integral of rho phi, which is at most lambda sqrt(m) for a mass-normalised mode.
+Check check_supports(const Bank& bank) {
+  Faults faults;
+  const Supports& supports = bank.supports;
+  const std::size_t count = supports.count();
+  if (count > 0) {
+    if (const std::string fault = find_text_fault(supports); !fault.empty()) faults.add("{}", fault);
+  }
+  for (std::size_t s = 0; s < count; ++s) {
+    const double length = calc_size(supports.normal[s]);
+    if (!(length < 1e-6 || std::abs(length - 1.0) < 1e-6)) faults.add("supports/normal[{}] has length {:.6g}, neither 0 nor 1", s, length);
+    if (!(supports.area_m2[s] >= 0.0 && supports.thickness_m[s] >= 0.0))
+      faults.add("support {} has area {:.6g} m^2 and thickness {:.6g} m, negative", s, supports.area_m2[s], supports.thickness_m[s]);
+  }
+  double worst = 0.0;
+  for (std::size_t m = 0; m < bank.mode_count() && count > 0; ++m) {
+    Vec3 force{};
+    double shares = 0.0;
+    for (std::size_t s = 0; s < count; ++s) {
+      const double share = supports.energy[m * count + s];
+      if (!(share >= 0.0 && share <= 1.0)) faults.add("support_energy of mode {} at support {} is {:.6g}, outside 0 to 1", m, s, share);
+      shares += share;
+      for (std::size_t k = 0; k < 3; ++k) force[k] += supports.reaction[(m * count + s) * 6 + k];
+    }
+    if (!(shares <= 1.0 + kShareTolerance)) faults.add("support_energy of mode {} sums up to {:.6g}, more than 1", m, shares);
+    const double share = calc_size(force) / (bank.eigenvalue_rad2_s2[m] * std::sqrt(bank.rigid.mass_kg));
+    if (!(share <= 1.0 + kMassTolerance))
+      faults.add("support_reaction of mode {} is {:.3g} times the most that a body of this mass has", m, share);
+    worst = std::max(worst, share);
+  }
+  return {
+      "supports",
+      count == 0 ? std::string("nothing is fixed") : fmt::format("{}, reactions of up to {:.3g} of the body's mass", count, worst * worst),
+      faults.take()};
+}
+
 Check check_material(const Bank& bank) {
   Faults faults;
   const Material& m = bank.material;
@@ -375,7 +447,7 @@ std::vector<Check> calc_checks(const Bank& bank) {
   std::vector<Check> checks{check_arrays(bank)};
   if (!checks[0].faults.empty()) return checks;
   for (const auto check : {check_numbers, check_eigenvalues, check_band, check_decay, check_residuals, check_gains, check_shapes,
-                           check_surface, check_rigid_body, check_material, check_solve}) {
+                           check_surface, check_rigid_body, check_supports, check_material, check_solve}) {
     checks.push_back(check(bank));
   }
   checks.push_back(check_error_bars(bank));

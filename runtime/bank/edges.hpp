@@ -1,4 +1,4 @@
-// The edges of a surface of triangles. Standard C++17, for code that stands on Simbody's headers.
+// The edges of a surface of triangles.
 #pragma once
 
 #include <algorithm>

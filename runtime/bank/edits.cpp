@@ -136,6 +136,14 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   for (Vec3& vertex : edited.vertices_m) {
     for (double& x : vertex) x *= g;
   }
+  // A reaction is lambda times mass times phi, a couple has an arm more.
+  const double reaction_scale = eigenvalue_scale * std::sqrt(s * g * g * g);
+  for (std::size_t i = 0; i < edited.supports.reaction.size(); ++i)
+    edited.supports.reaction[i] *= i % 6 < 3 ? reaction_scale : reaction_scale * g;
+  for (Vec3& centre : edited.supports.centre_m)
+    for (double& x : centre) x *= g;
+  for (double& area : edited.supports.area_m2) area *= g * g;
+  for (double& thickness : edited.supports.thickness_m) thickness *= g;
   edited.rigid.mass_kg *= s * g * g * g;
   edited.rigid.volume_m3 *= g * g * g;
   for (double& x : edited.rigid.centre_m) x *= g;

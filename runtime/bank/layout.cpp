@@ -37,6 +37,28 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
   }
   if (!form.regions.empty())
     fields.push_back({"material/regions", text_type(form.regions), {}, "1", "JSON text: materials by region", form.regions.data()});
+  if (!form.supports.empty()) {
+    const Supports& s = bank.supports;
+    const std::uint64_t count = s.count(), modes = bank.mode_count();
+    fields.insert(fields.end(),
+                  {{"supports/text", text_type(form.supports), {}, "1", "JSON text: names, and what is behind them", form.supports.data()},
+                   {"supports/centre_m", "<f8", {count, 3}, "m", "of the patch of fixed nodes", s.centre_m.data()},
+                   {"supports/normal", "<f8", {count, 3}, "1", "out of the body; 0 of a patch without area", s.normal.data()},
+                   {"supports/area_m2", "<f8", {count}, "m^2", "of the patch", s.area_m2.data()},
+                   {"supports/thickness_m", "<f8", {count}, "m", "short side of the patch", s.thickness_m.data()},
+                   {"modes/support_reaction",
+                    "<f8",
+                    {modes, count, 6},
+                    "N m^-1 kg^-1/2, N kg^-1/2",
+                    "force on the body, couple about the centre, for unit modal amplitude",
+                    s.reaction.data()},
+                   {"modes/support_energy",
+                    "<f8",
+                    {modes, count},
+                    "1",
+                    "share of the strain energy within one thickness of the patch",
+                    s.energy.data()}});
+  }
   if (!bank.proof) return;
   const Proof& proof = *bank.proof;
   const auto& rigid = proof.rigid_per_component;
@@ -102,7 +124,7 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   return fields;
 }
 
-int find_version_minor(const Bank& bank) { return bank.shape_bytes == 1 ? kVersionMinor : 1; }
+int find_version_minor(const Bank& bank) { return bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1; }
 
 std::uint64_t find_item_bytes(const std::string& dtype) {
   if (dtype == "<f8" || dtype == "<i8") return 8;

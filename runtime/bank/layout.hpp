@@ -31,6 +31,7 @@ struct FileForm {
   std::string damping_law;   // since 1.1
   std::string regions;       // since 1.1, perhaps absent
   std::string proof_method;  // since 1.1, absent without a proof
+  std::string supports;      // since 1.3, absent where nothing is fixed
 };
 
 /// The arrays of `bank` and `form` in the order of docs/bank-format.md; those that are not there (no proof, no error bars, a file of

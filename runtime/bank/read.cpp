@@ -137,6 +137,21 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
     make_list("damping/loss_factor", "<f8", bank.damping.loss_factor);
   }
   if (seal.extents.contains("material/regions")) make_text("material/regions", loaded.form.regions);
+  if (has_group(seal, "supports")) {
+    make_text("supports/text", loaded.form.supports);
+    Supports& supports = bank.supports;
+    const std::uint64_t count = get_rows(seal, "supports/area_m2", name), modes = bank.mode_count();
+    const auto make_table = [&](const char* field, std::vector<std::uint64_t> shape, auto& values, std::uint64_t size) {
+      check_extent({field, "<f8", std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
+      values.resize(size);
+    };
+    make_table("supports/centre_m", {count, 3}, supports.centre_m, count);
+    make_table("supports/normal", {count, 3}, supports.normal, count);
+    make_table("supports/area_m2", {count}, supports.area_m2, count);
+    make_table("supports/thickness_m", {count}, supports.thickness_m, count);
+    make_table("modes/support_reaction", {modes, count, 6}, supports.reaction, modes * count * 6);
+    make_table("modes/support_energy", {modes, count}, supports.energy, modes * count);
+  }
   if (!has_group(seal, "proof")) return;
   Proof& proof = bank.proof.emplace();
   make_list("proof/cut_hz", "<f8", proof.cut_hz);
@@ -258,6 +273,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   bank.provenance = trim(form.provenance);
   if (!form.damping_law.empty()) bank.damping.law = trim(form.damping_law);
   bank.regions = trim(form.regions);
+  bank.supports.text = trim(form.supports);
   if (bank.proof) bank.proof->method = trim(form.proof_method);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);

@@ -76,6 +76,16 @@ void keep_modes(Bank& bank, const std::vector<std::size_t>& kept) {
                        &bank.algebraic_error_cents, &bank.discretisation_error_cents}) {
     keep_values(*values, kept);
   }
+  Supports& supports = bank.supports;
+  const std::size_t rows = supports.count();
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    std::copy_n(supports.reaction.begin() + static_cast<std::ptrdiff_t>(kept[i] * rows * 6), rows * 6,
+                supports.reaction.begin() + static_cast<std::ptrdiff_t>(i * rows * 6));
+    std::copy_n(supports.energy.begin() + static_cast<std::ptrdiff_t>(kept[i] * rows), rows,
+                supports.energy.begin() + static_cast<std::ptrdiff_t>(i * rows));
+  }
+  supports.reaction.resize(kept.size() * rows * 6);
+  supports.energy.resize(kept.size() * rows);
   bank.complete = false;
 }
 

@@ -1,4 +1,4 @@
-// Places of a triangle, for vectors of any kind. Standard C++17, for code that stands on Simbody's headers.
+// Places of a triangle, for vectors of any kind.
 #pragma once
 
 #include <array>

@@ -56,6 +56,7 @@ void use_bytes(const Bank& bank, Use&& use) {
   form.provenance = pad_text(bank.provenance);
   form.damping_law = pad_text(bank.damping.law);
   form.regions = bank.regions;
+  if (bank.supports.count() > 0) form.supports = pad_text(bank.supports.text);
   if (bank.proof) form.proof_method = pad_text(bank.proof->method);
   if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
 

@@ -1,4 +1,4 @@
-// Numbers that look random and are the same on every machine. Standard C++17, for code that stands on Simbody's headers.
+// Numbers that look random and are the same on every machine.
 #pragma once
 
 #include <cstdint>

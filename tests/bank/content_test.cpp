@@ -232,6 +232,44 @@ const Spoiled kSpoiled[] = {
        for (int k : {0, 4, 8}) b.rigid.inertia_kg_m2[k] += 1.0;
      },
      "too large for a surface"},
+    {"short_reaction", [](Bank& b) { b.supports = example::make_supported_bank(3, 5).supports; },
+     "support_reaction holds 60 values and 72"},
+    {"nan_reaction",
+     [](Bank& b) {
+       b.supports = example::make_supported_bank(3, 6).supports;
+       b.supports.reaction[7] = kNan;
+     },
+     "support_reaction[7] is nan"},
+    {"huge_reaction",
+     [](Bank& b) {
+       b.supports = example::make_supported_bank(3, 6).supports;
+       b.supports.reaction[14] *= 10;
+     },
+     "support_reaction of mode 1"},
+    {"long_normal",
+     [](Bank& b) {
+       b.supports = example::make_supported_bank(3, 6).supports;
+       b.supports.normal[1] = {1, 1, 0};
+     },
+     "supports/normal[1] has length"},
+    {"energy_from_nowhere",
+     [](Bank& b) {
+       b.supports = example::make_supported_bank(3, 6).supports;
+       b.supports.energy[3] = 0.95;
+     },
+     "support_energy of mode 1 sums up to"},
+    {"unnamed_support",
+     [](Bank& b) {
+       b.supports = example::make_supported_bank(3, 6).supports;
+       b.supports.text = R"({"supports": [{"name": "x-min"}]})";
+     },
+     "names 1 supports, and there are 2"},
+    {"unreadable_support",
+     [](Bank& b) {
+       b.supports = example::make_supported_bank(3, 6).supports;
+       b.supports.text = R"({"supports": [{"name": "x-min", "on": "sand"}, {"name": "x-max"}]})";
+     },
+     "sand"},
     {"short_error", [](Bank& b) { b.algebraic_error_cents.pop_back(); }, "algebraic_error_cents holds 5 values"},
     {"nan_error", [](Bank& b) { b.discretisation_error_cents[1] = kNan; }, "discretisation_error_cents[1] is nan"},
     {"negative_error", [](Bank& b) { b.discretisation_error_cents[1] = -2; }, "discretisation_error_cents[1] is -2, negative"},

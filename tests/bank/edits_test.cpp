@@ -28,6 +28,23 @@ TEST(Edits, AnEditedBankIsSaneAndTheWayBackIsTheBankItself) {
   EXPECT_NE(there.provenance.find("\"size_scale\": 2.5"), std::string::npos);
 }
 
+TEST(Edits, ReactionsFollowAsMassTimesAccelerationAndCouplesHaveAnArm) {
+  const Bank bank = example::make_supported_bank(3, 4);
+  const double s = 0.3, k = 4.0, g = 2.5;
+  const Bank there = calc_edited(bank, {.density_scale = s, .stiffness_scale = k, .size_scale = g});
+  EXPECT_EQ(find_faults(there), std::vector<std::string>{});
+  for (std::size_t i = 0; i < bank.supports.reaction.size(); ++i) {
+    // lambda times the integral of rho phi: with phi of unit modal mass that goes with lambda sqrt(mass).
+    const double scale = there.eigenvalue_rad2_s2[i / 12] / bank.eigenvalue_rad2_s2[i / 12] *
+                         std::sqrt(there.rigid.mass_kg / bank.rigid.mass_kg) * (i % 6 < 3 ? 1.0 : g);
+    EXPECT_NEAR(there.supports.reaction[i] / bank.supports.reaction[i], scale, 1e-12 * scale);
+  }
+  EXPECT_EQ(there.supports.energy, bank.supports.energy);
+  EXPECT_NEAR(there.supports.area_m2[0] / bank.supports.area_m2[0], g * g, 1e-12);
+  EXPECT_NEAR(there.supports.centre_m[1][0] / bank.supports.centre_m[1][0], g, 1e-12);
+  EXPECT_NEAR(there.supports.thickness_m[1] / bank.supports.thickness_m[1], g, 1e-12);
+}
+
 TEST(Edits, OtherAlphasTakeThePlaceOfTheLaw) {
   const Bank edited = calc_edited(example::make_bank(2, 5), {.alphas = {{2e-8, 7.0}}});
   for (std::size_t m = 0; m < edited.mode_count(); ++m) {

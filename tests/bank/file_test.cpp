@@ -86,6 +86,13 @@ void expect_equal(const Bank& a, const Bank& b) {
   EXPECT_EQ(a.damping.freq_hz, b.damping.freq_hz);
   EXPECT_EQ(a.damping.loss_factor, b.damping.loss_factor);
   EXPECT_EQ(a.regions, b.regions);
+  EXPECT_EQ(a.supports.text, b.supports.text);
+  EXPECT_EQ(a.supports.centre_m, b.supports.centre_m);
+  EXPECT_EQ(a.supports.normal, b.supports.normal);
+  EXPECT_EQ(a.supports.area_m2, b.supports.area_m2);
+  EXPECT_EQ(a.supports.thickness_m, b.supports.thickness_m);
+  EXPECT_EQ(a.supports.reaction, b.supports.reaction);
+  EXPECT_EQ(a.supports.energy, b.supports.energy);
   ASSERT_EQ(a.proof.has_value(), b.proof.has_value());
   if (!a.proof) return;
   EXPECT_EQ(a.proof->cut_hz, b.proof->cut_hz);
@@ -158,6 +165,21 @@ TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
   // carillon-bank edit version_1_1.hdf version_1_2.hdf --shape-bits 8
   expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/bank/pinned/version_1_2.hdf"),
                calc_reduced(example::make_bank(1, 2), {.shape_bits = 8}));
+  // make_example_bank version_1_3.hdf 1 2 supports
+  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/bank/pinned/version_1_3.hdf"), example::make_supported_bank(1, 2));
+}
+
+TEST_F(BankFile, SupportsComeBackAndRaiseTheVersionOnlyWhereThereAreSome) {
+  for (const std::size_t modes : {0u, 1u, 9u}) {
+    write_bank(example::make_supported_bank(2, modes), file_);
+    expect_equal(read_bank(file_), example::make_supported_bank(2, modes));
+    EXPECT_EQ(read_version(file_), (std::array<int, 2>{1, 3}));
+  }
+  const Bank narrow = calc_reduced(example::make_supported_bank(2, 5), {.shape_bits = 8});
+  write_bank(narrow, file_);
+  expect_equal(read_bank(file_), narrow);
+  write_bank(example::make_bank(2, 5), file_);
+  EXPECT_EQ(read_version(file_), (std::array<int, 2>{1, 1})) << "as older readers know it";
 }
 
 TEST_F(BankFile, MayHoldNoModes) {

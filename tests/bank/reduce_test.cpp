@@ -28,6 +28,18 @@ TEST(Reduce, TheLowestModesKeepTheirProofAndAreAsTheyWere) {
   EXPECT_NE(reduced.provenance.find(R"("keep": "lowest")"), std::string::npos);
 }
 
+TEST(Reduce, ModesKeepTheirReactions) {
+  const Bank bank = example::make_supported_bank(2, 9);
+  const Bank reduced = calc_reduced(bank, {.modes = 3, .keep = Keep::kLoudest});
+  EXPECT_EQ(find_faults(reduced), std::vector<std::string>{});
+  for (std::size_t m = 0; m < 3; ++m) {
+    std::size_t of = 0;
+    while (bank.eigenvalue_rad2_s2[of] != reduced.eigenvalue_rad2_s2[m]) ++of;
+    for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(reduced.supports.reaction[12 * m + i], bank.supports.reaction[12 * of + i]);
+    for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(reduced.supports.energy[2 * m + i], bank.supports.energy[2 * of + i]);
+  }
+}
+
 TEST(Reduce, AGroupOfEqualModesEndsWhereTheListEnds) {
   Bank bank = example::make_bank(2, 6);
   for (const std::size_t first : {0u, 3u})

@@ -200,6 +200,23 @@ TEST(HeldNodes, by_box_and_by_value_of_point_data_are_those_of_the_plane) {
   EXPECT_EQ(count({.order = 2, .hold = {{.box_m = Box{{{0, 0, 0}, {0, 3, 2}}}}}}), 7 * 5);
 }
 
+TEST(HeldNodes, know_the_first_entry_that_names_them) {
+  // x = 0 by a set, y = 0 by a box; the edge of both belongs to the set, which comes first, and so do mid nodes between the two.
+  const auto box = tests::make_box({4, 3, 2}, {4, 3, 2});
+  std::vector<std::int32_t> side(box.nodes.size(), 0);
+  for (std::size_t i = 0; i < side.size(); ++i) side[i] = box.nodes[i][0] == 0 ? 1 : 0;
+  const SharedFile file(box, {.point_data = {{"side", side}}});
+  for (const int order : {1, 2}) {
+    const ParallelMesh read =
+        read_parallel(kWorld, file.path(), {.order = order, .hold = {{.node_set = "side"}, {.box_m = Box{{{0, 0, 0}, {4, 0, 2}}}}}});
+    ASSERT_EQ(read.pieces.local.fixed_by.size(), read.pieces.local.nodes_m.size());
+    for (std::size_t i = 0; i < read.pieces.local.row.size(); ++i) {
+      const Vec3& x = read.pieces.local.nodes_m[i];
+      EXPECT_EQ(read.pieces.local.fixed_by[i], x[0] == 0 ? 0 : x[1] == 0 ? 1 : -1) << x[0] << " " << x[1] << " " << x[2];
+    }
+  }
+}
+
 TEST(Components, are_numbered_by_their_first_nodes_whatever_the_cut) {
   mesh::TetMesh three;
   for (int k : {2, 0, 1}) {  // in space in another order than in the file

@@ -39,7 +39,7 @@ KNOBS = (
     Knob("planner_db", "Planner: what changes a body's sound by less is left out", (-150, -100, -70, -50, -40, -30, -20, -10), -50, "chute"),
     Knob("quiet_db", "Planner: what is so far below the loudest strike is not heard", (250, 120, 90, 70, 50, 40, 30), 70, "chute"),
     Knob("lead_s", "Planner: look-ahead, by which an effect is on before it is needed", (0.2, 0.1, 0.05, 0.02, 0.01, 0.001), 0.05, "chute"),
-    Knob("contact_step_s", "Physics: longest step while bodies touch and move", (1e-4, 2e-4, 5e-4, 1e-3, 2e-3), 5e-4, "roll", True),
+    Knob("contact_step_s", "Physics: longest step while bodies touch and move", (1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3), 2.5e-4, "roll", True),
 )
 
 
@@ -122,7 +122,7 @@ def measure_effects(lab, scene, contacts):
     return {what: Turn(what, one.cpu_ms, one.spread, sounds.compare(played[0].sound, one.sound) if number else None) for number, (what, one) in enumerate(zip(wishes, played))}
 
 
-def measure_fall(lab, scene, steps=(5e-4, 2e-4)):
+def measure_fall(lab, scene, steps=(2.5e-4, 1e-4)):
     """(Difference, milliseconds of physics of both) of one fall at two steps of the physics."""
     played = sounds.play_all(lab, {f"fall-{number}": turn(scene, "contact_step_s", step) for number, step in enumerate(steps)}, repeats=1)
     usual, finer = played.values()
