@@ -22,29 +22,38 @@ struct Pose {
 
 /// How a world is run.
 struct WorldOptions {
-  /// The longest step [s] while something in touch moves faster than 1 cm/s; slower, longer ones in proportion. Steps of bodies that fly
-  /// free, and the instant of an impact, do not hang on it.
-  double contact_step_s = 5e-4;
+  double contact_step_s =
+      2.5e-4;  // the longest step [s] of bodies that touch or may. Flight and the instant of an impact do not depend on it
   double end_s = std::numeric_limits<double>::infinity();  // the world stops there
-  bool islands = true;                                     // false: one Simbody system for all bodies, for comparison
+  bool islands = true;                                     // false: all bodies in one problem, for comparison
+  bool modes = true;                                       // false: impacts do not look at modes, as if banks had none
   bool lasting_contacts = true;                            // false: no stream::Contact records, and none of their cost
   bool audits_energy = false;                              // Statistics::energy
 };
 
-/// The books of mechanical energy: kinetic, of gravity, and of the springs of resting contacts. Looked at every 2 ms.
+/// The books of mechanical energy: kinetic and of gravity. Looked at every 2 ms.
 struct EnergyAudit {
   double rise_j = 0.0;      // the most that it has ever been above an earlier moment, what hits took put back
   double hit_rise_j = 0.0;  // the most that a hit has added; they only take
   double kinetic_j = 0.0;   // the largest there has been
   double weight_n = 0.0;    // of all bodies that move; rise_j over it is a height
+  // Now; start = motion + modes + lost + error. What is radiated is taken from the modes by whoever plays them, and is in `lost`.
+  double start_j = 0.0;       // all there was at the beginning; gravity counts from the origin
+  double motion_j = 0.0;      // kinetic and of gravity
+  double modes_j = 0.0;       // in the modes
+  double most_modes_j = 0.0;  // the largest there has been
+  double lost_j = 0.0;        // by friction, in contacts, in the modes' damping
+  double error_j = 0.0;       // the largest there has been
 };
 
 /// What a world has cost so far.
 struct Statistics {
-  std::int64_t steps = 0;       // integrations, those that were thrown away again included
+  std::int64_t steps = 0;       // small steps of what touches or may, and windows in which bodies only fly
   std::int64_t body_steps = 0;  // of each, the bodies that moved in it, summed
-  std::int64_t islands = 0;     // groups of moving bodies at present
-  std::int64_t made = 0;        // Simbody systems made so far
+  std::int64_t islands = 0;     // groups of bodies that may touch each other at present
+  std::int64_t searches = 0;    // for the touches of a pair
+  std::int64_t impacts = 0;
+  std::int64_t sweeps = 0;  // over the contacts of a group
   double seconds_cpu = 0.0;
   EnergyAudit energy;  // zeros unless asked for
 };

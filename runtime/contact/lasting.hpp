@@ -1,59 +1,75 @@
-// Contacts that last: told apart from impacts, followed while they last, and written down as stream events.
+// Contacts that last: separated from impacts, followed while they last, and written down as stream events.
 #pragma once
-
-#include <SimTKcommon.h>
 
 #include <array>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "runtime/contact/engine.hpp"
+#include "runtime/rigid/space.hpp"
 #include "runtime/stream/events.hpp"
 
 namespace carillon::contact {
 
-/// A place where two bodies touch, followed while they do.
-struct Spot {
-  std::uint64_t id = 0;  // of the contact, from its first record on
-  int a = 0, b = -1;
-  SimTK::Vec3 where{0};
-  SimTK::Vec3 drift{0};                      // velocity of the place over the surface whose corners carry, smoothed
-  std::vector<std::array<int, 3>> features;  // that carry there
-  double quiet_s = 0.0;                      // time of the first touch, or of the last impact since
-  double seen_s = 0.0;                       // when it last touched
-  double recorded_s = 0.0;
-  double begun_s = -1.0;                // time of its first record; below 0: none yet
-  double radius_m = 0.0;                // of the Hertz contact of both surfaces there
-  std::array<stream::Contact, 2> last;  // of both bodies
+/// What of a body the records need that its motion does not.
+struct Matter {
+  std::string name;
+  double young_modulus_pa = 0.0, poisson_ratio = 0.0, density_kg_m3 = 0.0;
 };
 
-/// How many lasting contacts each pair of bodies has had, by their numbers in the scene; -1: the ground.
-using TouchCounts = std::map<std::pair<int, int>, std::uint64_t>;
+/// Points of a pair nearer to each other than this belong to one spot [m]: a tenth of the smaller body's size.
+double calc_spot_radius(const rigid::Space& space, int a, int b);
+
+/// The place of a point of the world on a body's bank.
+struct Spotted {
+  std::int32_t triangle = 0;
+  stream::Vec3 barycentric{};
+};
+Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const stream::Vec3& where, const stream::Vec3& outward);
 
 class LastingContacts {
  public:
-  /// `before`: what was counted by others, which must outlive this and not change while this one counts.
-  explicit LastingContacts(const TouchCounts& before) : before_(&before) {}
+  /// One a body, and one for the ground at the end.
+  explicit LastingContacts(std::vector<Matter> matter) : matter_(std::move(matter)) {}
 
-  /// After a step: what touches now, from the resting points of the engine at the state reached. Appends events with the engine's own
-  /// numbers of bodies; `members`: their numbers in the scene.
-  void update(const Engine& engine, const std::vector<int>& members, const Snapshot& now, std::vector<stream::Contact>& events);
+  /// After a step: what touches now. Appends events.
+  void update(const rigid::Space& space, std::vector<stream::Event>& events);
   /// An impact at a place: what follows there is no lasting contact for the next moments.
-  void note_impact(const Engine& engine, int a, int b, const SimTK::Vec3& where, double time_s);
-
-  std::vector<Spot>& spots() { return spots_; }
-  const std::vector<Spot>& spots() const { return spots_; }
-  /// Of the pairs that began a contact here, with what was before.
-  const TouchCounts& get_touches() const { return touches_; }
+  void note_impact(const rigid::Space& space, int a, int b, const stream::Vec3& where, double time_s);
 
  private:
-  std::uint64_t make_id(const Engine& engine, const std::vector<int>& members, const Spot& spot);
+  struct Group;
+  /// A place where two bodies touch, followed while they do.
+  struct Spot {
+    std::uint64_t id = 0;  // of the contact, from its first record on
+    int a = 0, b = -1;
+    stream::Vec3 where{};
+    stream::Vec3 drift{};                 // velocity of the place over the surface that carries, smoothed
+    std::vector<std::uint64_t> features;  // that carry there
+    double quiet_s = 0.0;                 // time of the first touch, or of the last impact since
+    double seen_s = 0.0;                  // when it last touched
+    double recorded_s = 0.0;
+    double begun_s = -1.0;                // time of its first record; below 0: none yet
+    double load_n = 0.0;                  // smoothed
+    bool lies = false;                    // both bodies lie still
+    double radius_m = 0.0;                // of the Hertz contact of both surfaces there
+    std::array<stream::Contact, 2> last;  // of both bodies
+  };
 
-  const TouchCounts* before_;
-  TouchCounts touches_;
+  std::vector<Group> make_groups(const rigid::Space& space);
+  void record(const rigid::Space& space, const Group& group, Spot& spot, std::vector<stream::Event>& events);
+  std::uint64_t make_id(const Spot& spot);
+  std::uint64_t hash_name(int body) const;
+  const Matter& get_matter(int body) const { return body < 0 ? matter_.back() : matter_[static_cast<std::size_t>(body)]; }
+  double calc_patch(const Group& group, double radius_m) const;
+  double calc_impedance(int body, double patch_m) const;
+
+  std::vector<Matter> matter_;
+  std::map<std::pair<int, int>, std::uint64_t> touches_;  // how many lasting contacts each pair has had
   std::vector<Spot> spots_;
+  std::vector<const rigid::Contact*> contacts_;
 };
 
 }  // namespace carillon::contact

@@ -1,15 +1,20 @@
-// Checks a world and hands it to the Simbody side (model.hpp says why that is apart).
+// Checks a world, lets its bodies move and strike (runtime/rigid), and writes down what the sound needs of it.
 #include "runtime/contact/world.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <limits>
+#include <map>
+#include <utility>
 #include <variant>
 
 #include "runtime/config/error.hpp"
-#include "runtime/contact/model.hpp"
+#include "runtime/contact/lasting.hpp"
+#include "runtime/contact/pulses.hpp"
+#include "runtime/rigid/space.hpp"
 
 namespace carillon::contact {
 namespace {
@@ -70,62 +75,321 @@ void check_body(const BodySpec& b) {
   }
 }
 
-BodyModel make_body(const BodySpec& b) {
-  BodyModel m;
-  m.name = b.name;
-  m.vertices_m = &b.bank->vertices_m;
-  m.triangles = &b.bank->triangles;
-  m.fixed = b.fixed;
-  m.initial = b.initial;
-  m.velocity_m_s = b.velocity_m_s;
-  m.angular_velocity_rad_s = b.angular_velocity_rad_s;
-  m.mass_kg = b.bank->rigid.mass_kg;
-  m.centre_m = b.bank->rigid.centre_m;
-  m.inertia_kg_m2 = b.bank->rigid.inertia_kg_m2;
-  m.young_modulus_pa = b.bank->material.young_modulus_pa;
-  m.poisson_ratio = b.bank->material.poisson_ratio;
-  m.density_kg_m3 = b.bank->material.density_kg_m3;
-  m.restitution = b.restitution;
-  m.friction = b.friction;
-  return m;
+rigid::Mat3 to_matrix(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
+
+rigid::Mat3 calc_inverse(const rigid::Mat3& m) {
+  using impact::cross;
+  const Vec3 a = cross(m[1], m[2]), b = cross(m[2], m[0]), c = cross(m[0], m[1]);
+  const double s = 1.0 / impact::dot(m[0], a);
+  return {Vec3{s * a[0], s * b[0], s * c[0]}, Vec3{s * a[1], s * b[1], s * c[1]}, Vec3{s * a[2], s * b[2], s * c[2]}};
 }
 
-WorldModel make_model(const WorldSpec& spec) {
+/// Bodies of one bank share their shape.
+using Shapes = std::map<const bank::Bank*, std::shared_ptr<const shape::Shape>>;
+
+rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
+  rigid::Solid solid;
+  auto& shared = shapes[b.bank];
+  if (!shared) {
+    try {
+      shared = std::make_shared<shape::Shape>(b.bank->vertices_m, b.bank->triangles);
+    } catch (const InputError& e) {
+      throw InputError(fmt::format("body '{}': {}", b.name, e.what()));
+    }
+  }
+  solid.shape = shared;
+  solid.fixed = b.fixed;
+  solid.mass_kg = b.bank->rigid.mass_kg;
+  solid.centre_m = b.bank->rigid.centre_m;
+  if (!b.fixed) {
+    solid.inertia_kg_m2 = to_matrix(b.bank->rigid.inertia_kg_m2);
+    solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
+  }
+  for (const Vec3& v : b.bank->vertices_m)
+    solid.radius_m = std::max(solid.radius_m, std::hypot(v[0] - solid.centre_m[0], v[1] - solid.centre_m[1], v[2] - solid.centre_m[2]));
+  solid.restitution = b.restitution;
+  solid.friction = b.friction;
+  solid.young_modulus_pa = b.bank->material.young_modulus_pa;
+  solid.poisson_ratio = b.bank->material.poisson_ratio;
+  return solid;
+}
+
+/// Bodies of one bank share their modes.
+using ModeSets = std::map<const bank::Bank*, std::shared_ptr<const impact::Modes>>;
+
+void add_modes(rigid::Solid& solid, const bank::Bank& bank, ModeSets& sets) {
+  if (bank.mode_count() == 0) return;
+  auto& shared = sets[&bank];
+  if (!shared) {
+    std::vector<double> omega;
+    for (const double lambda : bank.eigenvalue_rad2_s2) omega.push_back(std::sqrt(std::max(lambda, 0.0)));
+    shared = std::make_shared<const impact::Modes>(omega, bank.decay_per_s);
+  }
+  solid.modes = shared;
+  solid.find_shape = [&bank](const shape::Place& place) {
+    const std::size_t modes = bank.mode_count();
+    std::vector<double> shape(3 * modes, 0.0);
+    const auto& corners = bank.triangles[static_cast<std::size_t>(place.triangle)];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::int16_t* row = bank.shape.data() + static_cast<std::size_t>(corners[c]) * 3 * modes;
+      for (std::size_t i = 0; i < 3 * modes; ++i) shape[i] += place.barycentric[c] * bank.shape_scale[i / 3] * row[i];
+    }
+    return shape;
+  };
+}
+
+rigid::State make_state(const BodySpec& b, const rigid::Solid& solid) {
+  using rigid::operator*;
+  using impact::operator+;
+  rigid::State state;
+  state.rotation = rigid::normalise(b.initial.rotation);
+  const rigid::Mat3 rotation = rigid::make_rotation(state.rotation);
+  state.centre = b.initial.position_m + rotation * solid.centre_m;
+  state.velocity = b.velocity_m_s;
+  if (!b.fixed) state.momentum = rotation * (solid.inertia_kg_m2 * (rigid::transpose(rotation) * b.angular_velocity_rad_s));
+  return state;
+}
+
+std::vector<Matter> list_matter(const WorldSpec& spec) {
+  std::vector<Matter> matter;
+  for (const BodySpec& b : spec.bodies)
+    matter.push_back({b.name, b.bank->material.young_modulus_pa, b.bank->material.poisson_ratio, b.bank->material.density_kg_m3});
+  const GroundSpec ground = spec.ground.value_or(GroundSpec{});
+  matter.push_back({"", ground.young_modulus_pa, ground.poisson_ratio, ground.density_kg_m3});
+  return matter;
+}
+
+void check(const WorldSpec& spec, const WorldOptions& options) {
+  if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end of the world, {} s, must be a number, 0 or more", options.end_s));
+  if (!(options.contact_step_s >= 2e-6 && options.contact_step_s <= 2e-3))
+    throw InputError(fmt::format("the step of contacts, {} s, must lie within 2e-6 and 0.002 s", options.contact_step_s));
   if (!is_finite(spec.gravity_m_s2)) throw InputError("gravity must be three finite numbers");
-  WorldModel world;
-  world.gravity_m_s2 = spec.gravity_m_s2;
   if (spec.ground) {
     const GroundSpec& g = *spec.ground;
     if (!std::isfinite(g.height_m)) throw InputError("ground: the height must be a finite number");
     if (!(g.density_kg_m3 > 0.0 && std::isfinite(g.density_kg_m3))) throw InputError("ground: the density must be a finite number above 0");
     check_contact_numbers("ground", g.restitution, g.friction, g.young_modulus_pa, g.poisson_ratio);
-    world.ground = GroundModel{g.height_m, g.young_modulus_pa, g.poisson_ratio, g.density_kg_m3, g.restitution, g.friction};
   }
+  for (const BodySpec& body : spec.bodies) check_body(body);
+}
+
+rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
+  check(spec, options);
+  Shapes shapes;
+  ModeSets modes;
+  std::vector<rigid::Solid> solids;
+  std::vector<rigid::State> states;
   for (const BodySpec& body : spec.bodies) {
-    check_body(body);
-    world.bodies.push_back(make_body(body));
+    solids.push_back(make_solid(body, shapes));
+    if (options.modes) add_modes(solids.back(), *body.bank, modes);
+    states.push_back(make_state(body, solids.back()));
   }
-  return world;
+  std::optional<rigid::Ground> ground;
+  if (spec.ground)
+    ground = {spec.ground->height_m, spec.ground->restitution, spec.ground->friction, spec.ground->young_modulus_pa,
+              spec.ground->poisson_ratio};
+  return rigid::Space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,
+                      {.step_s = options.contact_step_s, .islands = options.islands});
+}
+
+/// CPU time of this thread alone: sound rendered on another thread is not counted.
+double get_cpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace
 
-World::World(const WorldSpec& spec, const WorldOptions& options) {
-  if (!(options.end_s >= 0.0)) throw InputError(fmt::format("the end of the world, {} s, must be a number, 0 or more", options.end_s));
-  if (!(options.contact_step_s >= 2e-6 && options.contact_step_s <= 2e-3))
-    throw InputError(fmt::format("the step of contacts, {} s, must lie within 2e-6 and 0.002 s", options.contact_step_s));
-  runner_ = std::make_unique<Runner>(make_model(spec), options);
+/// The bodies on their way, and the window that is being made.
+class World::Course {
+ public:
+  Course(const WorldSpec& spec, const WorldOptions& options)
+      : options_(options), space_(make_space(spec, options)), lasting_(list_matter(spec)) {
+    check_overlaps(spec);
+    if (!options_.audits_energy) return;
+    for (int i = 0; i < count(); ++i)
+      if (!space_.solid(i).fixed)
+        energy_.weight_n += space_.solid(i).mass_kg * std::sqrt(impact::dot(spec.gravity_m_s2, spec.gravity_m_s2));
+  }
+
+  double advance(double until_s, double cpu_s, const Sink& sink) {
+    const double started_s = get_cpu_s();
+    while (!begun_ || (until_s - reached_s_ > kShortest && !is_over())) {
+      step(sink);
+      if (get_cpu_s() - started_s >= cpu_s) break;
+    }
+    seconds_cpu_ += get_cpu_s() - started_s;
+    return reached_s_;
+  }
+
+  Statistics get_statistics() const {
+    Statistics s;
+    const rigid::Costs& costs = space_.get_costs();
+    s.steps = costs.steps;
+    s.body_steps = costs.body_steps;
+    s.islands = space_.count_islands();
+    s.searches = costs.searches;
+    s.impacts = costs.impacts;
+    s.sweeps = costs.sweeps;
+    s.seconds_cpu = seconds_cpu_;
+    s.energy = energy_;
+    return s;
+  }
+
+ private:
+  static constexpr double kShortest = 2e-7;  // s; what is nearer than this to the end of a window has reached it
+  static constexpr double kEarliest = 1e-4;  // s; a pulse found in a window may have begun so much before it
+
+  int count() const { return static_cast<int>(space_.states().size()); }
+  bool is_over() const { return options_.end_s - reached_s_ <= kShortest; }
+
+  stream::Motion make_motion(int body, const rigid::State& state, double time_s) const {
+    return {time_s, body, state.centre, state.velocity, state.rotation};
+  }
+
+  void step(const Sink& sink) {
+    if (!begun_) {
+      begun_ = true;
+      for (int i = 0; i < count(); ++i) sink(make_motion(i, space_.state(i), 0.0));
+      audit();
+      return;
+    }
+    const bool slept = space_.is_at_window() && space_.is_all_asleep();  // and nothing presses
+    if (slept) {
+      space_.skip_window(options_.end_s);
+    } else {
+      space_.step(options_.end_s);
+      for (const rigid::Strike& strike : space_.take_strikes()) take(strike);
+      for (const rigid::Forces& forces : space_.take_forces()) take(forces);
+      if (options_.lasting_contacts) lasting_.update(space_, events_);
+    }
+    if (!space_.is_at_window()) return;
+    if (!slept) audit();
+    reached_s_ = space_.get_time();
+    for (int i = 0; i < count(); ++i)
+      if (is_over() || (!space_.is_still(i) && !slept) || just_slept(i)) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+    emit(sink);
+  }
+
+  /// The window in which a body is put to sleep ends with its last motion.
+  bool just_slept(int body) {
+    still_.resize(static_cast<std::size_t>(count()), 1);
+    const char now = space_.is_still(body) ? 1 : 0, before = std::exchange(still_[static_cast<std::size_t>(body)], now);
+    return now != 0 && before == 0;
+  }
+
+  void take(const rigid::Strike& strike) {
+    for (std::size_t k = 0; k < strike.bodies.size(); ++k)
+      events_.push_back(make_motion(strike.bodies[k], strike.before[k], strike.time_s));
+    for (std::size_t k = 0; k < strike.bodies.size(); ++k) events_.push_back(make_motion(strike.bodies[k], strike.after[k], strike.time_s));
+    add_pulses(space_, strike, lasting_, events_);
+    if (!options_.audits_energy) return;
+    double taken = 0.0;
+    for (std::size_t k = 0; k < strike.bodies.size(); ++k)
+      taken += rigid::calc_kinetic(space_.solid(strike.bodies[k]), strike.before[k]) -
+               rigid::calc_kinetic(space_.solid(strike.bodies[k]), strike.after[k]);
+    taken_j_ += taken - strike.modes_j;
+    energy_.hit_rise_j = std::max(energy_.hit_rise_j, strike.modes_j - taken);
+  }
+
+  /// One event a body that rings or moves, in pieces as long as events take.
+  void take(const rigid::Forces& forces) {
+    for (const int side : {0, 1}) {
+      const int body = side == 0 ? forces.a : forces.b;
+      if (body < 0) continue;
+      const shape::Place& place = side == 0 ? forces.place_a : forces.place_b;
+      stream::Force first;
+      first.time_s = forces.time_s;
+      first.step_s = forces.step_s;
+      first.body = body;
+      first.other = side == 0 ? forces.b : forces.a;
+      first.triangle = place.triangle;
+      first.barycentric = place.barycentric;
+      first.continues = forces.continues;
+      stream::split_force(first, side == 0 ? forces.on_a : forces.on_b, [&](const stream::Force& force) { events_.push_back(force); });
+    }
+  }
+
+  void audit() {
+    if (!options_.audits_energy) return;
+    double kinetic = 0.0;
+    for (int i = 0; i < count(); ++i) kinetic += rigid::calc_kinetic(space_.solid(i), space_.state(i));
+    const rigid::Books books = space_.calc_books();
+    const double now = books.motion_j + books.modes_j + books.springs_j;
+    if (!has_books_) energy_.start_j = now, has_books_ = true;
+    energy_.motion_j = books.motion_j;
+    energy_.modes_j = books.modes_j;
+    energy_.most_modes_j = std::max(energy_.most_modes_j, books.modes_j);
+    energy_.lost_j = books.lost_j;
+    energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
+    energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - least_j_);
+    energy_.kinetic_j = std::max(energy_.kinetic_j, kinetic);
+    least_j_ = std::min(least_j_, now + taken_j_);
+  }
+
+  /// What is earlier than any that may still come, in order of time; a Mark at the end.
+  void emit(const Sink& sink) {
+    const double mark_s = is_over() ? options_.end_s : std::max(0.0, reached_s_ - kEarliest);
+    std::stable_sort(events_.begin(), events_.end(),
+                     [](const auto& x, const auto& y) { return stream::get_time_s(x) < stream::get_time_s(y); });
+    std::size_t n = 0;
+    for (; n < events_.size() && (is_over() || stream::get_time_s(events_[n]) <= mark_s); ++n) sink(events_[n]);
+    events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(n));
+    sink(stream::Mark{mark_s});
+  }
+
+  void check_overlaps(const WorldSpec& spec) const;
+
+  WorldOptions options_;
+  rigid::Space space_;
+  LastingContacts lasting_;
+  std::vector<stream::Event> events_;  // of this window
+  std::vector<char> still_;
+  bool begun_ = false;
+  double reached_s_ = 0.0, seconds_cpu_ = 0.0;
+  EnergyAudit energy_;
+  bool has_books_ = false;
+  double taken_j_ = 0.0;                                      // by hits
+  double least_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
+};
+
+void World::Course::check_overlaps(const WorldSpec& spec) const {
+  const auto allowed_m = [&](int body) { return std::min(2e-4, 5e-3 * space_.solid(body).shape->get_size_m()); };
+  for (int a = 0; a < count(); ++a) {
+    const rigid::Placed at_a = rigid::place(space_.solid(a), space_.state(a));
+    if (spec.ground && !space_.solid(a).fixed) {
+      shape::PairMemory memory;
+      std::vector<shape::Touch> touches;
+      shape::find_ground_touches(*space_.solid(a).shape, at_a.frame, spec.ground->height_m, allowed_m(a), memory, touches);
+      double depth = 0.0;
+      for (const shape::Touch& touch : touches) depth = std::max(depth, -touch.gap_m);
+      if (depth > allowed_m(a))
+        throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much",
+                                     spec.bodies[static_cast<std::size_t>(a)].name, depth * 1e3, spec.ground->height_m));
+    }
+    for (int b = a + 1; b < count(); ++b) {
+      if (space_.solid(a).fixed && space_.solid(b).fixed) continue;
+      Vec3 where{};
+      const double depth = shape::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
+                                               rigid::place(space_.solid(b), space_.state(b)).frame, where);
+      if (depth > std::min(allowed_m(a), allowed_m(b)))
+        throw InputError(
+            fmt::format("bodies '{}' and '{}' start inside each other, {:.2f} mm deep near ({:.4f}, {:.4f}, {:.4f}) m; move one of them",
+                        spec.bodies[static_cast<std::size_t>(a)].name, spec.bodies[static_cast<std::size_t>(b)].name, depth * 1e3, where[0],
+                        where[1], where[2]));
+    }
+  }
 }
 
+World::World(const WorldSpec& spec, const WorldOptions& options) : course_(std::make_unique<Course>(spec, options)) {}
 World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
-double World::advance(double until_s, double cpu_s, const std::function<void(const stream::Event&)>& sink) {
-  return runner_->advance(until_s, cpu_s, sink);
-}
+double World::advance(double until_s, double cpu_s, const Sink& sink) { return course_->advance(until_s, cpu_s, sink); }
 
-Statistics World::get_statistics() const { return runner_->get_statistics(); }
+Statistics World::get_statistics() const { return course_->get_statistics(); }
 
 Pose calc_pose(const stream::Motion& motion, const Vec3& c) {
   const auto& q = motion.rotation;

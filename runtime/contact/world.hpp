@@ -12,8 +12,6 @@
 
 namespace carillon::contact {
 
-class Runner;
-
 /// One body. Its surface, rigid-body data and material come from its bank; `initial` places the frame of the bank's mesh in the world.
 struct BodySpec {
   std::string name;                  // for messages
@@ -45,7 +43,7 @@ struct WorldSpec {
 };
 
 /// A world on its way. Bodies that cannot touch each other for the moment are integrated apart, each group with steps of its own
-/// (docs/decisions/islands.md). All of it [main-thread]: it allocates and throws.
+/// (docs/decisions/contact.md). All of it [main-thread]: it allocates and throws.
 class World {
  public:
   /// Copies the spec; its banks must outlive the world. Throws InputError for a spec that cannot be simulated (the message names the body:
@@ -62,12 +60,14 @@ class World {
   /// right after every impact (two with one time); at the end, all again. A pulse may be centred up to half its duration beyond the Mark
   /// that follows it. The same spec gives the same bits, in whatever slices of time and CPU it is asked for. Throws SolveError when the
   /// integration breaks down.
-  double advance(double until_s, double cpu_s, const std::function<void(const stream::Event&)>& sink);
+  using Sink = std::function<void(const stream::Event&)>;
+  double advance(double until_s, double cpu_s, const Sink& sink);
 
   Statistics get_statistics() const;
 
  private:
-  std::unique_ptr<Runner> runner_;
+  class Course;
+  std::unique_ptr<Course> course_;
 };
 
 /// The pose of the mesh frame of a body whose centre of mass lies at `centre_m` in it: x - R(q) c.

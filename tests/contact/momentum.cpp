@@ -43,7 +43,9 @@ Found look(const std::vector<stream::Event>& events, std::int32_t body, double m
   for (std::size_t i = 1; i < motions.size(); ++i) {
     const stream::Motion &a = motions[i - 1], &b = motions[i];
     const double dt = b.time_s - a.time_s;
-    if (dt > 0.0) found.worst_rest = std::max(found.worst_rest, norm(b.velocity_m_s - a.velocity_m_s + Vec3{0, 0, kGravity * dt}));
+    // Bodies that sleep have no motions.
+    if (dt > 0.0 && dt < 3e-3)
+      found.worst_rest = std::max(found.worst_rest, norm(b.velocity_m_s - a.velocity_m_s + Vec3{0, 0, kGravity * dt}));
   }
   // Impacts so near in time that their pulses cannot be told apart are looked at together.
   for (std::size_t i = 1; i < motions.size();) {

@@ -13,7 +13,7 @@ namespace carillon::contact::tests {
 namespace {
 
 constexpr double kGravity = 9.81;
-constexpr double kSlowestHit = 1e-3;  // m/s; docs/decisions/contact-events.md
+constexpr double kSlowestHit = 1e-3;  // m/s; docs/decisions/contact.md
 
 BodySpec make_body(const bank::Bank& bank, Vec3 position, double restitution) {
   BodySpec b;

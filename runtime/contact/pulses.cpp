@@ -1,0 +1,109 @@
+// Method: the real contact lasts a Hertz time from the touch on, so its pulse is centred half that time later. Where several spots share an
+//   impact, each carries its part of the mass.
+// Source: J. O'Brien, C. Shen, C. Gatchalian, "Synthesizing sounds from rigid-body simulations" (2002), section 4.
+// Deviations: none.
+#include "runtime/contact/pulses.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace carillon::contact {
+namespace {
+
+using impact::cross;
+using impact::dot;
+using impact::operator+;
+using impact::operator-;
+using impact::operator*;
+using rigid::norm;
+using stream::Vec3;
+
+constexpr double kSlowest = 1e-3;   // m/s; of an impact
+constexpr double kTogether = 1e-4;  // s; touches nearer in time than this are one impact
+
+/// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
+double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
+                         const Vec3& normal) {
+  double sum = 0.0;
+  for (const int body : {hit.a, hit.b}) {
+    if (body < 0 || space.solid(body).fixed) continue;
+    const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
+    const rigid::State& state =
+        at == strike.bodies.end() ? space.state(body) : strike.before[static_cast<std::size_t>(at - strike.bodies.begin())];
+    const rigid::Solid& solid = space.solid(body);
+    const Vec3 arm = cross(where - state.centre, normal);
+    sum += 1.0 / solid.mass_kg + dot(arm, rigid::place(solid, state).inverse_inertia * arm);
+  }
+  return sum;
+}
+
+void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std::vector<const rigid::Hit*>& hits, double touch_s,
+              LastingContacts& lasting, std::vector<stream::Event>& events) {
+  const rigid::Hit& first = *hits.front();
+  Vec3 impulse{}, where{}, normal{};
+  double push = 0.0, approach = 0.0, curvature = 0.0;
+  for (const rigid::Hit* hit : hits) {
+    const double share = dot(hit->impulse, hit->touch.normal);
+    impulse = impulse + hit->impulse;
+    where = where + share * hit->touch.where_m;
+    normal = normal + share * hit->touch.normal;
+    curvature += share * (hit->touch.curvature_a_per_m + hit->touch.curvature_b_per_m);
+    approach = std::max(approach, hit->approach_m_s);
+    push += share;
+  }
+  where = (1.0 / push) * where;
+  normal = (1.0 / norm(normal)) * normal;
+  const double inverse_mass = calc_inverse_mass(space, strike, first, where, normal);
+  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest) return;  // a resting spot that the impact elsewhere hardly moved
+  const double speed = approach > kSlowest ? approach : push * inverse_mass;
+  const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
+  lasting.note_impact(space, first.a, first.b, where, strike.time_s);
+  rigid::Hit mean = first;
+  mean.touch.curvature_a_per_m = curvature / push;
+  mean.touch.curvature_b_per_m = 0.0;
+  stream::Impulse pulse;
+  pulse.duration_s = space.calc_contact_time(mean, mass, speed);
+  pulse.time_s = touch_s + 0.5 * pulse.duration_s;
+  for (const int side : {0, 1}) {
+    const int body = side == 0 ? first.a : first.b;
+    if (body < 0) continue;
+    const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
+    const rigid::State& state =
+        at == strike.bodies.end() ? space.state(body) : strike.before[static_cast<std::size_t>(at - strike.bodies.begin())];
+    const double sign = side == 0 ? 1.0 : -1.0;
+    const Spotted place = find_place(space.solid(body), state, where, (-sign) * normal);
+    pulse.body = body;
+    pulse.other = side == 0 ? first.b : first.a;
+    pulse.triangle = place.triangle;
+    pulse.barycentric = place.barycentric;
+    pulse.impulse_n_s = rigid::transpose(rigid::make_rotation(state.rotation)) * (sign * impulse);
+    events.push_back(pulse);
+  }
+}
+
+}  // namespace
+
+void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, std::vector<stream::Event>& events) {
+  std::vector<const rigid::Hit*> order;
+  for (const rigid::Hit& hit : strike.hits)
+    if (dot(hit.impulse, hit.touch.normal) > 0.0) order.push_back(&hit);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto* x, const auto* y) { return dot(x->impulse, x->impulse) > dot(y->impulse, y->impulse); });
+  std::vector<char> taken(order.size(), 0);
+  for (std::size_t seed = 0; seed < order.size(); ++seed) {
+    if (taken[seed]) continue;
+    std::vector<const rigid::Hit*> spot;
+    double wait_s = kTogether;
+    for (std::size_t i = seed; i < order.size(); ++i) {
+      const rigid::Hit& hit = *order[i];
+      if (taken[i] || hit.a != order[seed]->a || hit.b != order[seed]->b) continue;
+      if (norm(hit.touch.where_m - order[seed]->touch.where_m) > calc_spot_radius(space, hit.a, hit.b)) continue;
+      taken[i] = 1;
+      spot.push_back(&hit);
+      wait_s = std::min(wait_s, hit.approach_m_s > kSlowest ? hit.touch.gap_m / hit.approach_m_s : 0.0);
+    }
+    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -kTogether, kTogether), lasting, events);
+  }
+}
+
+}  // namespace carillon::contact

@@ -1,0 +1,486 @@
+// Method: an impact whose bodies ring is integrated with their modes inside (runtime/impact), over as many small steps as it takes. Its
+// bodies take
+//   their motion from it; what gravity and other contacts do to them enters it as accelerations, a small step at a time. Where the modes
+//   would get less than 2 % of the energy, the rigid impact and the Hertz pulse stand.
+// Source: runtime/impact/impact.hpp; docs/decisions/impact.md.
+// Deviations: none.
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/impact/predict.hpp"
+#include "runtime/rigid/space.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+using impact::cross;
+using impact::dot;
+
+constexpr double kSlowest = 1e-3;   // m/s
+constexpr double kTouchM = 1e-7;    // m; nearer than this is in touch
+constexpr int kMostPresses = 8;     // of one impact
+constexpr double kLongest = 50e-3;  // s; what presses for longer rests
+
+/// (n) along a direction.
+std::vector<double> project(const std::vector<double>& shape, const Vec3& along) {
+  std::vector<double> phi(shape.size() / 3);
+  for (std::size_t m = 0; m < phi.size(); ++m) phi[m] = shape[3 * m] * along[0] + shape[3 * m + 1] * along[1] + shape[3 * m + 2] * along[2];
+  return phi;
+}
+
+}  // namespace
+
+Space::Ringing* Space::find_ringing(int body) {
+  if (body < 0 || !in_ringing_[static_cast<std::size_t>(body)]) return nullptr;
+  for (Ringing& ringing : ringings_)
+    if (std::find(ringing.bodies.begin(), ringing.bodies.end(), body) != ringing.bodies.end()) return &ringing;
+  return nullptr;
+}
+
+/// The impact with modes that a hit belongs to: one of its bodies is in it, and all that it moves are in the group that is being stepped.
+Space::Ringing* Space::find_own_ringing(const Hit& hit) {
+  for (const int body : {hit.a, hit.b}) {
+    Ringing* ringing = find_ringing(body);
+    if (ringing == nullptr) continue;
+    const bool is_here = std::all_of(ringing->bodies.begin(), ringing->bodies.end(),
+                                     [&](int other) { return !moves(other) || index_[static_cast<std::size_t>(other)] >= 0; });
+    if (is_here) return ringing;
+  }
+  return nullptr;
+}
+
+/// Is there an impact on its way between the two, at that place? Points get other names while bodies roll.
+bool Space::is_pressed(const Pair& pair, const Vec3& where) const {
+  const double near = 0.05 * calc_pair_size(pair.a, pair.b);
+  for (const Ringing& ringing : ringings_)
+    for (const Press& press : ringing.presses) {
+      if (!(press.a == pair.a && press.b == pair.b) && !(press.b == pair.a && press.a == pair.b)) continue;
+      const auto s = static_cast<std::size_t>(moves(press.a) ? press.a : press.b);
+      if (norm(states_[s].centre + placed_[s].rotation * press.station - where) < near) return true;
+    }
+  return false;
+}
+
+/// The modal state of a body, moved on to a time; what its damping takes is lost.
+Space::Ring& Space::ring_until(int body, double time_s) {
+  const auto i = static_cast<std::size_t>(body);
+  Ring& ring = rings_[i];
+  const impact::Modes& modes = *solids_[i].modes;
+  const auto count = static_cast<std::size_t>(modes.size());
+  if (ring.q.empty()) {
+    ring.q.assign(count, 0.0);
+    ring.q_dot.assign(count, 0.0);
+    ring.time_s = time_s;
+  }
+  if (time_s > ring.time_s) {
+    const double before = modes.calc_energy(ring.q, ring.q_dot);
+    if (before > 0.0) modes.move_freely(ring.q, ring.q_dot, time_s - ring.time_s);
+    lost_j_ += before - modes.calc_energy(ring.q, ring.q_dot);
+    ring.time_s = time_s;
+  }
+  return ring;
+}
+
+shape::Place Space::find_place(int body, const shape::Touch& touch, bool is_a) const {
+  const auto i = static_cast<std::size_t>(body);
+  const Mat3 back = transpose(placed_[i].rotation);
+  return solids_[i].shape->find_place(solids_[i].centre_m + back * (touch.where_m - states_[i].centre),
+                                      back * ((is_a ? -1.0 : 1.0) * touch.normal));
+}
+
+/// 1/R of the summed curvatures, within what a contact can have (calc_hertz_duration).
+double Space::calc_contact_radius(const shape::Touch& touch, int a, int b) const {
+  double largest = 0.5 * solid(a).shape->get_size_m();
+  if (b >= 0) largest = std::min(largest, 0.5 * solid(b).shape->get_size_m());
+  const double curvature = std::max(touch.curvature_a_per_m + touch.curvature_b_per_m, 0.0);
+  return 1.0 / std::clamp(curvature, 1.0 / std::max(largest, 0.5e-3), 1.0 / 0.5e-3);
+}
+
+/// Caps the restitution of every hit by what its modes take; true where an impact has to be integrated.
+bool Space::predict_hits(const std::vector<std::pair<Pair*, std::size_t>>& taken, std::vector<Hit>& hits, std::vector<Point>& points) {
+  bool integrate = false;
+  for (std::size_t n = 0; n < hits.size(); ++n) {
+    Hit& hit = hits[n];
+    const Contact& c = taken[n].first->contacts[taken[n].second];
+    if (!(hit.approach_m_s > kSlowest) || (c.touching && c.touch.gap_m <= 1e-7)) continue;
+    if (Ringing* own = find_own_ringing(hit); own != nullptr) {
+      integrate = true;
+      continue;
+    }
+    if (!rings(hit.a) && !rings(hit.b)) continue;
+    if (!(hit.restitution > 0.0)) continue;  // it stays: weight keeps the surfaces together (strike())
+    const double inverse_mass = dot(hit.touch.normal, calc_mobility(movers_, points[n]) * hit.touch.normal);
+    const Solid& a = solid(hit.a);
+    const double young = hit.b >= 0 ? solid(hit.b).young_modulus_pa : ground_->young_modulus_pa;
+    const double poisson = hit.b >= 0 ? solid(hit.b).poisson_ratio : ground_->poisson_ratio;
+    const impact::Spring spring{.stiffness = impact::calc_hertz_stiffness(a.young_modulus_pa, a.poisson_ratio, young, poisson,
+                                                                          calc_contact_radius(hit.touch, hit.a, hit.b))};
+    std::vector<double> phi[2];
+    impact::Side sides[2];
+    for (const int side : {0, 1}) {
+      const int body = side == 0 ? hit.a : hit.b;
+      if (!rings(body) || in_ringing_[static_cast<std::size_t>(body)]) continue;
+      const auto i = static_cast<std::size_t>(body);
+      phi[side] = project(solids_[i].find_shape(find_place(body, hit.touch, side == 0)), transpose(placed_[i].rotation) * hit.touch.normal);
+      Ring& ring = ring_until(body, std::max(time_s_, rings_[i].time_s));
+      sides[side] = {solids_[i].modes.get(), phi[side], ring.q, ring.q_dot};
+    }
+    const impact::Prediction p = impact::predict(spring, 1.0 / inverse_mass, hit.approach_m_s, hit.restitution, sides[0], sides[1]);
+    // A shelf has one modal state: while an impact of another group has it, those that strike it meanwhile do so as rigid bodies.
+    const bool is_free =
+        !(rings(hit.a) && in_ringing_[static_cast<std::size_t>(hit.a)]) && !(rings(hit.b) && in_ringing_[static_cast<std::size_t>(hit.b)]);
+    integrate = integrate || (!p.is_enough && is_free);
+    if (p.restitution < hit.restitution) {
+      hit.restitution = p.restitution;
+      points[n].wanted = (hit.restitution * hit.approach_m_s) * hit.touch.normal;
+    }
+  }
+  return integrate;
+}
+
+impact::Body Space::make_struck(int body, double time_s) {
+  const auto i = static_cast<std::size_t>(body);
+  impact::Body b;
+  b.centre_m = states_[i].centre;
+  if (moves(body)) {
+    b.mass_kg = solids_[i].mass_kg;
+    b.inertia_kg_m2 = placed_[i].rotation * (solids_[i].inertia_kg_m2 * transpose(placed_[i].rotation));
+    b.velocity_m_s = states_[i].velocity;
+    b.spin_rad_s = placed_[i].spin;
+    b.acceleration_m_s2 = gravity_;
+    b.spin_acceleration_rad_s2 = placed_[i].inverse_inertia * cross(states_[i].momentum, placed_[i].spin);
+  }
+  if (rings(body)) {
+    const Ring& ring = ring_until(body, std::max(time_s, rings_[i].time_s));
+    b.modes = solids_[i].modes.get();
+    b.q = ring.q;
+    b.q_dot = ring.q_dot;
+  }
+  return b;
+}
+
+/// Shapes of a body in world axes.
+std::vector<double> Space::find_shape(int body, const std::vector<double>& shape) const {
+  std::vector<double> world(shape.size());
+  const Mat3& r = placed_[static_cast<std::size_t>(body)].rotation;
+  for (std::size_t m = 0; m + 2 < shape.size(); m += 3) {
+    const Vec3 v = r * Vec3{shape[m], shape[m + 1], shape[m + 2]};
+    world[m] = v[0];
+    world[m + 1] = v[1];
+    world[m + 2] = v[2];
+  }
+  return world;
+}
+
+/// Begins an impact with modes, or lets the hits join one that is on its way. False where there are too many points: the rigid impact
+/// stands.
+bool Space::begin_ringing(const std::vector<std::pair<Pair*, std::size_t>>& taken, const std::vector<Hit>& hits, double time_s) {
+  std::vector<std::size_t> order;
+  for (std::size_t n = 0; n < hits.size(); ++n)
+    if (hits[n].approach_m_s > kSlowest) order.push_back(n);
+  if (order.empty()) return false;
+  // What leans on something else is struck as a rigid body, with what stands behind it.
+  for (const auto& [pair, contact] : taken) {
+    const Contact& c = pair->contacts[contact];
+    if (!c.touching || c.presses || c.touch.gap_m > kTouchM) continue;
+    for (const std::size_t n : order)
+      for (const int body : {hits[n].a, hits[n].b})
+        if (body >= 0 && moves(body) && (body == pair->a || body == pair->b) && !in_ringing_[static_cast<std::size_t>(body)]) return false;
+  }
+  Ringing* joined = nullptr;
+  // A hit on a shelf that an impact of another group has stays out of this one.
+  std::erase_if(order, [&](std::size_t n) {
+    return find_own_ringing(hits[n]) == nullptr && (find_ringing(hits[n].a) != nullptr || find_ringing(hits[n].b) != nullptr);
+  });
+  if (order.empty()) return false;
+  for (const std::size_t n : order) {
+    Ringing* found = find_own_ringing(hits[n]);
+    if (found == nullptr || found == joined) continue;
+    if (joined == nullptr)
+      joined = found;
+    else
+      release(*found, time_s);  // what it has in its springs is lost
+  }
+  ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+  if (order.size() + (joined != nullptr ? joined->presses.size() : 0) > kMostPresses) {
+    if (joined != nullptr) {
+      release(*joined, time_s);
+      ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+      joined = nullptr;
+    }
+    if (order.size() > kMostPresses) {
+      std::stable_sort(order.begin(), order.end(),
+                       [&](std::size_t x, std::size_t y) { return hits[x].approach_m_s > hits[y].approach_m_s; });
+      order.resize(kMostPresses);
+      std::sort(order.begin(), order.end());
+    }
+  }
+  const bool is_new = joined == nullptr;
+  if (is_new) {
+    ringings_.emplace_back();
+    joined = &ringings_.back();
+    joined->start_s = time_s;
+  }
+  Ringing& ringing = *joined;
+  std::vector<impact::Body> bodies;
+  const auto find_index = [&](int body) {
+    if (body < 0 || (!moves(body) && !rings(body))) return -1;
+    const auto at = std::find(ringing.bodies.begin(), ringing.bodies.end(), body);
+    if (at != ringing.bodies.end()) return static_cast<int>(at - ringing.bodies.begin());
+    ringing.bodies.push_back(body);
+    in_ringing_[static_cast<std::size_t>(body)] = 1;
+    const impact::Body struck = make_struck(body, time_s);
+    if (is_new) {
+      bodies.push_back(struck);
+      return static_cast<int>(bodies.size()) - 1;
+    }
+    return ringing.impact->join(struck);
+  };
+  std::vector<impact::Contact> contacts;
+  std::list<std::vector<double>> shapes;  // kept until the impact has them
+  for (const std::size_t n : order) {
+    const Hit& hit = hits[n];
+    Contact& c = taken[n].first->contacts[taken[n].second];
+    Press press;
+    press.a = hit.a;
+    press.b = hit.b;
+    const int stands = moves(hit.a) ? hit.a : hit.b;
+    const auto s = static_cast<std::size_t>(stands);
+    press.station = transpose(placed_[s].rotation) * (hit.touch.where_m - states_[s].centre);
+    impact::Contact contact;
+    int a = find_index(hit.a), b = find_index(hit.b);
+    contact.where_m = hit.touch.where_m;
+    contact.normal = hit.touch.normal;
+    // Surfaces are where the motion of the rigid bodies has them; what modes lift or lower there is small, and must not press a spring.
+    contact.gap_m = std::max(hit.touch.gap_m, 0.0);
+    const Solid& first = solid(hit.a);
+    const double young = hit.b >= 0 ? solid(hit.b).young_modulus_pa : ground_->young_modulus_pa;
+    const double poisson = hit.b >= 0 ? solid(hit.b).poisson_ratio : ground_->poisson_ratio;
+    contact.spring.stiffness = impact::calc_hertz_stiffness(first.young_modulus_pa, first.poisson_ratio, young, poisson,
+                                                            calc_contact_radius(hit.touch, hit.a, hit.b));
+    contact.restitution = calc_pair_restitution(hit.a, hit.b);
+    contact.friction = calc_pair_friction(hit.a, hit.b);
+    if (rings(hit.a)) {
+      press.place_a = find_place(hit.a, hit.touch, true);
+      press.shape_a = solid(hit.a).find_shape(press.place_a);
+      shapes.push_back(find_shape(hit.a, press.shape_a));
+      contact.shape_a = shapes.back();
+    } else {
+      press.place_a = find_place(hit.a, hit.touch, true);
+    }
+    if (hit.b >= 0) press.place_b = find_place(hit.b, hit.touch, false);
+    if (rings(hit.b)) {
+      press.shape_b = solid(hit.b).find_shape(press.place_b);
+      shapes.push_back(find_shape(hit.b, press.shape_b));
+      contact.shape_b = shapes.back();
+    }
+    if (a < 0) {
+      // What neither moves nor rings is b of the impact: the contact is turned round.
+      std::swap(a, b);
+      contact.normal = -1.0 * contact.normal;
+      std::swap(contact.shape_a, contact.shape_b);
+      std::swap(press.a, press.b);
+      std::swap(press.place_a, press.place_b);
+      std::swap(press.shape_a, press.shape_b);
+    }
+    contact.a = a;
+    contact.b = b;
+    c.presses = true;
+    c.touching = false;
+    c.impulse = c.couple = {};
+    press.waiting.a = press.a;
+    press.waiting.b = press.b;
+    press.waiting.place_a = press.place_a;
+    press.waiting.place_b = press.place_b;
+    ringing.presses.push_back(std::move(press));
+    if (is_new)
+      contacts.push_back(contact);
+    else
+      ringing.impact->join(contact);
+  }
+  if (is_new) ringing.impact = std::make_unique<impact::Impact>(std::move(bodies), std::move(contacts));
+  ++costs_.impacts;
+  return true;
+}
+
+/// An impact with modes has no other contacts than its own: where one of its bodies comes to touch something slowly, it ends.
+void Space::release_what_rests(const Island& island) {
+  if (ringings_.empty()) return;
+  for (const Pair* pair : island.pairs)
+    for (const Contact& c : pair->contacts) {
+      if (c.presses || c.touch.gap_m > kTouchM) continue;
+      for (const int body : {pair->a, pair->b}) {
+        Ringing* ringing = body >= 0 && moves(body) ? find_ringing(body) : nullptr;
+        const Vec3 u = calc_velocity(pair->a, c.touch.where_m) - calc_velocity(pair->b, c.touch.where_m);
+        if (ringing == nullptr || std::abs(dot(u, c.touch.normal)) > kSlowest) continue;
+        release(*ringing, time_s_);
+        ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+      }
+    }
+}
+
+/// Moves the impacts with modes of a group on to a time. `movers_` says what gravity and the other contacts do to their bodies in a step,
+/// of which `part_s` is made.
+void Space::advance_ringings(const Island& island, double to_s, double part_s, double step_s) {
+  for (Ringing& ringing : ringings_) {
+    const bool is_here = std::any_of(ringing.bodies.begin(), ringing.bodies.end(), [&](int body) {
+      return moves(body) && std::find(island.bodies.begin(), island.bodies.end(), body) != island.bodies.end();
+    });
+    if (!is_here || !(part_s > 0.0)) continue;
+    std::vector<impact::Body> bodies = ringing.impact->get_bodies();
+    // A body that slept when it was struck has come to move, or belongs to another group: the impact cannot go on as it was.
+    bool is_whole = true;
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      const int body = ringing.bodies[k];
+      is_whole = is_whole && moves(body) == (bodies[k].mass_kg > 0.0) && (!moves(body) || index_[static_cast<std::size_t>(body)] >= 0);
+    }
+    if (!is_whole) {
+      release(ringing, to_s);  // its bodies stay where they are for this part
+      continue;
+    }
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      const int body = ringing.bodies[k];
+      if (!moves(body)) continue;
+      const auto i = static_cast<std::size_t>(body);
+      const Mover& mover = movers_[static_cast<std::size_t>(index_[i])];
+      impact::Body& b = bodies[k];
+      b.centre_m = states_[i].centre;
+      b.inertia_kg_m2 = placed_[i].rotation * (solids_[i].inertia_kg_m2 * transpose(placed_[i].rotation));
+      b.acceleration_m_s2 = gravity_;
+      b.spin_acceleration_rad_s2 = placed_[i].inverse_inertia * cross(states_[i].momentum, placed_[i].spin);
+      // What other contacts do comes at once: the impact's own steps may be longer than this part.
+      const double part = part_s / step_s;
+      const Vec3 pushed = part * (mover.velocity - states_[i].velocity - step_s * gravity_);
+      const Vec3 spun = part * (mover.spin - free_spin_[static_cast<std::size_t>(index_[i])]);
+      if (pushed != Vec3{} || spun != Vec3{}) ringing.impact->push(static_cast<int>(k), pushed, spun);
+    }
+    std::vector<impact::Contact> contacts;
+    std::list<std::vector<double>> shapes;
+    for (std::size_t k = 0; k < ringing.presses.size(); ++k) {
+      const Press& press = ringing.presses[k];
+      impact::Contact contact;
+      const auto find_index = [&](int body) {
+        const auto at = std::find(ringing.bodies.begin(), ringing.bodies.end(), body);
+        return at == ringing.bodies.end() ? -1 : static_cast<int>(at - ringing.bodies.begin());
+      };
+      contact.a = find_index(press.a);
+      contact.b = press.b >= 0 ? find_index(press.b) : -1;
+      const int stands = moves(press.a) ? press.a : press.b;
+      const auto s = static_cast<std::size_t>(stands);
+      contact.where_m = states_[s].centre + placed_[s].rotation * press.station;
+      contact.normal = ringing.impact->get_contact(static_cast<int>(k)).normal;
+      contact.friction = ringing.impact->get_contact(static_cast<int>(k)).friction;
+      contact.spring = ringing.impact->get_contact(static_cast<int>(k)).spring;
+      contact.restitution = ringing.impact->get_contact(static_cast<int>(k)).restitution;
+      if (!press.shape_a.empty()) {
+        shapes.push_back(find_shape(press.a, press.shape_a));
+        contact.shape_a = shapes.back();
+      }
+      if (!press.shape_b.empty()) {
+        shapes.push_back(find_shape(press.b, press.shape_b));
+        contact.shape_b = shapes.back();
+      }
+      contacts.push_back(contact);
+    }
+    ringing.impact->update(bodies, contacts);
+    const double from_s = ringing.start_s;
+    const bool ended = ringing.impact->advance(to_s - from_s);
+    bodies = ringing.impact->get_bodies();
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      const int body = ringing.bodies[k];
+      if (!moves(body)) continue;
+      State& s = states_[static_cast<std::size_t>(body)];
+      s.velocity = bodies[k].velocity_m_s;
+      s.centre = s.centre + bodies[k].moved_m;
+      s.rotation = normalise(multiply(make_turn(bodies[k].turned_rad), s.rotation));
+      const Mat3 rotation = make_rotation(s.rotation);
+      s.momentum = rotation * (solid(body).inertia_kg_m2 * (transpose(rotation) * bodies[k].spin_rad_s));
+    }
+    keep_pulses(ringing);
+    // Once a window: pieces of a small step each would be many.
+    if (to_s >= window_end_s_ - 1e-9)
+      for (Press& press : ringing.presses) hand_out_forces(press);
+    if (ended || to_s - from_s > kLongest) release(ringing, to_s);
+  }
+  ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+}
+
+/// Takes the forces of an impact since the last time into the frames of its bodies, as they are now.
+void Space::keep_pulses(Ringing& ringing) {
+  for (const impact::Pulse& pulse : ringing.impact->take_pulses()) {
+    Press& press = ringing.presses[static_cast<std::size_t>(pulse.contact)];
+    Forces& forces = press.waiting;
+    const double start_s = ringing.start_s + pulse.start_s;
+    // A contact that was open for a while begins anew.
+    if (!forces.on_a.empty() &&
+        std::abs(start_s - forces.time_s - forces.step_s * static_cast<double>(forces.on_a.size())) > 0.5 * forces.step_s)
+      hand_out_forces(press);
+    if (forces.on_a.empty()) forces.time_s = start_s;
+    forces.step_s = pulse.step_s;
+    const auto to_mesh = [&](int body) { return transpose(placed_[static_cast<std::size_t>(body)].rotation); };
+    const Mat3 to_a = to_mesh(press.a), to_b = press.b >= 0 ? to_mesh(press.b) : Mat3{};
+    for (const Vec3& impulse : pulse.impulse_n_s) {
+      forces.on_a.push_back(to_a * impulse);
+      if (press.b >= 0) forces.on_b.push_back(to_b * (-1.0 * impulse));
+    }
+  }
+}
+
+void Space::hand_out_forces(Press& press) {
+  if (press.waiting.on_a.empty()) return;
+  Forces next = press.waiting;
+  next.on_a.clear();
+  next.on_b.clear();
+  next.continues = true;
+  forces_.push_back(std::exchange(press.waiting, std::move(next)));
+}
+
+/// Gives the bodies of an impact their modal states back. It may be ahead of `time_s` by a part of its step.
+void Space::release(Ringing& ringing, double time_s) {
+  keep_pulses(ringing);
+  for (Press& press : ringing.presses) hand_out_forces(press);
+  const std::vector<impact::Body> bodies = ringing.impact->get_bodies();
+  const double reached_s = ringing.start_s + ringing.impact->get_time();
+  const impact::Books books = ringing.impact->get_books();
+  lost_j_ += books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band + books.spring;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    const int body = ringing.bodies[k];
+    const auto i = static_cast<std::size_t>(body);
+    in_ringing_[i] = 0;
+    if (rings(body)) rings_[i] = {bodies[k].q, bodies[k].q_dot, reached_s};
+    if (moves(body) && reached_s > time_s) states_[i] = fly(solids_[i], states_[i], gravity_, time_s - reached_s);
+    place_body(body);
+  }
+  for (auto& [key, pair] : pairs_)
+    for (Contact& c : pair.contacts)
+      for (const Press& press : ringing.presses) {
+        const bool same = (press.a == key.first && press.b == key.second) || (press.b == key.first && press.a == key.second);
+        if (same && c.presses) c.presses = false, c.touching = false, c.since_s = time_s;
+      }
+  ringing.impact = nullptr;
+  ringing.bodies.clear();
+}
+
+Books Space::calc_books() const {
+  Books books;
+  for (std::size_t i = 0; i < solids_.size(); ++i) {
+    books.motion_j += rigid::calc_energy(solids_[i], states_[i], gravity_);
+    if (!solids_[i].modes || rings_[i].q.empty() || in_ringing_[i]) continue;
+    std::vector<double> q = rings_[i].q, q_dot = rings_[i].q_dot;
+    const double before = solids_[i].modes->calc_energy(q, q_dot);
+    if (before > 0.0 && time_s_ > rings_[i].time_s) solids_[i].modes->move_freely(q, q_dot, time_s_ - rings_[i].time_s);
+    const double now = solids_[i].modes->calc_energy(q, q_dot);
+    books.modes_j += now;
+    books.lost_j += before - now;
+  }
+  for (const Ringing& ringing : ringings_) {
+    const impact::Books inside = ringing.impact->get_books();
+    books.modes_j += inside.modal;
+    books.springs_j += inside.spring;
+    books.lost_j += inside.dissipated_modes + inside.dissipated_contact + inside.dissipated_friction + inside.above_band;
+  }
+  books.lost_j += lost_j_;
+  return books;
+}
+
+}  // namespace carillon::rigid

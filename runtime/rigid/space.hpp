@@ -1,0 +1,271 @@
+// Bodies that fall, strike, slide, roll and rest: their motion in small steps, on contacts that have an identity.
+//
+// Time goes in windows of 2 ms. Bodies that can meet nothing within one fly through it in closed form. The others go through it in small
+// steps. In each of them the velocities at its end follow from one complementarity problem over all points that touch (solver.hpp), begun
+// at the impulses of the step before; places follow from the mean of both velocities, so that what neither slides nor strikes keeps its
+// energy. A touch that comes fast is no part of that: its instant is found, the step ends there, and the impact is solved by itself.
+// A group that a solution with zero velocity balances is put to sleep.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "runtime/impact/impact.hpp"
+#include "runtime/rigid/body.hpp"
+#include "runtime/rigid/solver.hpp"
+
+namespace carillon::rigid {
+
+/// The half space z <= height_m.
+struct Ground {
+  double height_m = 0.0;
+  double restitution = 0.5, friction = 0.5;
+  double young_modulus_pa = 0.0, poisson_ratio = 0.0;
+};
+
+struct Options {
+  double step_s = 2.5e-4;   // the longest small step; windows are cut into equal ones
+  double tolerance = 1e-5;  // of gravity times the step: when the sweeps over the contacts end
+  int most_sweeps = 30;
+  int most_direct = 12;              // bodies of a group whose problem is factorised in every step
+  bool islands = true;               // false: all bodies in one problem, for comparison
+  int most_settling = 200;           // the same of a group that is about to rest
+  double rolling_resistance = 1e-3;  // c: couple c R F against rolling, of hard on hard
+};
+
+/// A touch that is followed.
+struct Contact {
+  shape::Touch touch;
+  int a = 0, b = -1;  // bodies; -1: the ground
+  bool touching = false;
+  bool presses = false;      // in an impact that is on its way
+  Vec3 impulse{}, couple{};  // of the last step, on a [N s, N m s]
+  double step_s = 0.0;       // its length
+  double lost_j = 0.0;       // by it, in that step
+  double since_s = 0.0;      // touching since, or apart since
+};
+
+/// One point of an impact. Momentum and place in the world.
+struct Hit {
+  int a = 0, b = -1;
+  shape::Touch touch;
+  double approach_m_s = 0.0, restitution = 0.0;
+  Vec3 impulse{};  // on a [N s]
+};
+
+/// An instant of impact: its points, and the bodies that it moved, before and after.
+struct Strike {
+  double time_s = 0.0;
+  std::vector<Hit> hits;
+  std::vector<int> bodies;
+  std::vector<State> before, after;
+  double modes_j = 0.0;  // given to modes
+};
+
+/// The force of one contact of an impact with modes, as impulses of equal steps; long ones come in pieces.
+struct Forces {
+  int a = 0, b = -1;
+  shape::Place place_a, place_b;
+  double time_s = 0.0, step_s = 0.0;
+  bool continues = false;
+  std::vector<Vec3> on_a, on_b;  // [N s], each in the frame of its body's mesh as it was then; on_b empty for the ground
+};
+
+/// Energies now, or lost since the beginning [J]: motion + modes + springs + lost is constant.
+struct Books {
+  double motion_j = 0.0;   // kinetic and of gravity
+  double modes_j = 0.0;    // in the bodies' modes
+  double springs_j = 0.0;  // of impacts that are on their way
+  double lost_j = 0.0;     // by friction, in contacts, in the modes' damping, above their bands
+};
+
+struct Costs {
+  std::int64_t steps = 0;       // small steps, and windows in which bodies only flew
+  std::int64_t body_steps = 0;  // of each, the bodies that moved
+  std::int64_t solves = 0, sweeps = 0, searches = 0, impacts = 0;
+};
+
+class Space {
+ public:
+  static constexpr double kWindow = 2e-3;  // s
+
+  Space(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity, const Options& options);
+
+  /// One small step of all that is not asleep, to at most `until_s`. At the start of a window all bodies are at its time; within it those
+  /// that fly are at its end. Throws SolveError where a state is not finite.
+  void step(double until_s);
+  double get_time() const { return time_s_; }
+  bool is_at_window() const { return at_window_; }
+
+  const Solid& solid(int body) const { return solids_[static_cast<std::size_t>(body)]; }
+  const State& state(int body) const { return states_[static_cast<std::size_t>(body)]; }
+  const std::vector<State>& states() const { return states_; }
+  bool is_asleep(int body) const { return asleep_[static_cast<std::size_t>(body)] != 0; }
+  /// Fixed or asleep.
+  bool is_still(int body) const { return !moves(body); }
+  bool is_all_asleep() const;
+  /// Where all is asleep: to the end of the next window, without a step.
+  void skip_window(double end_s);
+  const Vec3& get_spin(int body) const { return placed_[static_cast<std::size_t>(body)].spin; }
+  /// Contacts of bodies that are awake.
+  void list_contacts(std::vector<const Contact*>& out) const;
+  /// Impacts since the last call.
+  std::vector<Strike> take_strikes() { return std::exchange(strikes_, {}); }
+  /// Forces of impacts with modes since the last call.
+  std::vector<Forces> take_forces() { return std::exchange(forces_, {}); }
+  Books calc_books() const;
+  /// How long a contact lasts (calc_hertz_duration) in which so much mass meets at that speed.
+  double calc_contact_time(const Hit& hit, double mass_kg, double speed_m_s) const;
+  /// Groups of moving bodies that may touch each other in the present window.
+  int count_islands() const { return islands_; }
+  const Costs& get_costs() const { return costs_; }
+  const std::optional<Ground>& ground() const { return ground_; }
+  const Vec3& gravity() const { return gravity_; }
+
+ private:
+  struct Pair {
+    int a = 0, b = -1;
+    shape::PairMemory memory;
+    std::vector<Contact> contacts;
+    double margin_m = 0.0, travelled_m = 0.0;  // since the last search
+    bool searched = false;
+    std::int64_t window = -1;  // in which it was last near
+  };
+  struct Island {
+    std::vector<int> bodies;
+    std::vector<Pair*> pairs;
+  };
+  struct Box {
+    Vec3 low{}, high{};
+  };
+
+  /// The modal state of a body at a time.
+  struct Ring {
+    std::vector<double> q, q_dot;
+    double time_s = 0.0;
+  };
+  /// A contact of an impact with modes.
+  struct Press {
+    int a = 0, b = -1;
+    shape::Place place_a, place_b;
+    std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
+    Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
+    Forces waiting;                        // what was not handed out yet
+  };
+  /// An impact with modes, on its way.
+  struct Ringing {
+    std::unique_ptr<impact::Impact> impact;
+    double start_s = 0.0;
+    std::vector<int> bodies;  // in the order of the impact's
+    std::vector<Press> presses;
+  };
+  struct RowOf {
+    Pair* pair = nullptr;
+    std::size_t contact = 0;
+  };
+
+  void open_window(double end_s);
+  void count_groups(const std::vector<Box>& boxes);
+  void add_pair(int a, int b);
+  void sort_near();
+  void search(Pair& pair, double step_s);
+  void refresh(Pair& pair);
+  void update(Pair& pair, double step_s);
+  std::vector<Island> make_islands();
+  void step_island(Island& island, double start_s, double step_s);
+  void solve(double tolerance_m_s);
+  void predict(const Island& island, double h, bool at_rest);
+  void make_points(Island& island, double h, bool leaves_impacts);
+  bool is_fast(const Contact& contact, double approach, double h) const;
+  bool find_impact(const Island& island, double h, double& at_s, std::vector<std::pair<Pair*, std::size_t>>& first);
+  bool confirm_impact(std::vector<std::pair<Pair*, std::size_t>>& first, double step_s, double near_m);
+  double calc_loss(const Point& point, double part) const;
+  double calc_energy(const Island& island) const;
+  void take_gain(const Island& island, double before_j);
+  void strike(Island& island, const std::vector<std::pair<Pair*, std::size_t>>& first, double time_s);
+  bool predict_hits(const std::vector<std::pair<Pair*, std::size_t>>& taken, std::vector<Hit>& hits, std::vector<Point>& points);
+  bool begin_ringing(const std::vector<std::pair<Pair*, std::size_t>>& taken, const std::vector<Hit>& hits, double time_s);
+  void release_what_rests(const Island& island);
+  void advance_ringings(const Island& island, double to_s, double part_s, double step_s);
+  void give_to_modes(Strike& record, double taken_j);
+  void keep_pulses(Ringing& ringing);
+  void hand_out_forces(Press& press);
+  void release(Ringing& ringing, double time_s);
+  Ring& ring_until(int body, double time_s);
+  impact::Body make_struck(int body, double time_s);
+  shape::Place find_place(int body, const shape::Touch& touch, bool is_a) const;
+  std::vector<double> find_shape(int body, const std::vector<double>& shape) const;
+  Ringing* find_ringing(int body);
+  Ringing* find_own_ringing(const Hit& hit);
+  bool is_pressed(const Pair& pair, const Vec3& where) const;
+  double calc_contact_radius(const shape::Touch& touch, int a, int b) const;
+  /// Does an impact with modes move this body at present?
+  bool has_impact(int body) const { return body >= 0 && moves(body) && in_ringing_[static_cast<std::size_t>(body)] != 0; }
+  bool rings(int body) const { return body >= 0 && solids_[static_cast<std::size_t>(body)].modes != nullptr; }
+  bool may_rest(const Island& island);
+  bool rests(Island& island, double h);
+  State calc_moved(int body, const Mover& mover, const Vec3& turned, double part_s, double step_s) const;
+  void place_body(int body);
+  void check_finite(int body) const;
+  bool is_fixed(int body) const { return body < 0 || solids_[static_cast<std::size_t>(body)].fixed; }
+  bool moves(int body) const { return !is_fixed(body) && !asleep_[static_cast<std::size_t>(body)]; }
+  /// Are both bodies of a pair, as far as they move, in the group that is being stepped? A touch that was found in this step waits for the
+  /// next.
+  bool is_stepped(const Pair& pair) const {
+    const auto is_in = [this](int body) { return is_fixed(body) || index_[static_cast<std::size_t>(body)] >= 0; };
+    return is_in(pair.a) && is_in(pair.b);
+  }
+  void wake(int body);
+  void reach_out(int body);
+  double calc_pair_friction(int a, int b) const;
+  double calc_pair_restitution(int a, int b) const;
+  double calc_pair_speed(int a, int b) const;
+  double calc_pair_size(int a, int b) const;
+  Vec3 calc_velocity(int body, const Vec3& where) const;
+  Box calc_box(int body, double grown_m) const;
+
+  std::vector<Solid> solids_;
+  std::vector<State> states_;
+  std::vector<Placed> placed_;
+  std::vector<char> asleep_, flying_, in_ringing_;
+  std::vector<double> slow_s_, reach_m_s_;
+  std::vector<State> flew_from_;
+  std::optional<Ground> ground_;
+  Vec3 gravity_{};
+  Options options_;
+  std::map<std::pair<int, int>, Pair> pairs_;
+  std::vector<Pair*> near_;  // of this window, in order
+  std::vector<Strike> strikes_;
+  std::vector<Ring> rings_;
+  std::list<Ringing> ringings_;
+  std::vector<Forces> forces_;
+  double lost_j_ = 0.0;
+  double time_s_ = 0.0, window_end_s_ = 0.0, window_start_s_ = 0.0;
+  std::int64_t window_ = 0;
+  int islands_ = 0, step_in_window_ = 0, steps_in_window_ = 1;
+  bool at_window_ = true, any_active_ = false, near_is_sorted_ = true;
+  Costs costs_;
+  Solver solver_;
+  // Of the step that is being made:
+  std::vector<int> index_;                     // of a body in its island
+  const std::vector<int>* stepped_ = nullptr;  // its bodies
+  std::vector<Mover> movers_;
+  std::vector<Vec3> free_spin_;
+  std::vector<Placed> free_;
+  std::vector<Point> points_;
+  std::vector<RowOf> rows_;  // of points_
+  std::vector<std::size_t> order_;
+  std::vector<shape::Touch> touches_;
+};
+
+/// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), kept within 5 us .. 20 ms.
+/// 1/R is the summed curvature, kept within 1/(0.5 mm) and 1/`largest_radius_m`.
+double calc_hertz_duration(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double curvature_per_m, double mass_kg,
+                           double speed_m_s, double largest_radius_m);
+
+}  // namespace carillon::rigid

@@ -1,0 +1,181 @@
+// Motions that have a closed form, or a solution that others published: what rolls, swings in a bowl, falls in a row.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "tests/contact/checks.hpp"
+#include "tests/contact/solids.hpp"
+#include "tests/shape/solids.hpp"
+
+namespace carillon::contact::tests {
+namespace {
+
+constexpr double kGravity = 9.81;
+constexpr double kRollingResistance = 1e-3;  // docs/decisions/contact.md
+
+bank::Bank make_bank(const shape::tests::Solid& solid) {
+  bank::Bank bank;
+  bank.material = ceramic();
+  bank.vertices_m.assign(solid.vertices.begin(), solid.vertices.end());
+  bank.triangles.assign(solid.triangles.begin(), solid.triangles.end());
+  set_rigid_of_solid(bank);
+  return bank;
+}
+
+/// Facets on the sphere, mass and inertia of the true ball. 20 n^2 triangles.
+bank::Bank make_round(double radius_m, int n) {
+  bank::Bank ball = make_bank(shape::tests::make_ball(radius_m, n));
+  ball.rigid = make_ball(radius_m, 1).rigid;
+  return ball;
+}
+
+BodySpec make_body(const bank::Bank& bank, Vec3 position, double friction) {
+  BodySpec b;
+  b.name = "body";
+  b.bank = &bank;
+  b.initial.position_m = position;
+  b.friction = friction;
+  b.restitution = 0.0;
+  return b;
+}
+
+std::vector<std::vector<stream::Motion>> run(const WorldSpec& spec, double end_s, int* hits = nullptr) {
+  World world(spec, {.end_s = end_s, .lasting_contacts = false});
+  std::vector<std::vector<stream::Motion>> motions(spec.bodies.size());
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const stream::Event& e) {
+    if (const auto* m = std::get_if<stream::Motion>(&e)) motions[static_cast<std::size_t>(m->body)].push_back(*m);
+    if (hits != nullptr && std::holds_alternative<Impulse>(e)) ++*hits;
+  });
+  return motions;
+}
+
+const stream::Motion& get_at(const std::vector<stream::Motion>& motions, double time_s) {
+  return *std::min_element(motions.begin(), motions.end(),
+                           [&](const auto& a, const auto& b) { return std::abs(a.time_s - time_s) < std::abs(b.time_s - time_s); });
+}
+
+class RollingDown : public testing::TestWithParam<std::tuple<double, int>> {};
+INSTANTIATE_TEST_SUITE_P(Planes, RollingDown,
+                         testing::Combine(testing::Values(1.0, 3.0, 10.0, 20.0),
+                                          testing::Values(6, 16)));  // degrees; 720 and 5,120 triangles
+
+TEST_P(RollingDown, AcceleratesByFiveSeventhsLessTheResistance) {
+  const auto [degrees, n] = GetParam();
+  const double a = degrees * M_PI / 180, radius = 0.03;
+  const bank::Bank ball = make_round(radius, n), plane = make_box({4.0, 0.4, 0.04});
+  WorldSpec w;
+  w.bodies = {make_body(ball, {}, 0.5), make_body(plane, {0, 0, 0}, 0.5)};
+  w.bodies[1].fixed = true;
+  w.bodies[1].initial.rotation = {std::cos(a / 2), 0, std::sin(a / 2), 0};
+  const Vec3 down{std::cos(a), 0, -std::sin(a)}, up{std::sin(a), 0, std::cos(a)};
+  w.bodies[0].initial.position_m = (radius + 0.02) * up - 1.9 * down;
+  const auto motions = run(w, 1.2)[0];
+  const double expected = 5.0 / 7.0 * kGravity * (std::sin(a) - kRollingResistance * std::cos(a));
+  const auto speed = [&](double t) {
+    const Vec3& v = get_at(motions, t).velocity_m_s;
+    return v[0] * down[0] + v[2] * down[2];
+  };
+  EXPECT_NEAR((speed(1.1) - speed(0.1)) / expected, 1.0, 0.02);
+  EXPECT_NEAR(motions.back().velocity_m_s[1], 0.0, 0.01 * speed(1.2)) << "to the side";
+}
+
+TEST(Rolling, OnTheFlatLosesWhatTheResistanceTakes) {
+  for (const int n : {6, 16}) {
+    const bank::Bank ball = make_round(0.03, n);
+    WorldSpec w;
+    w.ground = GroundSpec{};
+    w.bodies = {make_body(ball, {0, 0, 0.03}, 0.5)};
+    w.bodies[0].velocity_m_s = {0.5, 0, 0};
+    w.bodies[0].angular_velocity_rad_s = {0, 0.5 / 0.03, 0};
+    int hits = 0;
+    const auto motions = run(w, 4.0, &hits)[0];
+    // 720 facets: 2.4 %, the faster one; 5,120: within 2 %.
+    EXPECT_NEAR(motions.back().velocity_m_s[0] / (0.5 - 5.0 / 7.0 * kRollingResistance * kGravity * 4.0), 1.0, n < 10 ? 0.03 : 0.02) << n;
+    EXPECT_EQ(hits, 0) << n;
+  }
+}
+
+class SlidingToRolling : public testing::TestWithParam<std::tuple<double, double>> {};
+INSTANTIATE_TEST_SUITE_P(Speeds, SlidingToRolling, testing::Combine(testing::Values(0.5, 1.0, 2.0), testing::Values(0.1, 0.3)));
+
+TEST_P(SlidingToRolling, EndsWithFiveSeventhsAfterTwoSeventhsOfTheSpeedOverFrictionAndGravity) {
+  const auto [speed, friction] = GetParam();
+  const bank::Bank ball = make_round(0.03, 8);
+  WorldSpec w;
+  w.ground = GroundSpec{.friction = friction};
+  w.bodies = {make_body(ball, {0, 0, 0.03}, friction)};
+  w.bodies[0].velocity_m_s = {speed, 0, 0};
+  const double rolls_s = 2.0 / 7.0 * speed / (friction * kGravity);
+  const auto motions = run(w, 1.2 * rolls_s)[0];
+  // Until it rolls the resistance takes a share c / mu more or less.
+  EXPECT_NEAR(get_at(motions, 0.5 * rolls_s).velocity_m_s[0], speed * (1.0 - 1.0 / 7.0), 0.01 * speed);
+  EXPECT_NEAR(get_at(motions, 1.1 * rolls_s).velocity_m_s[0], 5.0 / 7.0 * speed, 0.01 * speed);
+}
+
+TEST(Bowl, HoldsABallThatSwingsWithItsPeriod) {
+  // A ball that rolls in a sphere is a pendulum of length (R - r) 7/5: period by the complete elliptic integral.
+  const double bowl = 0.15, radius = 0.015;
+  std::vector<std::array<double, 2>> outline;
+  const int rings = 48;
+  for (int i = 0; i <= rings; ++i) {  // outside, from below to the brim
+    const double angle = 0.5 * M_PI * i / rings;
+    outline.push_back({1.1 * bowl * std::sin(angle), -1.1 * bowl * std::cos(angle)});
+  }
+  for (int i = rings; i >= 0; --i) {
+    const double angle = 0.5 * M_PI * i / rings;
+    outline.push_back({bowl * std::sin(angle), -bowl * std::cos(angle)});
+  }
+  const bank::Bank basin = make_bank(shape::tests::make_lathe(outline, 96, false)), ball = make_round(radius, 8);
+  for (const auto& [degrees, period] : {std::pair{10.0, 0.873783}, std::pair{30.0, 0.887303}}) {
+    const double a = degrees * M_PI / 180;
+    WorldSpec w;
+    w.bodies = {make_body(ball, {(bowl - radius) * std::sin(a), 0, -(bowl - radius) * std::cos(a)}, 0.8), make_body(basin, {}, 0.8)};
+    w.bodies[1].fixed = true;
+    const auto motions = run(w, 2.2)[0];
+    std::vector<double> crossings;
+    for (std::size_t i = 1; i < motions.size(); ++i)
+      if (motions[i - 1].position_m[0] > 0.0 && motions[i].position_m[0] <= 0.0)
+        crossings.push_back(motions[i - 1].time_s + (motions[i].time_s - motions[i - 1].time_s) * motions[i - 1].position_m[0] /
+                                                        (motions[i - 1].position_m[0] - motions[i].position_m[0]));
+    ASSERT_GE(crossings.size(), 3U);
+    const double measured = (crossings[2] - crossings[0]) / 2.0;
+    EXPECT_NEAR(measured / period, 1.0, 0.003) << degrees << " degrees";
+  }
+}
+
+TEST(Dominoes, WithoutFrictionFallAsFastAsTheTrainThatLeans) {
+  // Speed of the wave, stones that turn about their feet and stay together once they met, no friction between them: J. M. J. van Leeuwen,
+  // "The domino effect", Am. J. Phys. 78 (2010).
+  struct Row {
+    double height_m, thickness_m, gap_m, speed_m_s;
+  };
+  for (const Row& row : {Row{0.048, 0.0075, 0.0096, 1.3504}, Row{0.05, 0.005, 0.025, 1.1994}}) {
+    bank::Bank stone = make_box({row.thickness_m, 0.024, row.height_m});
+    WorldSpec w;
+    w.ground = GroundSpec{.restitution = 0.0, .friction = 2e3};  // with 5e-4 of the stones: 1 at their feet
+    const int stones = 28;
+    const double pitch = row.gap_m + row.thickness_m;
+    for (int i = 0; i < stones; ++i) w.bodies.push_back(make_body(stone, {pitch * i, 0, 0.5 * row.height_m}, 5e-4));
+    // The first is pushed over its lower edge.
+    const double push = 6.0;  // rad/s
+    w.bodies[0].angular_velocity_rad_s = {0, push, 0};
+    w.bodies[0].velocity_m_s = {push * 0.5 * row.height_m, 0, push * 0.5 * row.thickness_m};
+    const auto motions = run(w, 1.0);
+    std::vector<double> starts;  // of each stone: when it moves
+    for (const auto& path : motions) {
+      const auto found = std::find_if(path.begin(), path.end(), [&](const auto& m) { return m.velocity_m_s[0] > 0.02; });
+      starts.push_back(found == path.end() ? -1.0 : found->time_s);
+    }
+    ASSERT_GT(starts[25], 0.0);
+    const double measured = pitch * 10 / (starts[25] - starts[15]);
+    EXPECT_NEAR(measured / row.speed_m_s, 1.0, 0.03);
+  }
+}
+
+}  // namespace
+}  // namespace carillon::contact::tests

@@ -1,0 +1,147 @@
+// Impacts with modes inside: what goes in comes out, of energy and of momentum, and what rings still carries.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/contact/checks.hpp"
+#include "tests/contact/solids.hpp"
+
+namespace carillon::contact::tests {
+namespace {
+
+/// Invented modes on the surface of a bank: every vertex moves in a direction of its own.
+bank::Bank add_modes(bank::Bank bank, int modes) {
+  for (int m = 0; m < modes; ++m) {
+    const double omega = 2.0 * M_PI * 300.0 * std::pow(1.13, m);
+    bank.eigenvalue_rad2_s2.push_back(omega * omega);
+    bank.decay_per_s.push_back(2.0 + 1e-6 * omega);
+    bank.residual.push_back(1e-10);
+    bank.radiation_gain.push_back(1.0);
+    bank.shape_scale.push_back(1.0 / 32767.0);
+  }
+  const std::size_t count = bank.vertices_m.size() * static_cast<std::size_t>(modes) * 3;
+  for (std::size_t i = 0; i < count; ++i) bank.shape.push_back(static_cast<std::int16_t>(32767.0 * std::sin(1.7 * static_cast<double>(i))));
+  return bank;
+}
+
+BodySpec make_body(const std::string& name, const bank::Bank& bank, Vec3 position) {
+  BodySpec b;
+  b.name = name;
+  b.bank = &bank;
+  b.initial.position_m = position;
+  b.restitution = 0.6;
+  return b;
+}
+
+struct Outcome {
+  std::vector<stream::Force> forces;
+  std::vector<stream::Motion> motions;
+  int impulses = 0;
+  EnergyAudit energy;
+};
+
+Outcome run(const WorldSpec& spec, double end_s) {
+  World world(spec, {.end_s = end_s, .audits_energy = true});
+  Outcome outcome;
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const stream::Event& event) {
+    EXPECT_EQ(stream::find_fault(event), nullptr);
+    if (const auto* force = std::get_if<stream::Force>(&event)) outcome.forces.push_back(*force);
+    if (const auto* motion = std::get_if<stream::Motion>(&event)) outcome.motions.push_back(*motion);
+    if (std::holds_alternative<stream::Impulse>(event)) ++outcome.impulses;
+  });
+  outcome.energy = world.get_statistics().energy;
+  return outcome;
+}
+
+stream::Motion find_last(const Outcome& outcome, int body) {
+  stream::Motion last;
+  for (const stream::Motion& m : outcome.motions)
+    if (m.body == body) last = m;
+  return last;
+}
+
+TEST(Ringing, GivesBodiesEqualAndOppositeForcesAndTheirMomentum) {
+  // Two that ring meet in flight without spin about the line between them.
+  const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20);
+  WorldSpec w;
+  w.gravity_m_s2 = {0, 0, 0};
+  w.bodies = {make_body("ball", ball, {0, 0, 0}), make_body("box", box, {0.2, 0.01, 0.005})};
+  w.bodies[1].velocity_m_s = {-2, 0, 0};
+  const Outcome r = run(w, 0.2);
+  ASSERT_FALSE(r.forces.empty());
+  EXPECT_EQ(r.impulses, 0);
+  const Simulation paths = collect({r.motions.begin(), r.motions.end()}, {ball.rigid.centre_m, box.rigid.centre_m});
+  Vec3 on[2] = {};
+  for (const stream::Force& f : r.forces) {
+    for (int k = 0; k < f.count; ++k) {
+      const auto& j = f.impulse_n_s[static_cast<std::size_t>(k)];
+      const Pose pose = pose_at(paths.poses[static_cast<std::size_t>(f.body)], f.time_s + k * f.step_s);
+      on[f.body] = on[f.body] + rotate(pose.rotation, {j[0], j[1], j[2]});
+    }
+  }
+  const double size = norm(on[0]);
+  EXPECT_GT(size, 0.1);
+  // Each force is in a frame of the end of its small step; poses are known every 2 ms.
+  EXPECT_LT(norm(on[0] + on[1]), 5e-3 * size);
+  EXPECT_LT(norm(on[0] - ball.rigid.mass_kg * find_last(r, 0).velocity_m_s), 5e-3 * size);
+  const Vec3 total = ball.rigid.mass_kg * find_last(r, 0).velocity_m_s + box.rigid.mass_kg * find_last(r, 1).velocity_m_s;
+  EXPECT_LT(norm(total - box.rigid.mass_kg * Vec3{-2, 0, 0}), 1e-9 * box.rigid.mass_kg);
+}
+
+class Books : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Scenes, Books, testing::Range(0, 5));
+
+TEST_P(Books, OfMotionModesAndLossesStayWithinAHundredth) {
+  const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20),
+                   plate = add_modes(make_box({0.4, 0.3, 0.01}), 20), lump = add_modes(make_eared_ball(0.05, 3), 20);
+  WorldSpec w;
+  w.ground = GroundSpec{};
+  switch (GetParam()) {
+    case 0:
+      w.bodies = {make_body("ball", ball, {0, 0, 0.5})};
+      break;
+    case 1:
+      w.bodies = {make_body("box", box, {0, 0, 0.3})};
+      w.bodies[0].initial.rotation = {0.9, 0.3, -0.2, 0.4};
+      break;
+    case 2:
+      w.bodies = {make_body("plate", plate, {0, 0, 0.3})};
+      w.bodies[0].initial.rotation = {0.95, 0.2, 0.1, 0.0};
+      break;
+    case 3:
+      w.bodies = {make_body("lump", lump, {0, 0, 0.3})};
+      w.bodies[0].angular_velocity_rad_s = {5, -3, 2};
+      break;
+    default:
+      w.bodies = {make_body("shelf", plate, {0, 0, 0.3}), make_body("box", box, {0.02, 0, 0.5}), make_body("ball", ball, {0, 0.05, 0.8})};
+      w.bodies[0].fixed = true;
+      w.bodies[0].initial.rotation = {std::cos(0.15), 0, std::sin(0.15), 0};
+  }
+  const EnergyAudit e = run(w, 1.0).energy;
+  EXPECT_GT(e.most_modes_j, 0.0);
+  EXPECT_GT(e.lost_j, 0.0);
+  EXPECT_LT(e.error_j, 0.01 * e.start_j) << "start " << e.start_j << ", motion " << e.motion_j << ", modes " << e.modes_j << ", lost "
+                                         << e.lost_j;
+  // The modes never have more than the fall had.
+  EXPECT_LT(e.most_modes_j, e.start_j);
+}
+
+TEST(Ringing, ShelfGoesOnCarryingWhatLiesOnIt) {
+  // Balls strike a shelf that rings while a box lies at its other end.
+  const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20),
+                   plate = add_modes(make_box({0.6, 0.3, 0.01}), 20);
+  WorldSpec w;
+  w.bodies = {make_body("shelf", plate, {0, 0, 0}), make_body("box", box, {-0.2, 0, 0.03}), make_body("ball", ball, {0.2, 0, 0.3}),
+              make_body("other", ball, {0.2, 0.1, 0.3003})};
+  w.bodies[0].fixed = true;
+  const Outcome r = run(w, 0.6);
+  int on_shelf = 0;
+  for (const stream::Force& f : r.forces) on_shelf += f.body == 0 ? 1 : 0;
+  EXPECT_GT(on_shelf, 0);
+  EXPECT_NEAR(find_last(r, 1).position_m[2], 0.03, 1e-6);
+  EXPECT_LT(r.energy.error_j, 0.01 * std::abs(r.energy.start_j));
+}
+
+}  // namespace
+}  // namespace carillon::contact::tests
