@@ -24,6 +24,7 @@
 #include "runtime/config/error.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/stream/events.hpp"
+#include "runtime/support/losses.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/synthesiser.hpp"
@@ -191,6 +192,14 @@ carillon_impulse make_default() {
 }
 
 template <>
+carillon_force make_default() {
+  carillon_force force{};
+  force.other = -1;
+  force.barycentric[0] = 1.0;
+  return force;
+}
+
+template <>
 carillon_contact make_default() {
   carillon_contact contact{};
   contact.state = CARILLON_CONTACT_HOLD;
@@ -350,8 +359,13 @@ carillon_status carillon_model_make(const carillon_bank* bank, const carillon_mo
   return run(message, message_size, [&] {
     const auto kind = ours->radiation == CARILLON_RADIATION_SPHERE ? radiation::GainKind::kSphere : radiation::GainKind::kOsg02;
     const std::vector<double> gains = radiation::calc_gains(bank->bank, kind);
+    // What fixes the body takes of its modes what the bank says; a bank without losses is not copied.
+    std::optional<bank::Bank> mounted;
+    if (const support::Losses losses = support::calc_losses(bank->bank, {}); !losses.is_empty())
+      support::apply(losses, mounted.emplace(bank->bank));
+    const bank::Bank& played = mounted ? *mounted : bank->bank;
     *model = new carillon_model{
-        synth::Model::make(bank->bank, {.rate_hz = ours->rate_hz, .gains = gains, .sphere_radius_m = find_sphere_radius_m(bank->bank)})};
+        synth::Model::make(played, {.rate_hz = ours->rate_hz, .gains = gains, .sphere_radius_m = find_sphere_radius_m(played)})};
   });
 }
 
@@ -373,6 +387,7 @@ carillon_status carillon_create(const carillon_options* options, carillon_synth*
                                    .listener_m = to_vector(given->listener_m),
                                    .max_bodies = given->max_bodies,
                                    .max_strikes = given->max_strikes,
+                                   .max_forces = 2 * std::min(given->max_strikes, 1 << 20),
                                    .max_waypoints = given->max_waypoints,
                                    .ring_events = given->ring_events,
                                    .longest_m = given->longest_m,
@@ -467,6 +482,7 @@ carillon_status carillon_keep_load(carillon_synth* synth, double share, double b
 }
 
 void carillon_impulse_init_sized(carillon_impulse* impulse, size_t size) { init(impulse, size); }
+void carillon_force_init_sized(carillon_force* force, size_t size) { init(force, size); }
 void carillon_contact_init_sized(carillon_contact* contact, size_t size) { init(contact, size); }
 void carillon_motion_init_sized(carillon_motion* motion, size_t size) { init(motion, size); }
 void carillon_listener_init_sized(carillon_listener* listener, size_t size) { init(listener, size); }
@@ -475,6 +491,35 @@ carillon_status carillon_push_impulse(carillon_synth* synth, const carillon_impu
   const auto ours = read(impulse);
   if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
   return push(synth, to_event(*ours));
+}
+
+carillon_status carillon_push_force(carillon_synth* synth, const carillon_force* force) {
+  const auto ours = read(force);
+  if (synth == nullptr || !ours || ours->impulse_n_s == nullptr || ours->count < 1) return CARILLON_BAD_ARGUMENT;
+  stream::Force piece{.time_s = ours->time_s,
+                      .step_s = ours->step_s,
+                      .body = ours->body,
+                      .other = ours->other,
+                      .triangle = ours->triangle,
+                      .continues = ours->continues != 0,
+                      .barycentric = to_vector(ours->barycentric)};
+  // Nothing of it is played unless all of it can be.
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::int32_t done = 0; done < ours->count; done += stream::kMostForceSteps) {
+      std::array<stream::Vec3, stream::kMostForceSteps> impulses{};
+      const std::int32_t count = std::min(stream::kMostForceSteps, ours->count - done);
+      for (std::int32_t k = 0; k < count; ++k) impulses[static_cast<std::size_t>(k)] = to_vector(ours->impulse_n_s[done + k]);
+      stream::Force first = piece;
+      first.time_s += done * piece.step_s;
+      first.continues = piece.continues || done > 0;
+      carillon_status status = CARILLON_OK;
+      stream::split_force(first, std::span(impulses).first(static_cast<std::size_t>(count)), [&](const stream::Force& part) {
+        if (pass > 0 || stream::find_fault(part) != nullptr) status = push(synth, part);
+      });
+      if (status != CARILLON_OK) return status;
+    }
+  }
+  return CARILLON_OK;
 }
 
 carillon_status carillon_vary_impulse(const carillon_bank* bank, double variation, uint64_t seed, uint64_t strike,

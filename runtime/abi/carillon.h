@@ -26,7 +26,7 @@ extern "C" {
 
 /* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
  * programs would have to be compiled again. */
-#define CARILLON_ABI_VERSION 4
+#define CARILLON_ABI_VERSION 5
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -222,6 +222,21 @@ typedef struct carillon_impulse {
   int32_t reserved;
 } carillon_impulse;
 
+/* The force of one contact pulse, known step by step: constant in each of `count` steps of `step_s`. Played exactly. A pulse may be given
+ * in one piece or in several, of any length. Point and impulses are in the frame of the body's mesh. */
+typedef struct carillon_force {
+  uint32_t size;
+  int32_t body;
+  int32_t triangle;               /* of the bank */
+  int32_t other;                  /* the other body; -1: the ground, or unknown */
+  double time_s;                  /* when the first step begins, since the first frame */
+  double step_s;                  /* above 0 */
+  const double (*impulse_n_s)[3]; /* on the body, of each step */
+  int32_t count;                  /* of the steps, at least 1 */
+  int32_t continues;              /* not 0: a further piece of the pulse before */
+  double barycentric[3];
+} carillon_force;
+
 typedef enum carillon_contact_state {
   CARILLON_CONTACT_BEGIN = 0,
   CARILLON_CONTACT_HOLD = 1,
@@ -271,6 +286,8 @@ typedef struct carillon_listener {
 
 #define carillon_impulse_init(impulse) carillon_impulse_init_sized((impulse), sizeof(carillon_impulse))
 CARILLON_API void carillon_impulse_init_sized(carillon_impulse* impulse, size_t size);
+#define carillon_force_init(force) carillon_force_init_sized((force), sizeof(carillon_force))
+CARILLON_API void carillon_force_init_sized(carillon_force* force, size_t size);
 #define carillon_contact_init(contact) carillon_contact_init_sized((contact), sizeof(carillon_contact))
 CARILLON_API void carillon_contact_init_sized(carillon_contact* contact, size_t size);
 #define carillon_motion_init(motion) carillon_motion_init_sized((motion), sizeof(carillon_motion))
@@ -291,6 +308,9 @@ CARILLON_API uint64_t carillon_name_seed(const char* name);
 /* [any] Events, in any order; those before carillon_horizon_s act late. CARILLON_BAD_INPUT for numbers that are not finite, and the like.
  */
 CARILLON_API carillon_status carillon_push_impulse(carillon_synth* synth, const carillon_impulse* impulse);
+/* A force of more than 16 steps takes several places of the ring and of the body's strikes, of which it has twice max_strikes for forces;
+ * CARILLON_FULL when the ring has no room for all of it, which is then played up to there. */
+CARILLON_API carillon_status carillon_push_force(carillon_synth* synth, const carillon_force* force);
 CARILLON_API carillon_status carillon_push_contact(carillon_synth* synth, const carillon_contact* contact);
 CARILLON_API carillon_status carillon_push_motion(carillon_synth* synth, const carillon_motion* motion);
 CARILLON_API carillon_status carillon_push_listener(carillon_synth* synth, const carillon_listener* listener);

@@ -3,21 +3,47 @@
 #include <fmt/format.h>
 
 namespace carillon::host {
+namespace {
+
+/// What the supports take of the body's bank.
+void mount(Scene& scene, SceneBody& body, bank::Bank& bank) {
+  const support::Losses losses = support::calc_losses(bank, body.support);
+  if (losses.is_empty()) return;
+  body.mounting = {support::describe(losses, bank), losses.beyond, losses.mixed, {}, bank.decay_per_s, {}};
+  if (const std::string limits = support::describe_limits(losses, bank); !limits.empty())
+    scene.warnings.push_back(fmt::format("{}: the support of body \"{}\": {}", scene.file.string(), body.name, limits));
+  support::apply(losses, bank);
+  body.mounting.decay_per_s = bank.decay_per_s;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) body.mounting.freq_hz.push_back(bank.freq_hz(m));
+}
+
+}  // namespace
 
 Banks read_banks(Scene& scene) {
   Banks banks;
+  std::map<std::filesystem::path, int> left;  // bodies that still need the bank as it is in the file
+  for (const SceneBody& body : scene.bodies) ++left[body.bank];
+  std::map<std::filesystem::path, bank::Bank> files;
+  std::map<const ReadBank*, const Mounting*> mountings;
   for (SceneBody& body : scene.bodies) {
-    auto& slot = banks[body.bank];
+    const bool is_last = --left[body.bank] == 0;
+    auto& slot = banks[{body.bank, support::write_key(body.support)}];
     if (!slot) {
+      const std::string place = body.support_place.empty() ? scene.file.string() : body.support_place;
       try {
         slot = std::make_unique<ReadBank>();
-        slot->bank = bank::read_bank(body.bank);
+        if (!files.contains(body.bank)) files[body.bank] = bank::read_bank(body.bank);
+        slot->bank = is_last ? std::move(files[body.bank]) : files[body.bank];
+        mount(scene, body, slot->bank);
         radiation::Radiation radiation = radiation::calc_radiation(slot->bank, scene.radiation);
         slot->bank.radiation_gain = std::move(radiation.gains);
         slot->sphere_radius_m = radiation.sphere_radius_m;
       } catch (const InputError& error) {
-        throw InputError(fmt::format("{}: the bank of body \"{}\": {}", scene.file.string(), body.name, error.what()));
+        throw InputError(fmt::format("{}: the bank of body \"{}\": {}", place, body.name, error.what()));
       }
+      mountings[slot.get()] = &body.mounting;
+    } else {
+      body.mounting = *mountings[slot.get()];
     }
     body.spec.bank = &slot->bank;
     body.sphere_radius_m = slot->sphere_radius_m;

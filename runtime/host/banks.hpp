@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/host/scene.hpp"
@@ -14,10 +16,12 @@ struct ReadBank {
   bank::Bank bank;
   double sphere_radius_m = 0.0;
 };
-using Banks = std::map<std::filesystem::path, std::unique_ptr<ReadBank>>;
+/// By file, and what carries the body (support::write_key()).
+using Banks = std::map<std::pair<std::filesystem::path, std::string>, std::unique_ptr<ReadBank>>;
 
-/// Reads every bank once, and gives it the gains that the scene asks for. The scene's bodies point into the result and know its radius.
-/// Throws InputError, which names scene and body.
+/// Reads every bank once, puts in what the supports take, and gives it the gains that the scene asks for: a bank for every way in which its
+/// bodies are mounted. The scene's bodies point into the result, and know its radius and in words how they are mounted; warnings about
+/// supports join the scene's. Throws InputError, which names scene and body.
 Banks read_banks(Scene& scene);
 
 }  // namespace carillon::host

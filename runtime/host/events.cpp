@@ -65,9 +65,7 @@ std::vector<stream::Event> make_still(const Scene& scene) {
 /// Puts what a world says in order of time, and strikes between it: of what happens at one time, first what the world says, as it came.
 class InOrder {
  public:
-  InOrder(std::vector<contact::Impulse> strikes, Events& out) : strikes_(std::move(strikes)), out_(&out) {
-    std::stable_sort(strikes_.begin(), strikes_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
-  }
+  InOrder(std::vector<stream::Event> strikes, Events& out) : strikes_(std::move(strikes)), out_(&out) {}
 
   void take(const stream::Event& event) {
     waiting_.push({stream::get_time_s(event), order_++, event});
@@ -89,12 +87,12 @@ class InOrder {
   /// Nothing before that time will come.
   void release(double until_s) {
     for (; !waiting_.empty() && waiting_.top().time_s < until_s; waiting_.pop()) {
-      for (; next_ < strikes_.size() && strikes_[next_].time_s < waiting_.top().time_s; ++next_) out_->append(strikes_[next_]);
+      for (; next_ < strikes_.size() && stream::get_time_s(strikes_[next_]) < waiting_.top().time_s; ++next_) out_->append(strikes_[next_]);
       out_->append(waiting_.top().event);
     }
   }
 
-  std::vector<contact::Impulse> strikes_;
+  std::vector<stream::Event> strikes_;
   Events* out_;
   std::size_t next_ = 0;
   std::int64_t order_ = 0;
@@ -105,6 +103,7 @@ void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::
                  Course& course) {
   contact::World world(make_world(scene), {.contact_step_s = scene.quality.contact_step_s,
                                            .end_s = scene.duration_s,
+                                           .modes = scene.quality.modes_in_impacts,
                                            .lasting_contacts = has_contacts,
                                            .audits_energy = audits});
   constexpr int kParts = 100;
@@ -178,11 +177,14 @@ Tally count_impulses(const Events& events, std::size_t bodies) {
   Tally tally;
   tally.body_impulses.assign(bodies, 0);
   events.for_each([&](const stream::Event& event) {
-    const auto* impulse = std::get_if<stream::Impulse>(&event);
-    if (impulse == nullptr || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= bodies) return;
-    ++tally.impulses;
-    ++tally.body_impulses[static_cast<std::size_t>(impulse->body)];
-    if (impulse->other < 0 || impulse->body < impulse->other) ++tally.contacts;
+    const auto count = [&](std::int32_t body, std::int32_t other) {
+      if (body < 0 || static_cast<std::size_t>(body) >= bodies) return;
+      ++tally.impulses;
+      ++tally.body_impulses[static_cast<std::size_t>(body)];
+      if (other < 0 || body < other) ++tally.contacts;
+    };
+    if (const auto* impulse = std::get_if<stream::Impulse>(&event)) count(impulse->body, impulse->other);
+    if (const auto* force = std::get_if<stream::Force>(&event); force != nullptr && !force->continues) count(force->body, force->other);
   });
   return tally;
 }
@@ -203,7 +205,10 @@ Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::f
   Course course{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
   std::vector<const bank::Bank*> banks;
   for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
-  InOrder events(make_impulses(scene, banks), course.events);  // strikes are refused before the physics, if at all
+  Strikes strikes = make_strikes(scene, banks);  // they are refused before the physics, if at all
+  course.blows = std::move(strikes.blows);
+  course.warnings = std::move(strikes.warnings);
+  InOrder events(std::move(strikes.events), course.events);
   if (!has_physics(scene)) {
     for (const stream::Event& event : make_still(scene)) events.take(event);
   } else {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/config/spool.hpp"
+#include "runtime/host/mallets.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/stream/file.hpp"
 
@@ -27,13 +28,14 @@ struct Course {
   Events events;
   std::int64_t steps = 0;  // of the physics
   contact::EnergyAudit energy{};
-  std::vector<std::string> warnings;
+  std::vector<Blow> blows{};  // of mallets
+  std::vector<std::string> warnings{};
 };
 
 /// The course as the text of a contacts file, in pieces, in order.
 void write_recording(const Course& course, const std::function<void(std::string_view)>& sink);
 
-/// How many impulses bodies get.
+/// How many impulses bodies get; a pulse of several stream::Forces is one.
 struct Tally {
   std::vector<std::int64_t> body_impulses;  // per body
   std::int64_t impulses = 0;

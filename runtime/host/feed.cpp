@@ -38,6 +38,11 @@ class Feed::Times {
       if (body == nullptr) return;
       const double due_s = impulse->time_s - calc_half_length_s(*impulse) - body->lead_s;
       work(Item{std::isnan(due_s) ? kEver : due_s, number});
+    } else if (const auto* force = std::get_if<stream::Force>(&event)) {
+      const FedBody* body = feed_->find(force->body);
+      if (body == nullptr) return;
+      const double due_s = force->time_s - body->lead_s;
+      work(Item{std::isnan(due_s) ? kEver : due_s, number});
     } else if (const auto* contact = std::get_if<stream::Contact>(&event)) {
       if (feed_->find(contact->body) == nullptr) return;
       const auto [last, is_first] = contacts_.try_emplace({contact->body, contact->id}, contact->time_s);
@@ -73,9 +78,10 @@ Feed::Feed(const Events& events, std::vector<FedBody> bodies, std::span<const st
     end_s_ = std::max(end_s_, stream::get_time_s(event));
     if (const auto* contact = std::get_if<stream::Contact>(&event)) has_contacts_ = has_contacts_ || find(contact->body) != nullptr;
     const auto* impulse = std::get_if<stream::Impulse>(&event);
-    const FedBody* body = impulse != nullptr ? find(impulse->body) : nullptr;
+    const auto* force = std::get_if<stream::Force>(&event);
+    const FedBody* body = impulse != nullptr ? find(impulse->body) : force != nullptr ? find(force->body) : nullptr;
     if (body == nullptr) return;
-    const double ahead_s = calc_half_length_s(*impulse) + body->lead_s;
+    const double ahead_s = (impulse != nullptr ? calc_half_length_s(*impulse) : 0.0) + body->lead_s;
     if (ahead_s < 10.0) margin_s_ = std::max(margin_s_, ahead_s);  // false for what is no number
   });
   times_ = std::make_shared<Times>(*this);
@@ -102,6 +108,7 @@ const FedBody* Feed::find(std::int32_t body) const {
 stream::Event Feed::make_event(const Item& item, stream::Event event) const {
   const auto get_number = [this](std::int32_t body) { return bodies_[static_cast<std::size_t>(body)].number; };
   if (auto* impulse = std::get_if<stream::Impulse>(&event)) impulse->body = get_number(impulse->body);
+  if (auto* force = std::get_if<stream::Force>(&event)) force->body = get_number(force->body);
   if (auto* contact = std::get_if<stream::Contact>(&event)) {
     contact->body = get_number(contact->body);
     const bool is_known = contact->other >= 0 && static_cast<std::size_t>(contact->other) < bodies_.size();

@@ -158,10 +158,20 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     fmt::print(notes, "  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", config::printable(scene.bodies[i].name), sound.body_modes[i],
                scene.bodies[i].spec.fixed ? "fixed, " : "", sound.body_peak_pa[i]);
+    if (const std::string& text = scene.bodies[i].mounting.text; !text.empty())
+      fmt::print(notes, "  {:<16} {}\n", "", config::printable(text));
   }
   print_bands(notes, scene, sound.rate_hz);
   fmt::print(notes, "modes sounding     {}\n", figures.modes);
   fmt::print(notes, "contacts           {}\n", figures.tally.contacts);
+  constexpr std::size_t kMostPrinted = 8;
+  for (std::size_t i = 0; i < std::min(figures.blows.size(), kMostPrinted); ++i) {
+    const Blow& blow = figures.blows[i];
+    fmt::print(notes, "mallet             at {:g} s on {}: {:.3g} ms, {:.3g} N s, {:.3g} N at most, leaves with {:.2g} of its speed\n",
+               blow.time_s, config::printable(blow.body), 1e3 * blow.contact_s, blow.impulse_n_s, blow.peak_n, blow.restitution);
+  }
+  if (figures.blows.size() > kMostPrinted)
+    fmt::print(notes, "mallet             and {} more (--report)\n", figures.blows.size() - kMostPrinted);
   fmt::print(notes, "physics            {:.2f} s\n", figures.physics_s);
   fmt::print(notes, "sound              {:.2f} s for {:g} s at {} Hz\n", figures.sound_s, scene.duration_s, sound.rate_hz);
   fmt::print(notes, "real-time factor   {:.3f} (below 1 is faster than real time)\n", figures.real_time_factor);
@@ -234,10 +244,14 @@ void run(const ProgramOptions& options) {
   const Plan plan = make_plan(std::move(facts), course.events, measures ? plan::measure_costs() : plan::Costs{});
   if (options.plan) {
     fmt::print("{}", config::printable_lines(plan::format_plan(plan.planner, plan.facts)));
+    for (const SceneBody& body : scene.bodies) {
+      if (!body.mounting.text.empty()) fmt::print("{}: {}\n", config::printable(body.name), config::printable(body.mounting.text));
+    }
     return;
   }
   figures.tally = count_impulses(course.events, scene.bodies.size());
   figures.physics_steps = course.steps;
+  figures.blows = course.blows;
   started = Clock::now();
   SoundStore store(scene.sample_rate_hz, count_channels(scene), make_spool("sound"));
   const Sound sound = calc_sound(scene, body_banks, course.events,

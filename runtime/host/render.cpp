@@ -31,6 +31,7 @@ constexpr double kReferencePa = 20e-6;
 constexpr double kFastS = 0.125;
 constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away is not heard (84 dB down, and memory has an end)
 constexpr int kMostStrikes = 256;         // of a body, waiting or acting at once
+constexpr int kMostForces = 512;          // of a body that gets any
 
 double get_cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -40,6 +41,7 @@ double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[
 struct BodyCourse {
   bool is_played = false;   // something happens to it
   bool is_touched = false;  // by a contact that lasts
+  bool is_pushed = false;   // by forces known step by step
   stream::Motion first;     // where it is at the beginning
   double reach_m = 0.0;     // how far from the first microphone's place it ever gets
 };
@@ -58,6 +60,8 @@ std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank:
     }
     if (const auto* impulse = std::get_if<stream::Impulse>(&event); impulse != nullptr && find(impulse->body))
       courses[static_cast<std::size_t>(impulse->body)].is_played = true;
+    if (const auto* force = std::get_if<stream::Force>(&event); force != nullptr && find(force->body))
+      courses[static_cast<std::size_t>(force->body)].is_played = courses[static_cast<std::size_t>(force->body)].is_pushed = true;
     if (const auto* contact = std::get_if<stream::Contact>(&event); contact != nullptr && find(contact->body))
       courses[static_cast<std::size_t>(contact->body)].is_played = courses[static_cast<std::size_t>(contact->body)].is_touched = true;
   });
@@ -251,6 +255,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
                                           .surface = make_surface(scene.bodies[i]),
                                           .longest_m = longest_m[i],
                                           .max_waypoints = waypoints[i],
+                                          .max_forces = courses[i].is_pushed ? kMostForces : 0,
                                           .isa = scene.quality.instructions,
                                           .audits_energy = options.audits});
   }

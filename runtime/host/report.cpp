@@ -89,6 +89,16 @@ class PathCursor {
   std::vector<contact::Pose> around_;
 };
 
+/// What an event pushes by; a piece of a pulse counts as one.
+std::optional<stream::Impulse> find_impulse(const stream::Event& event) {
+  if (const auto* impulse = std::get_if<stream::Impulse>(&event)) return *impulse;
+  const auto* force = std::get_if<stream::Force>(&event);
+  if (force == nullptr) return std::nullopt;
+  stream::Impulse impulse = stream::to_impulse(*force);
+  impulse.duration_s = force->calc_length_s();
+  return impulse;
+}
+
 contact::Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse& impulse) {
   contact::Vec3 point{};
   for (int corner = 0; corner < 3; ++corner) {
@@ -108,6 +118,22 @@ plan::MoreJson list_measured(const Sound& sound, std::size_t body, double durati
                     1e6 * static_cast<double>(counters.ticks[effect]) * sound.seconds_per_tick / duration_s, counters.units[effect]);
   }
   return more;
+}
+
+/// What supports take of a body's modes, as a member of a JSON object with its comma; empty without losses.
+std::string make_mounting_json(const Mounting& mounting) {
+  if (mounting.text.empty()) return {};
+  std::string json = fmt::format("\"supports\": {{\"text\": {}, \"beyond_first_order\": {}, \"shared\": {}",
+                                 config::quote(config::printable(mounting.text)), mounting.beyond, mounting.mixed);
+  const auto add = [&](const char* name, const std::vector<double>& values) {
+    fmt::format_to(std::back_inserter(json), ",\n    \"{}\": [", name);
+    for (std::size_t i = 0; i < values.size(); ++i) fmt::format_to(std::back_inserter(json), "{}{:.8g}", i == 0 ? "" : ", ", values[i]);
+    json += "]";
+  };
+  add("frequencies_hz", mounting.freq_hz);
+  add("decay_before_per_s", mounting.decay_before_per_s);
+  add("decay_per_s", mounting.decay_per_s);
+  return json + "},\n   ";
 }
 
 }  // namespace
@@ -141,8 +167,8 @@ void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& 
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) cursors.emplace_back(paths, i);
   bool first = true;
   events.for_each([&](const stream::Event& event) {
-    const auto* impulse = std::get_if<stream::Impulse>(&event);
-    if (impulse == nullptr || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= scene.bodies.size()) return;
+    const std::optional<stream::Impulse> impulse = find_impulse(event);
+    if (!impulse || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= scene.bodies.size()) return;
     const auto i = static_cast<std::size_t>(impulse->body);
     const contact::Pose pose = cursors[i].is_empty() ? scene.bodies[i].spec.initial : cursors[i].find(impulse->time_s);
     const contact::Vec3 x = calc_world_point(pose, find_contact_point(*banks[i], *impulse));
@@ -187,14 +213,28 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
                    "\"modes_rise\": {:.6g}}},\n",
                    bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j, bodies.weight_n, f.audit->modes_rise);
   }
+  if (!f.blows.empty()) {
+    json += " \"mallets\": [";
+    for (std::size_t i = 0; i < f.blows.size(); ++i) {
+      const Blow& b = f.blows[i];
+      fmt::format_to(out,
+                     "{}\n  {{\"body\": {}, \"time_s\": {:.9g}, \"contact_s\": {:.6g}, \"impulse_n_s\": {:.6g}, \"peak_n\": {:.6g}, "
+                     "\"restitution\": {:.6g}, \"before_j\": {:.6g}, \"after_j\": {:.6g}, \"together\": {}, \"motion_j\": {:.6g}, "
+                     "\"modes_j\": {:.6g}, \"lost_j\": {:.6g}}}",
+                     i == 0 ? "" : ",", config::quote(b.body), b.time_s, b.contact_s, b.impulse_n_s, b.peak_n, b.restitution, b.before_j,
+                     b.after_j, b.together, b.motion_j, b.modes_j, b.lost_j);
+    }
+    json += "\n ],\n";
+  }
   json += " \"warnings\": [";
   for (std::size_t i = 0; i < scene.warnings.size(); ++i)
     json += (i == 0 ? "" : ", ") + config::quote(config::printable(scene.warnings[i]));
   json += "],\n \"per_body\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const std::int64_t played = i < f.tally.body_impulses.size() ? f.tally.body_impulses[i] : 0;
-    fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   \"effects\": {}}}",
+    fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   {}\"effects\": {}}}",
                    i == 0 ? "" : ",", config::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i],
+                   make_mounting_json(scene.bodies[i].mounting),
                    plan::make_plan_json(plan.planner, plan.facts, static_cast<int>(i), list_measured(sound, i, scene.duration_s)));
   }
   fmt::format_to(out, "\n ],\n \"changes\": {}\n}}\n", plan::make_changes_json(plan.changes, plan.facts, kMostReported));

@@ -34,6 +34,7 @@ struct Figures {
   double sound_s = 0.0;
   Gain gain;
   std::optional<EnergyBooks> audit;
+  std::vector<Blow> blows;        // of mallets
   double real_time_factor = 0.0;  // (physics_s + sound_s) / duration: below 1 is faster than real time
 };
 std::string make_report_json(const Scene& scene, const Sound& sound, const Plan& plan, const Figures& figures);

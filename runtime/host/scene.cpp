@@ -11,6 +11,7 @@
 #include <span>
 
 #include "runtime/config/solids.hpp"
+#include "runtime/config/supports.hpp"
 
 namespace carillon::host {
 namespace {
@@ -25,11 +26,14 @@ constexpr double kMaxSpinRadS = 1e4;
 constexpr double kMaxEarDistanceM = 10.0;
 constexpr std::size_t kMostWaypoints = 100000;
 constexpr std::size_t kMostMicrophones = 16;
+constexpr std::size_t kMostHolders = 1000;
 constexpr std::size_t kMostStrikes = 100000;
 constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
 constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body lasts as long as a person's step on less
 constexpr double kStiffestGroundPa = 1e13;  // ten times a diamond
+constexpr double kFeltRestitution = 0.7;    // our estimate; piano hammers lose about half of their energy
+constexpr double kDensestKgM3 = 22600.0;    // osmium
 constexpr double kRoughestM = 1e-3;         // what is higher is no roughness but a shape
 
 using Quaternion = std::array<double, 4>;
@@ -136,6 +140,31 @@ plan::Wish read_effects(config::Object& object) {
 /// Exactly what a wish says where nobody plans.
 synth::EffectSet find_usual(const plan::Wish& wish) { return wish.automatic ? kDefaultEffects.with(wish.on).without(wish.off) : wish.on; }
 
+/// What fixes or carries a body.
+support::Wish read_support(config::Object& body) {
+  support::Wish wish;
+  wish.all = config::read_fixing(body);
+  if (auto supports = body.object_if("supports")) {
+    for (const std::string& name : supports->keys()) {
+      config::Object one = supports->object(name);
+      const auto fixing = config::read_fixing(one);
+      one.finish();
+      if (!fixing) supports->fail(name, "says nothing; give \"on\", \"joint\" or \"loss\"");
+      wish.by_name.emplace(name, *fixing);
+    }
+  }
+  for (config::Entry& entry : body.entries("held", kMostHolders)) {
+    if (!entry.object)
+      throw InputError(fmt::format("{}: \"held\": say where as well: {{\"by\": \"{}\", \"point_m\": [x, y, z]}}", entry.place, entry.text));
+    support::Holder holder{.by = config::read_holder(*entry.object, "by")};
+    if (!entry.object->has("point_m")) entry.object->numbers<3>("point_m");  // its message
+    holder.point_m = read_vector(*entry.object, "point_m", {}, kFarthestM);
+    entry.object->finish();
+    wish.held.push_back(holder);
+  }
+  return wish;
+}
+
 SceneBody parse_body(config::Object& object, const plan::Wish& wish, double variation) {
   SceneBody body;
   body.name = object.string("name");
@@ -161,6 +190,10 @@ SceneBody parse_body(config::Object& object, const plan::Wish& wish, double vari
   spec.restitution = read_within(object, "restitution", spec.restitution, 0.0, 1.0);
   spec.friction = read_within(object, "friction", spec.friction, 0.0, 10.0);
   spec.roughness_m = read_within(object, "roughness_m", spec.roughness_m, 0.0, kRoughestM);
+  body.support = read_support(object);
+  for (const char* key : {"on", "joint", "loss", "supports", "held"}) {
+    if (body.support_place.empty() && object.has(key)) body.support_place = object.find_place(key);
+  }
   body.wish = object.has("effects") ? read_effects(object) : wish;
   object.finish();
   return body;
@@ -198,7 +231,52 @@ std::size_t find_body(config::Object& object, const Names& bodies) {
                                   nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
 }
 
-SceneStrike parse_strike(config::Object& object, const Scene& scene, const Names& names) {
+Mallet parse_mallet(config::Object& object, std::vector<std::string>& warnings) {
+  Mallet mallet;
+  const auto read_positive = [&](config::Object& from, std::string_view key, double low, double high) {
+    const double value = from.number(key);
+    if (!(value >= low && value <= high))
+      from.fail(key, fmt::format("{} is out of range; give a number from {:g} to {:g}", value, low, high));
+    return value;
+  };
+  mallet.mass_kg = read_positive(object, "mass_kg", 1e-6, 1e3);
+  mallet.speed_m_s = read_positive(object, "speed_m_s", 1e-6, kMaxSpeedMs);
+  if (auto felt = object.object_if("felt")) {
+    for (const char* key : {"radius_m", "young_modulus_pa", "poisson_ratio"}) {
+      if (object.has(key)) object.fail(key, "is of a hard head, and there is a \"felt\"; keep one of them");
+    }
+    mallet.felt = Felt{.stiffness_n_m_p = read_positive(*felt, "stiffness_n_m_p", 1e-3, 1e30)};
+    mallet.felt->exponent = read_within(*felt, "exponent", mallet.felt->exponent, 1.0, 6.0);
+    mallet.restitution = kFeltRestitution;
+    felt->finish();
+  } else {
+    if (!object.has("young_modulus_pa"))
+      object.fail("young_modulus_pa", "is missing; say how hard the head is: \"young_modulus_pa\" and \"radius_m\", or \"felt\"");
+    mallet.young_modulus_pa = read_positive(object, "young_modulus_pa", kSoftestGroundPa, kStiffestGroundPa);
+    mallet.radius_m = read_positive(object, "radius_m", 1e-4, 10.0);
+    mallet.poisson_ratio = object.number_or("poisson_ratio", mallet.poisson_ratio, {-1.0, 0.5});
+    const double sphere_kg_m3 = mallet.mass_kg / (4.0 / 3.0 * std::numbers::pi * std::pow(mallet.radius_m, 3));
+    if (sphere_kg_m3 > kDensestKgM3) {
+      warnings.push_back(
+          fmt::format("{}: a sphere of {:g} m that weighs {:g} kg would be denser than osmium; \"radius_m\" is that of the "
+                      "head where it touches, in metres",
+                      object.find_place("radius_m"), mallet.radius_m, mallet.mass_kg));
+    }
+  }
+  mallet.restitution = read_within(object, "restitution", mallet.restitution, 0.0, 1.0);
+  mallet.friction = read_within(object, "friction", mallet.friction, 0.0, 10.0);
+  if (object.has("direction")) {
+    Vec3 direction = read_vector(object, "direction", {}, kFarthestM);
+    const double norm = calc_norm(direction);
+    if (!(norm > 1e-9)) object.fail("direction", "is no direction; give the way of the head as three numbers");
+    for (double& x : direction) x /= norm;
+    mallet.direction = direction;
+  }
+  object.finish();
+  return mallet;
+}
+
+SceneStrike parse_strike(config::Object& object, Scene& scene, const Names& names) {
   SceneStrike strike;
   strike.place = object.find_place("");
   strike.body = find_body(object, names);
@@ -217,8 +295,15 @@ SceneStrike parse_strike(config::Object& object, const Scene& scene, const Names
   } else {
     strike.triangle = static_cast<std::int32_t>(object.integer("triangle", 0, std::numeric_limits<std::int32_t>::max()));
   }
-  if (!object.has("impulse_n_s")) object.numbers<3>("impulse_n_s");  // its message
-  strike.impulse_n_s = read_vector(object, "impulse_n_s", {}, kMaxImpulseNs);
+  if (auto mallet = object.object_if("mallet")) {
+    for (const char* key : {"impulse_n_s", "duration_s"}) {
+      if (object.has(key)) object.fail(key, "follows from the \"mallet\"; keep one of them");
+    }
+    strike.mallet = parse_mallet(*mallet, scene.warnings);
+  } else {
+    if (!object.has("impulse_n_s")) object.numbers<3>("impulse_n_s");  // its message
+    strike.impulse_n_s = read_vector(object, "impulse_n_s", {}, kMaxImpulseNs);
+  }
   object.finish();
   return strike;
 }
@@ -315,6 +400,7 @@ Quality parse_quality(config::Object& object) {
   if (object.has("silence_pa")) quality.silence_pa = read_within(object, "silence_pa", 0.0, 1e-15, 1.0);
   quality.modes = object.integer_if("modes", synth::kGroup, std::numeric_limits<std::int32_t>::max());
   quality.contact_step_s = read_within(object, "contact_step_s", quality.contact_step_s, 1e-5, 2e-3);
+  quality.modes_in_impacts = object.boolean_or("modes_in_impacts", quality.modes_in_impacts);
   quality.instructions = static_cast<synth::Isa>(read_name(object, "instructions", kInstructionNames, "best"));
   object.finish();
   return quality;

@@ -13,6 +13,7 @@
 #include "runtime/contact/world.hpp"
 #include "runtime/plan/planner.hpp"
 #include "runtime/radiation/gains.hpp"
+#include "runtime/support/losses.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/track.hpp"
@@ -32,24 +33,52 @@ inline const std::vector<std::string> kGainKindNames{"osg02", "sphere"};
 inline constexpr synth::EffectSet kPlayableEffects = synth::kCompiledEffects;
 inline constexpr synth::EffectSet kDefaultEffects = synth::kUsualEffects;
 
+/// What supports take of a body's modes; filled when the banks are read, empty without losses.
+struct Mounting {
+  std::string text;                                     // in words, T60 before and after
+  std::size_t beyond = 0, mixed = 0;                    // as support::Losses has them
+  std::vector<double> freq_hz;                          // (m) as the body is mounted
+  std::vector<double> decay_before_per_s, decay_per_s;  // (m)
+};
+
 struct SceneBody {
   std::string name;
   std::filesystem::path bank;    // absolute
   contact::BodySpec spec;        // spec.bank is filled when the banks are read
   plan::Wish wish;               // its own key "effects", or the scene's
+  support::Wish support{};       // its keys "on", "joint", "loss", "supports" and "held"
+  std::string support_place;     // "file:line" of the first of them, for messages
+  Mounting mounting;             // what they, or the bank's own supports, take of its modes
   double sphere_radius_m = 0.0;  // of its bank, when that is read: radiation::calc_sphere_radius_m()
   double variation = 0.0;        // its own key "variation", or the scene's: how much equal strikes differ, 0..1
+};
+
+/// F = K y^p of a felt that is pressed in by y.
+struct Felt {
+  double stiffness_n_m_p = 0.0;  // K
+  double exponent = 2.5;         // p
+};
+
+/// The head of a mallet that flies freely into a body: a sphere of a solid, or a felt.
+struct Mallet {
+  double mass_kg = 0.0, speed_m_s = 0.0;
+  double radius_m = 0.0, young_modulus_pa = 0.0, poisson_ratio = 0.3;  // without felt
+  std::optional<Felt> felt{};
+  double restitution = 1.0;         // that it has on something rigid: what is lost in the head
+  double friction = 0.0;            // between head and body
+  std::optional<Vec3> direction{};  // of its way, unit, in the frame of the body's mesh; nothing: straight into the surface
 };
 
 /// A blow that the scene gives without physics. Point and impulse are in the frame of the body's mesh.
 struct SceneStrike {
   std::string place;                     // "file:line", for messages
   std::size_t body = 0;                  // index into Scene::bodies
-  double time_s = 0.0;                   // centre of the pulse
+  double time_s = 0.0;                   // centre of the pulse; of a mallet: of the touch
   std::optional<Vec3> point_m;           // its nearest point of the surface is struck; or
   std::optional<std::int32_t> triangle;  // the middle of this triangle of the bank
   Vec3 impulse_n_s{};
-  double duration_s = 0.0;  // of the pulse; 0 is an ideal impulse
+  double duration_s = 0.0;         // of the pulse; 0 is an ideal impulse
+  std::optional<Mallet> mallet{};  // in place of impulse and duration
 };
 
 struct Listener {
@@ -75,6 +104,7 @@ struct Quality {
   std::optional<double> silence_pa{};   // below which a body sleeps; nothing: as the planner says
   std::optional<std::int64_t> modes{};  // of all bodies that may ring at once; nothing: all
   double contact_step_s = contact::WorldOptions{}.contact_step_s;
+  bool modes_in_impacts = true;  // impacts are solved with the modes of what rings
   synth::Isa instructions = synth::Isa::kBest;
 };
 

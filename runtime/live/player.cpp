@@ -40,15 +40,17 @@ constexpr double kChangeS = 0.03;  // by which a change of effects is sent befor
 class Course {
  public:
   /// The planner watches what is to be played as soon as it is known.
-  Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks, plan::Planner& planner)
-      : strikes_(host::make_impulses(scene, banks)), planner_(&planner) {
-    std::stable_sort(strikes_.begin(), strikes_.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
-    for (const stream::Impulse& strike : strikes_) planner.watch(strike);
+  Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks, plan::Planner& planner) : planner_(&planner) {
+    host::Strikes strikes = host::make_strikes(scene, banks);
+    for (const std::string& warning : strikes.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", config::printable(warning));
+    strikes_ = std::move(strikes.events);
+    for (const stream::Event& strike : strikes_) planner.watch(strike);
     if (!host::has_physics(scene)) return;
     try {
       world_ =
           std::make_unique<contact::World>(host::make_world(scene), contact::WorldOptions{.contact_step_s = scene.quality.contact_step_s,
                                                                                           .end_s = scene.duration_s,
+                                                                                          .modes = scene.quality.modes_in_impacts,
                                                                                           .lasting_contacts = planner.needs_contacts()});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
@@ -70,11 +72,11 @@ class Course {
   /// Hands on what happens before a time, as far as there is room, and says how far physics has run.
   void hand_on(double until_s, synth::Synthesiser& synthesiser) {
     while (true) {
-      const bool has_strike = next_ < strikes_.size() && strikes_[next_].time_s <= until_s;
+      const bool has_strike = next_ < strikes_.size() && stream::get_time_s(strikes_[next_]) <= until_s;
       const bool has_event = !waiting_.empty() && stream::get_time_s(waiting_.front()) <= until_s;
       if (!has_strike && !has_event) break;
-      const bool takes_strike = has_strike && (!has_event || strikes_[next_].time_s < stream::get_time_s(waiting_.front()));
-      if (!synthesiser.push(takes_strike ? stream::Event(strikes_[next_]) : waiting_.front())) return;  // full: later
+      const bool takes_strike = has_strike && (!has_event || stream::get_time_s(strikes_[next_]) < stream::get_time_s(waiting_.front()));
+      if (!synthesiser.push(takes_strike ? strikes_[next_] : waiting_.front())) return;  // full: later
       if (takes_strike)
         ++next_;
       else
@@ -85,7 +87,7 @@ class Course {
   }
 
  private:
-  std::vector<stream::Impulse> strikes_;
+  std::vector<stream::Event> strikes_;
   plan::Planner* planner_;
   std::size_t next_ = 0;
   std::unique_ptr<contact::World> world_;
@@ -125,6 +127,7 @@ void play(const PlayerOptions& options) {
                                   .microphones_m = microphones.offset_m,
                                   .listener_m = microphones.centre.find(0.0).position_m,
                                   .max_bodies = static_cast<int>(scene.bodies.size()),
+                                  .max_forces = 2048,
                                   .max_waypoints = 1024,
                                   .ring_events = 1 << 14,
                                   .budget = host::calc_budget(scene.quality, rate_hz),

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -27,6 +28,7 @@ namespace {
 using std::numbers::pi;
 using Rule = Reason::Rule;
 constexpr double kRingS = 0.05;
+constexpr std::size_t kMostPulses = 16;  // that come in pieces and may go on
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kAlways = std::numeric_limits<double>::infinity();
 using synth::kContactEffects;
@@ -73,8 +75,9 @@ struct Planner::State {
       stream::Contact strongest;  // of the records since
       stream::Contact last;       // that holds until another comes
     };
-    std::vector<Driving> driving;    // contacts that slide or roll
-    std::vector<double> ring_m2_s2;  // per mode: mean square of q' [kg m^2 / s^2] that contacts have driven, at ring_at_s
+    std::vector<Driving> driving;         // contacts that slide or roll
+    std::vector<stream::Impulse> pulses;  // what is known of those that come in pieces, the last ones
+    std::vector<double> ring_m2_s2;       // per mode: mean square of q' [kg m^2 / s^2] that contacts have driven, at ring_at_s
     double ring_at_s = 0.0;
     EffectSet now;
     bool decided = false;
@@ -115,10 +118,12 @@ struct Planner::State {
   void look(Body& body, double time_s);
   void apply(const Pending& pending);
   void apply(const stream::Impulse& impulse);
+  void apply(const stream::Force& force);
   void apply(const stream::Contact& contact);
   void damp(Body& body, double share, double time_s);
   void find_power(const Body& body, const stream::Contact& contact, std::vector<double>& power);
   double ring(Body& body, const stream::Contact& contact);
+  std::array<synth::Surface, 2> find_surfaces(const stream::Contact& contact) const;
   bool offer(Body& body, const stream::Contact& contact, double time_s);
   EffectSet decide(const BodyFacts& of, Body& body, double time_s) const;
   void add_costs(Body& body);
@@ -242,6 +247,29 @@ void Planner::State::look(Body& body, double time_s) {
   if (moved > limit_m) body.anchor_m = way_m;
 }
 
+/// A pulse that comes in pieces is judged by all of it that is known.
+void Planner::State::apply(const stream::Force& force) {
+  Body& body = bodies[static_cast<std::size_t>(force.body)];
+  const double end_s = force.time_s + force.calc_length_s();
+  const auto goes_on = [&](const stream::Impulse& pulse) {
+    return pulse.other == force.other && pulse.triangle == force.triangle &&
+           std::abs(pulse.time_s + 0.5 * pulse.duration_s - force.time_s) < 0.01 * force.step_s;
+  };
+  auto pulse = force.continues ? std::find_if(body.pulses.begin(), body.pulses.end(), goes_on) : body.pulses.end();
+  if (pulse == body.pulses.end()) {
+    if (body.pulses.size() == kMostPulses) body.pulses.erase(body.pulses.begin());
+    body.pulses.push_back(stream::to_impulse(force));
+    pulse = std::prev(body.pulses.end());
+    pulse->duration_s = force.calc_length_s();
+  } else {
+    const Vec3 more = stream::calc_impulse(force);
+    for (std::size_t k = 0; k < 3; ++k) pulse->impulse_n_s[k] += more[k];
+    pulse->duration_s += force.calc_length_s();
+  }
+  pulse->time_s = end_s - 0.5 * pulse->duration_s;
+  apply(*pulse);
+}
+
 void Planner::State::apply(const stream::Impulse& impulse) {
   Body& body = bodies[static_cast<std::size_t>(impulse.body)];
   const BodyFacts& of = facts.bodies[static_cast<std::size_t>(impulse.body)];
@@ -320,11 +348,9 @@ void Planner::State::apply(const stream::Impulse& impulse) {
   look(body, impulse.time_s);
 }
 
-/// What a lasting contact adds to the mean square of each mode's velocity a second: a quarter of the density of its force.
-void Planner::State::find_power(const Body& body, const stream::Contact& contact, std::vector<double>& power) {
+/// The surfaces of a contact with their moduli: of the body that the record is for, and the other one.
+std::array<synth::Surface, 2> Planner::State::find_surfaces(const stream::Contact& contact) const {
   const BodyFacts& of = facts.bodies[static_cast<std::size_t>(contact.body)];
-  const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
-  power.assign(modes.size(), 0.0);
   const bool has_other = contact.other >= 0 && static_cast<std::size_t>(contact.other) < facts.bodies.size();
   const auto complete = [](synth::Surface surface, const bank::Bank& bank) {
     const double nu = bank.material.poisson_ratio;
@@ -337,6 +363,14 @@ void Planner::State::find_power(const Body& body, const stream::Contact& contact
     const BodyFacts& there = facts.bodies[static_cast<std::size_t>(contact.other)];
     other = complete(there.surface, *there.bank);
   }
+  return {own, other};
+}
+
+/// What a lasting contact adds to the mean square of each mode's velocity a second: a quarter of the density of its force.
+void Planner::State::find_power(const Body& body, const stream::Contact& contact, std::vector<double>& power) {
+  const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
+  power.assign(modes.size(), 0.0);
+  const auto [own, other] = find_surfaces(contact);
   const synth::ContactNoise noise = synth::calc_contact_noise(contact, own, other, facts.rate_hz);
   if (!(noise.give_m > 0.0)) return;
   const double drag = noise.sliding * std::sqrt(own.friction * other.friction), slip = calc_norm(contact.slip_m_s);
@@ -438,9 +472,13 @@ void Planner::State::apply(const stream::Contact& contact) {
   // A dashpot z at the point adds z (phi . n)^2 / 2 to a decay; a decay that is wrong by the part e changes an exposure by e^2 / 2.
   if (!body.bank->calc_projections(contact.triangle, contact.barycentric, contact.normal, projection)) return;
   double most = 0.0, sounding = 0.0;
+  const auto [own, other] = find_surfaces(contact);
+  const synth::ContactSpring spring = synth::calc_contact_spring(contact.patch_radius_m, own.modulus_pa, other.modulus_pa);
   const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
   for (std::size_t m = 0; m < modes.size(); ++m) {
-    const double part = 0.5 * contact.impedance_n_s_m * projection[m] * projection[m] / modes[m].decay_per_s;
+    const double taken = 0.5 * contact.impedance_n_s_m * projection[m] * projection[m] +
+                         synth::calc_spring_loss(spring, 2.0 * std::numbers::pi * modes[m].freq_hz, projection[m]);
+    const double part = taken / modes[m].decay_per_s;
     most = std::max(most, part);
     if (moves || body.quiet_s[m] >= contact.time_s) sounding = std::max(sounding, part);
   }
@@ -458,6 +496,7 @@ void Planner::State::damp(Body& body, double share, double time_s) {
 
 void Planner::State::apply(const Pending& next) {
   if (const auto* impulse = std::get_if<stream::Impulse>(&next.event)) apply(*impulse);
+  if (const auto* force = std::get_if<stream::Force>(&next.event)) apply(*force);
   if (const auto* contact = std::get_if<stream::Contact>(&next.event)) apply(*contact);
   if (const auto* motion = std::get_if<stream::Motion>(&next.event)) {
     Body& body = bodies[static_cast<std::size_t>(motion->body)];
@@ -536,6 +575,9 @@ void Planner::watch(const stream::Event& event) {
     if (!is_ours(impulse->body)) return;
     const double lead = s.bodies[static_cast<std::size_t>(impulse->body)].bank->get_radius_m() / bank::kSoundSpeedMs;
     from_s -= 0.5 * synth::calc_pulse_length(impulse->shape, impulse->duration_s) + lead;
+  } else if (const auto* force = std::get_if<stream::Force>(&event)) {
+    if (!is_ours(force->body)) return;
+    from_s -= s.bodies[static_cast<std::size_t>(force->body)].bank->get_radius_m() / bank::kSoundSpeedMs;
   } else if (const auto* contact = std::get_if<stream::Contact>(&event)) {
     if (!is_ours(contact->body)) return;
   } else if (const auto* motion = std::get_if<stream::Motion>(&event)) {

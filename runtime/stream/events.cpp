@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kBarycentricSlack = 1e-6;
 constexpr double kUnitSlack = 1e-3;
+static_assert(kMostForceSteps == 16, "the number is in the text of a fault");
 
 template <std::size_t n>
 bool is_finite(const std::array<double, n>& x) noexcept {
@@ -59,6 +60,19 @@ const char* find_own_fault(const Impulse& impulse) noexcept {
   return nullptr;
 }
 
+const char* find_own_fault(const Force& force) noexcept {
+  const char* const place = find_place_fault(force.body, force.other, force.triangle, force.barycentric);
+  if (place != nullptr) return place;
+  if (force.count < 1 || force.count > kMostForceSteps) return "the number of steps is not 1 to 16";
+  if (!(is_amount(force.step_s) && force.step_s > 0.0)) return "the length of a step is not above 0";
+  for (int k = 0; k < force.count; ++k) {
+    for (const float x : force.impulse_n_s[static_cast<std::size_t>(k)]) {
+      if (!std::isfinite(x)) return "an impulse is not finite";
+    }
+  }
+  return nullptr;
+}
+
 const char* find_own_fault(const Contact& contact) noexcept {
   const char* const place = find_place_fault(contact.body, contact.other, contact.triangle, contact.barycentric);
   if (place != nullptr) return place;
@@ -82,6 +96,31 @@ const char* find_own_fault(const Motion& motion) noexcept {
 const char* find_own_fault(const Listener& listener) noexcept { return find_moving_fault(listener); }
 
 }  // namespace
+
+Vec3 calc_impulse(const Force& force) noexcept {
+  Vec3 sum{};
+  for (int k = 0; k < force.count; ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += static_cast<double>(force.impulse_n_s[static_cast<std::size_t>(k)][axis]);
+  }
+  return sum;
+}
+
+Impulse to_impulse(const Force& force) noexcept {
+  double weights = 0.0, middle = 0.0;
+  for (int k = 0; k < force.count; ++k) {
+    const auto& [x, y, z] = force.impulse_n_s[static_cast<std::size_t>(k)];
+    const double size = std::hypot(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
+    weights += size;
+    middle += size * (k + 0.5);
+  }
+  const double steps = weights > 0.0 ? middle / weights : 0.5 * force.count;
+  return {.time_s = force.time_s + steps * force.step_s,
+          .body = force.body,
+          .other = force.other,
+          .triangle = force.triangle,
+          .barycentric = force.barycentric,
+          .impulse_n_s = calc_impulse(force)};
+}
 
 double get_time_s(const Event& event) noexcept {
   return std::visit([](const auto& e) noexcept { return e.time_s; }, event);

@@ -1,8 +1,10 @@
-// What physics tells the sound, whoever does the physics: impulses and lasting contacts at points of surfaces, and where bodies and
-// listener are.
+// What physics tells the sound, whoever does the physics: impulses, samples of forces and lasting contacts at points of surfaces, and where
+// bodies and listener are.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <variant>
 
@@ -26,6 +28,48 @@ struct Impulse {
   Vec3 impulse_n_s{};               // on the body
   double duration_s = 0.0;          // contact time; 0: an ideal impulse
 };
+
+/// Steps of a Force: a pulse of an impact has 20 to 40. An event is copied from queue to queue, so a longer pulse is several events.
+inline constexpr int kMostForceSteps = 16;
+
+/// The force of a contact on one body, known step by step: constant in each of `count` steps of equal length. A pulse that has more steps
+/// goes on in another Force, which begins where this one ends. Vectors are in the frame of the body's mesh.
+struct Force {
+  double time_s = 0.0;  // when the first step begins
+  double step_s = 0.0;  // above 0
+  std::int32_t body = 0;
+  std::int32_t other = -1;
+  std::int32_t triangle = 0;
+  std::int16_t count = 0;  // steps, 1 to kMostForceSteps
+  bool continues = false;  // the pulse of the Force before it of this body and place
+  Vec3 barycentric{1.0, 0.0, 0.0};
+  std::array<std::array<float, 3>, kMostForceSteps> impulse_n_s{};  // on the body, of each step; zero beyond `count`
+
+  double calc_length_s() const noexcept { return count * step_s; }
+};
+
+/// Hands a pulse of any length to `sink` as Forces. `first` has everything but count and samples; `impulses_n_s`: a Vec3 for each step.
+template <class Impulses, class Sink>
+void split_force(Force first, const Impulses& impulses_n_s, Sink&& sink) {
+  const double begin_s = first.time_s;
+  for (std::size_t done = 0; done < impulses_n_s.size(); done += kMostForceSteps) {
+    const std::size_t count = std::min<std::size_t>(kMostForceSteps, impulses_n_s.size() - done);
+    Force piece = first;
+    piece.time_s = begin_s + static_cast<double>(done) * first.step_s;
+    piece.count = static_cast<std::int16_t>(count);
+    piece.continues = first.continues || done > 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t axis = 0; axis < 3; ++axis) piece.impulse_n_s[k][axis] = static_cast<float>(impulses_n_s[done + k][axis]);
+    }
+    sink(piece);
+  }
+}
+
+/// The sum of a Force [N s].
+Vec3 calc_impulse(const Force& force) noexcept;
+
+/// The same impulse at once, at the middle of the force in time.
+Impulse to_impulse(const Force& force) noexcept;
 
 enum class ContactState : std::uint8_t { kBegin, kHold, kEnd };
 
@@ -71,12 +115,13 @@ struct Mark {
   double time_s = 0.0;
 };
 
-using Event = std::variant<Mark, Impulse, Contact, Motion, Listener>;
+using Event = std::variant<Mark, Impulse, Force, Contact, Motion, Listener>;
 
 double get_time_s(const Event& event) noexcept;
 
 /// What is wrong with an event, as part of a sentence; nullptr when it can be played: all numbers finite, indices not negative, barycentric
-/// coordinates in [-1e-6, 1 + 1e-6] with sum 1, quaternions of unit length to 1e-3, forces, durations and radii not negative.
+/// coordinates in [-1e-6, 1 + 1e-6] with sum 1, quaternions of unit length to 1e-3, durations, radii and the normal force of a Contact not
+/// negative, a Force of 1 to kMostForceSteps steps of a positive length.
 const char* find_fault(const Event& event) noexcept;
 
 }  // namespace carillon::stream

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -48,6 +49,16 @@ std::string format_numbers(const std::array<double, n>& x) {
   return text + "]";
 }
 
+/// The shortest text of a number in single precision that is read back to the same by way of a double; nearly always that of its own.
+std::string format_number(float x) {
+  std::string text = fmt::format("{}", x);
+  double read = 0.0;
+  std::from_chars(text.data(), text.data() + text.size(), read);
+  if (static_cast<float>(read) != x) return format_number(static_cast<double>(x));
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";
+  return text;
+}
+
 void write(Out out, const Mark& e) { fmt::format_to(out, R"({{"mark": {{"time_s": {}}}}})", format_number(e.time_s)); }
 
 void write(Out out, const Impulse& e) {
@@ -55,6 +66,18 @@ void write(Out out, const Impulse& e) {
                  format_number(e.time_s), e.body, e.other, e.triangle, format_numbers(e.barycentric));
   fmt::format_to(out, R"("impulse_n_s": {}, "duration_s": {}, "shape": "{}"}}}})", format_numbers(e.impulse_n_s),
                  format_number(e.duration_s), kShapeNames[static_cast<std::size_t>(e.shape)]);
+}
+
+void write(Out out, const Force& e) {
+  fmt::format_to(out, R"({{"force": {{"time_s": {}, "step_s": {}, "body": {}, "other": {}, "triangle": {}, "barycentric": {}, )",
+                 format_number(e.time_s), format_number(e.step_s), e.body, e.other, e.triangle, format_numbers(e.barycentric));
+  if (e.continues) fmt::format_to(out, R"("continues": true, )");
+  fmt::format_to(out, R"("impulse_n_s": [)");
+  for (int k = 0; k < e.count; ++k) {
+    const auto& [x, y, z] = e.impulse_n_s[static_cast<std::size_t>(k)];
+    fmt::format_to(out, "{}[{}, {}, {}]", k > 0 ? ", " : "", format_number(x), format_number(y), format_number(z));
+  }
+  fmt::format_to(out, "]}}}}");
 }
 
 void write(Out out, const Contact& e) {
@@ -98,6 +121,22 @@ class EventReader {
     check_size("impulse_n_s", e.impulse_n_s);
     check_size("duration_s", e.duration_s, kLongestPulse);
     e.shape = static_cast<PulseShape>(find(kShapeNames, in_.choice_or("shape", kShapeNames, kShapeNames.front())));
+    return finish(e);
+  }
+
+  Force read_force() {
+    Force e;
+    read_place(e);
+    e.step_s = in_.number("step_s");
+    e.continues = in_.boolean_or("continues", false);
+    check_size("step_s", e.step_s, kLongestPulse / kMostForceSteps);
+    for (const std::vector<double>& row : in_.number_rows("impulse_n_s", 3, kMostForceSteps)) {
+      auto& sample = e.impulse_n_s[static_cast<std::size_t>(e.count++)];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        check_size("impulse_n_s", row[axis]);
+        sample[axis] = static_cast<float>(row[axis]);
+      }
+    }
     return finish(e);
   }
 
@@ -201,11 +240,12 @@ Event parse_event(config::Object line, const std::vector<RecordedBody>& bodies) 
   };
   if (const auto mark = line.object_if("mark")) return finish(EventReader(*mark, bodies).read_mark());
   if (const auto impulse = line.object_if("impulse")) return finish(EventReader(*impulse, bodies).read_impulse());
+  if (const auto force = line.object_if("force")) return finish(EventReader(*force, bodies).read_force());
   if (const auto contact = line.object_if("contact")) return finish(EventReader(*contact, bodies).read_contact());
   if (const auto motion = line.object_if("motion")) return finish(EventReader(*motion, bodies).read_motion());
   if (const auto listener = line.object_if("listener")) return finish(EventReader(*listener, bodies).read_listener());
   line.finish();
-  line.fail("", "this line holds no event; give it a mark, an impulse, a contact, a motion or a listener");
+  line.fail("", "this line holds no event; give it a mark, an impulse, a force, a contact, a motion or a listener");
 }
 
 /// The bodies, and how many events there are, if the line says.

@@ -108,16 +108,17 @@ std::unique_ptr<BodyChange> Body::make_change(EffectSet from, EffectSet to, std:
   change->inherits = model != model_;
   const auto lacks = [&](Effect effect) { return to.has(effect) && (change->inherits || !from.has(effect)); };
   if (lacks(Effect::kModal)) {
-    change->voice = std::make_unique<Voice>(
-        model,
-        VoiceOptions{
-            .max_strikes = frame_.max_strikes, .silence_pa = frame_.silence_pa, .isa = frame_.isa, .audits_energy = frame_.audits_energy});
+    change->voice = std::make_unique<Voice>(model, VoiceOptions{.max_strikes = frame_.max_strikes,
+                                                                .max_forces = frame_.max_forces,
+                                                                .silence_pa = frame_.silence_pa,
+                                                                .isa = frame_.isa,
+                                                                .audits_energy = frame_.audits_energy});
     if (change->inherits && from.has(Effect::kModal)) change->succession = std::make_unique<Succession>(*model_, *model);
   }
   if (lacks(Effect::kAccelerationNoise)) {
-    change->clicker =
-        std::make_unique<Clicker>(Clicker{Click(model->get_sphere_radius_m(), model->get_mass_kg(), frame_.rate_hz, frame_.max_strikes),
-                                          Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
+    change->clicker = std::make_unique<Clicker>(
+        Clicker{Click(model->get_sphere_radius_m(), model->get_mass_kg(), frame_.rate_hz, frame_.max_strikes, frame_.max_forces),
+                Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
   }
   change->modulus_pa = frame_.surface.modulus_pa > 0.0 ? frame_.surface.modulus_pa : model->get_plane_strain_modulus_pa();
   if (needs_contacts(to) && (change->inherits || !needs_contacts(from))) {
@@ -245,23 +246,45 @@ void Body::wake(std::int64_t sample) noexcept {
 }
 
 bool Body::take(const stream::Impulse& impulse, std::int64_t sample) noexcept {
-  wake(sample);
   stream::Impulse own = impulse;
   if (!has(effects_, Effect::kHertzPulse)) own.duration_s = 0.0;
+  return play(own, own.duration_s > 0.0, true, sample);
+}
+
+bool Body::take(const stream::Force& force, std::int64_t sample) noexcept {
+  if (has(effects_, Effect::kHertzPulse)) return play(force, true, !force.continues, sample);
+  return play(stream::to_impulse(force), false, !force.continues, sample);
+}
+
+/// To a voice or a click.
+template <class Player, class... Attitudes>
+bool hit(Player& player, const stream::Impulse& impulse, const Attitudes&... attitude) noexcept {
+  return player.strike(impulse, attitude...);
+}
+template <class Player, class... Attitudes>
+bool hit(Player& player, const stream::Force& force, const Attitudes&... attitude) noexcept {
+  return player.push(force, attitude...);
+}
+
+/// To all who play pulses. What goes on with a pulse is none of its own.
+template <class Strike>
+bool Body::play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept {
+  wake(sample);
+  Strike own = strike;
   bool is_taken = false, is_refused = false;
   if (has(effects_, Effect::kModal) && voice_) {
-    own.time_s = impulse.time_s - static_cast<double>(first_) / frame_.rate_hz;
+    own.time_s = strike.time_s - static_cast<double>(first_) / frame_.rate_hz;
     const std::int64_t late = voice_->get_counters().late;
-    (voice_->strike(own) ? is_taken : is_refused) = true;
+    (hit(*voice_, own) ? is_taken : is_refused) = true;
     work_.late += voice_->get_counters().late - late;
   }
   if (has(effects_, Effect::kAccelerationNoise) && clicker_) {
-    own.time_s = impulse.time_s - static_cast<double>(clicker_->first) / frame_.rate_hz;
-    (clicker_->click.strike(own, clicker_->attitude.find(impulse.time_s)) ? is_taken : is_refused) = true;
+    own.time_s = strike.time_s - static_cast<double>(clicker_->first) / frame_.rate_hz;
+    (hit(clicker_->click, own, clicker_->attitude.find(strike.time_s)) ? is_taken : is_refused) = true;
   }
   if (is_taken) {
-    ++work_.strikes;
-    if (own.duration_s > 0.0) ++work_.units[Effect::kHertzPulse];
+    work_.strikes += static_cast<std::int64_t>(is_new);
+    if (has_length) ++work_.units[Effect::kHertzPulse];
   }
   if (is_refused) ++work_.refused;
   return is_taken;

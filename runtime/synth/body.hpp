@@ -25,7 +25,7 @@ namespace carillon::synth {
 struct BodyFrame {
   double rate_hz = 0.0;
   std::vector<Vec3> microphones_m;  // from the listener
-  int max_strikes = 0;
+  int max_strikes = 0, max_forces = 0;
   int max_waypoints = 0;
   double longest_m = 0.0;
   double silence_pa = 1e-10;
@@ -112,6 +112,7 @@ class Body {
 
   /// `sample`: the first that is not rendered. False when no effect could take it.
   bool take(const stream::Impulse& impulse, std::int64_t sample) noexcept;
+  bool take(const stream::Force& force, std::int64_t sample) noexcept;
   /// `other`: the surface of the other body.
   bool take(const stream::Contact& contact, const Surface& other, std::int64_t sample) noexcept;
   bool take(const stream::Motion& motion) noexcept;
@@ -131,6 +132,8 @@ class Body {
   float calc_nearness(const Track& listener, std::int64_t sample) const noexcept;
 
  private:
+  template <class Strike>
+  bool play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept;
   void wake(std::int64_t sample) noexcept;
   void put_contacts(BodyChange& change) noexcept;
   void make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept;

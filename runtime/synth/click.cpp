@@ -31,7 +31,7 @@ Vec3 turn(const stream::Quaternion& rotation, const Vec3& x) noexcept {
 
 }  // namespace
 
-Click::Click(double radius_m, double mass_kg, double sample_rate_hz, int max_strikes) : rate_hz_(sample_rate_hz) {
+Click::Click(double radius_m, double mass_kg, double sample_rate_hz, int max_strikes, int max_forces) : rate_hz_(sample_rate_hz) {
   const bool fit = radius_m > 0.0 && mass_kg > 0.0 && sample_rate_hz > 0.0 && std::isfinite(radius_m / mass_kg * sample_rate_hz);
   if (!fit) throw InputError("acceleration noise needs a positive radius, mass and sample rate");
   radius_s_ = std::max(radius_m / bank::kSoundSpeedMs, 1.0 / (kMostSubsteps * sample_rate_hz));
@@ -51,6 +51,7 @@ Click::Click(double radius_m, double mass_kg, double sample_rate_hz, int max_str
   const Moments coefficient_re = calc_chebyshev_coefficients(re), coefficient_im = calc_chebyshev_coefficients(im);
   for (int j = 0; j < kMoments; ++j) force_[j] = {coefficient_re[j], coefficient_im[j]};
   pulses_.reserve(static_cast<std::size_t>(std::max(max_strikes, 1)));
+  forces_.reserve(static_cast<std::size_t>(std::max(max_forces, 0)));
 }
 
 bool Click::strike(const stream::Impulse& impulse, const stream::Quaternion& to_world) noexcept {
@@ -68,9 +69,35 @@ bool Click::strike(const stream::Impulse& impulse, const stream::Quaternion& to_
   return true;
 }
 
+bool Click::push(const stream::Force& force, const stream::Quaternion& to_world) noexcept {
+  Steps steps;
+  steps.begin = (force.time_s - radius_s_) * rate_hz_;
+  steps.step = std::max(force.step_s * rate_hz_, kShortestStep);
+  steps.count = force.count;
+  bool sane = std::isfinite(steps.begin) && std::isfinite(steps.step) && force.step_s > 0.0 && steps.count >= 1 &&
+              steps.count <= stream::kMostForceSteps && forces_.size() < forces_.capacity();
+  for (std::size_t k = 0; sane && k < static_cast<std::size_t>(steps.count); ++k) {
+    const auto& [x, y, z] = force.impulse_n_s[k];
+    const Vec3 turned = turn(to_world, {x, y, z});
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sane = sane && std::isfinite(turned[axis]);
+      steps.impulse_n_s[k][axis] = static_cast<float>(turned[axis]);
+    }
+  }
+  if (!sane) {
+    ++refused_;
+    return false;
+  }
+  const double earliest = static_cast<double>(position_ - 1);
+  if (!(steps.begin > earliest)) steps.begin = std::nextafter(earliest, earliest + 1.0);
+  forces_.push_back(steps);
+  return true;
+}
+
 void Click::reset() noexcept {
   state_.fill(0.0);
   pulses_.clear();
+  forces_.clear();
   awake_ = false;
 }
 
@@ -83,6 +110,13 @@ void Click::take_over(const Click& other) noexcept {
   for (const Pulse& pulse : other.pulses_) {
     if (pulses_.size() < pulses_.capacity())
       pulses_.push_back(pulse);
+    else
+      ++refused_;
+  }
+  forces_.clear();
+  for (const Steps& steps : other.forces_) {
+    if (forces_.size() < forces_.capacity())
+      forces_.push_back(steps);
     else
       ++refused_;
   }
@@ -99,6 +133,24 @@ Click::Complex Click::calc_answer(const Pulse& pulse) const noexcept {
     for (int j = 0; j < kMoments; ++j) sum += moments[j] * force_[j];
   }
   return sum;
+}
+
+/// What a force adds to the state over the sample at position_.
+void Click::add_answer(const Steps& steps) noexcept {
+  const double begin = steps.begin - static_cast<double>(position_ - 1);
+  std::array<Complex, 3> sum{};
+  for (int part = 0; part < substeps_; ++part) {
+    for (Complex& z : sum) z *= sub_turn_;
+    for (int k = 0; k < steps.count; ++k) {
+      const Moments moments = calc_level_moments((begin + k * steps.step) * substeps_ - part, steps.step * substeps_);
+      if (moments[0] == 0.0) continue;
+      Complex answer = 0.0;
+      for (int j = 0; j < kMoments; ++j) answer += moments[j] * force_[j];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        sum[axis] += static_cast<double>(steps.impulse_n_s[static_cast<std::size_t>(k)][axis]) * answer;
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) state_[axis] += sum[axis];
 }
 
 void Click::process(const std::array<std::span<float>, 3>& dipole_pa) noexcept {
@@ -127,6 +179,12 @@ void Click::process(const std::array<std::span<float>, 3>& dipole_pa) noexcept {
         ++k;
       }
     }
+    for (const Steps& steps : forces_) {
+      if (steps.begin > static_cast<double>(position_)) continue;
+      add_answer(steps);
+      awake_ = true;
+    }
+    std::erase_if(forces_, [this](const Steps& steps) { return steps.begin + steps.count * steps.step <= static_cast<double>(position_); });
     for (std::size_t axis = 0; axis < 3; ++axis) {
       dipole_pa[axis][i] = awake_ ? static_cast<float>(gain_ * (state_[axis].real() - state_[axis].imag())) : 0.0F;
     }

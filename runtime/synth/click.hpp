@@ -19,12 +19,15 @@ namespace carillon::synth {
 class Click {
  public:
   /// Throws InputError when radius [m], mass [kg] or rate is not a positive number.
-  Click(double radius_m, double mass_kg, double sample_rate_hz, int max_strikes = 256);
+  Click(double radius_m, double mass_kg, double sample_rate_hz, int max_strikes = 256, int max_forces = 256);
 
   /// Registers a pulse; the impulse is turned from the body's frame into the world's by `to_world`. Sound comes from the surface that is
   /// nearest to the listener, radius / c earlier than from the centre, at which ears place it: the pulse begins to act by so much before
   /// its time. False when it was refused: not finite, or no room. [audio-thread]: no heap, no lock, no throw.
   bool strike(const stream::Impulse& impulse, const stream::Quaternion& to_world) noexcept;
+
+  /// The same for a force that is known step by step.
+  bool push(const stream::Force& force, const stream::Quaternion& to_world) noexcept;
 
   /// How long before its beginning a strike has to be known.
   double get_lead_s() const { return radius_s_; }
@@ -35,7 +38,7 @@ class Click {
 
   bool is_awake() const { return awake_; }
   /// process() would only give zeros.
-  bool is_idle() const { return !awake_ && pulses_.empty(); }
+  bool is_idle() const { return !awake_ && pulses_.empty() && forces_.empty(); }
   /// As process() of so many samples of a click that is idle, whose zeros nobody wants. [audio-thread]
   void skip(std::int64_t samples) noexcept { position_ += samples; }
   /// Silence; no pulse is left. [audio-thread]
@@ -44,7 +47,7 @@ class Click {
   /// does. [audio-thread]
   void take_over(const Click& other) noexcept;
   /// Memory that it has taken.
-  std::size_t calc_bytes() const { return sizeof(Click) + pulses_.capacity() * sizeof(Pulse); }
+  std::size_t calc_bytes() const { return sizeof(Click) + pulses_.capacity() * sizeof(Pulse) + forces_.capacity() * sizeof(Steps); }
   std::int64_t get_refused() const { return refused_; }
 
  private:
@@ -55,7 +58,14 @@ class Click {
     std::array<double, 3> impulse_n_s{};
   };
 
+  struct Steps {
+    double begin = 0.0, step = 0.0;  // in samples
+    int count = 0;
+    std::array<std::array<float, 3>, stream::kMostForceSteps> impulse_n_s{};
+  };
+
   Complex calc_answer(const Pulse& pulse) const noexcept;
+  void add_answer(const Steps& steps) noexcept;
 
   double rate_hz_ = 0.0;
   double radius_s_ = 0.0;                // radius / c
@@ -66,6 +76,7 @@ class Click {
   Complex sub_turn_;
   std::array<Complex, 3> state_{};  // (q' + q c / a) + i q c / a along x, y, z
   std::vector<Pulse> pulses_;       // capacity max_strikes, never grown
+  std::vector<Steps> forces_;       // capacity max_forces, never grown
   std::int64_t position_ = 0;
   std::int64_t refused_ = 0;
   bool awake_ = false;

@@ -53,6 +53,13 @@ double calc_pair_modulus(double own_pa, double other_pa) noexcept {
   return own_pa > 0.0 && other_pa > 0.0 ? 1.0 / (1.0 / own_pa + 1.0 / other_pa) : 0.0;
 }
 
+/// Of a body at a contact, by its plane-strain modulus: what is as stiff as metal or stone loses little, wood and plastics ten times that.
+double calc_contact_loss(double modulus_pa) noexcept {
+  constexpr double kHardPa = 50e9, kSoftPa = 10e9, kHard = 0.01, kSoft = 0.1;
+  const double share = std::clamp(std::log(kHardPa / modulus_pa) / std::log(kHardPa / kSoftPa), 0.0, 1.0);
+  return kHard * std::pow(kSoft / kHard, share);
+}
+
 /// Of the movement over the surfaces so much is slip.
 double calc_sliding(double slip_m_s, double sweep_m_s, double other_sweep_m_s) noexcept {
   return slip_m_s <= 0.0 ? 0.0 : std::min(1.0, slip_m_s / std::max({sweep_m_s, other_sweep_m_s, slip_m_s}));
@@ -119,6 +126,17 @@ ContactNoise calc_contact_noise(const stream::Contact& contact, const Surface& o
                      .modulus_pa = calc_pair_modulus(own.modulus_pa, other.modulus_pa),
                      .rate_hz = rate_hz},
                     texture, other_texture);
+}
+
+ContactSpring calc_contact_spring(double patch_m, double own_pa, double other_pa) noexcept {
+  const double modulus_pa = calc_pair_modulus(own_pa, other_pa);
+  if (!(modulus_pa > 0.0) || !(patch_m > 0.0)) return {};
+  return {2.0 * modulus_pa * patch_m, modulus_pa * (calc_contact_loss(own_pa) / own_pa + calc_contact_loss(other_pa) / other_pa)};
+}
+
+double calc_spring_loss(const ContactSpring& spring, double omega_rad_s, double shape_along) noexcept {
+  const double stiffness = spring.stiffness_n_m * shape_along * shape_along;
+  return stiffness > 0.0 ? 0.5 * spring.loss_factor * omega_rad_s * stiffness / (omega_rad_s * omega_rad_s + stiffness) : 0.0;
 }
 
 double calc_density(const ContactNoise& noise, double force_n, double freq_hz) noexcept {
@@ -390,6 +408,12 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
   }
   const double drag = rough * slot.friction / (slip + kSticking);
   const double brake = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
+  if (brake > 0.0) {
+    const ContactSpring spring = calc_contact_spring(values.patch_m, surface_.modulus_pa, slot.other_modulus_pa);
+    // k phi_n^2 / omega^2 is k / (Z / (2 rate)) times the damping by Z, over the square of the mode's angle, in samples.
+    node.give = static_cast<float>(std::min(1e30, 2.0 * spring.stiffness_n_m / (values.impedance * rate_hz_)));
+    node.half_loss = static_cast<float>(0.5 * spring.loss_factor);
+  }
   find_rows(node);
   for (int corner = 0; corner < 3; ++corner) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -410,6 +434,8 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
     std::copy(nodes[end]->row.begin(), nodes[end]->row.end(), push[end].row);
     std::copy(nodes[end]->force.begin(), nodes[end]->force.end(), push[end].force);
     std::copy(nodes[end]->brake.begin(), nodes[end]->brake.end(), push[end].brake);
+    push[end].give = nodes[end]->give;
+    push[end].half_loss = nodes[end]->half_loss;
     std::fill(std::begin(push[end].signal), std::end(push[end].signal), 0.0F);
   }
   bool damps = false;

@@ -47,6 +47,18 @@ struct ContactNoise {
 /// As ContactForces has it for a record that acts on a body of the surface `own`; both with their moduli. No throw; any thread.
 ContactNoise calc_contact_noise(const stream::Contact& contact, const Surface& own, const Surface& other, double rate_hz) noexcept;
 
+/// The spring of a contact as a mode meets it, however little it moves.
+struct ContactSpring {
+  double stiffness_n_m = 0.0;  // 2 E* a
+  double loss_factor = 0.0;    // of both bodies there, each by its part of the give
+};
+
+/// Of a patch of that radius between surfaces of these plane-strain moduli; of stiffness 0 where one of them has none.
+ContactSpring calc_contact_spring(double patch_m, double own_pa, double other_pa) noexcept;
+
+/// What the spring takes of a mode [1/s]: eta omega / 2 times the spring's share of the energy, k phi_n^2 / (omega^2 + k phi_n^2).
+double calc_spring_loss(const ContactSpring& spring, double omega_rad_s, double shape_along) noexcept;
+
 /// One-sided density [N^2 / Hz] of the noise under the load at a frequency, at least as large as it is: of heights whose density falls with
 /// a power of the frequency, as these do, the exponential's is e^(s^2) times that of the linear spring.
 double calc_density(const ContactNoise& noise, double force_n, double freq_hz) noexcept;
@@ -78,7 +90,8 @@ struct ContactCounters {
 /// by the patch as it rolls. What is slower than sqrt(g / u), where a body that its weight presses on u bounces, does not press: the body
 /// rides over it. While one surface slides on the other (its share is slip over the larger sweep) friction follows, -mu f along the slip.
 /// What moves at less than 0.2 mm/s is at rest and gives no force at all. Damping: the impedance Z of the other body at the point takes Z
-/// (phi.n)^2 / 2 [1/s] of each mode (docs/decisions/contact-sound.md).
+/// (phi.n)^2 / 2 [1/s] of each mode, and the contact's spring what it loses
+/// however little it is moved: calc_spring_loss() (docs/decisions/contact-sound.md).
 ///
 /// Memory is taken in the constructor only. One thread at a time.
 class ContactForces {
@@ -138,6 +151,7 @@ class ContactForces {
     double level = 0.0;  // 0..1: its rise and its fall
     ContactNoise noise;
     std::array<float, kStrikeRows> force{}, brake{};
+    float give = 0.0F, half_loss = 0.0F;  // as Push has them
     std::array<const std::int16_t*, kStrikeRows> row{};
   };
   struct Slot {

@@ -63,6 +63,8 @@ struct Push {
   const std::int16_t* row[kStrikeRows];  // [mode]
   float force[kStrikeRows];              // times row and signal: the force on a mode
   float brake[kStrikeRows];              // times row, squared: the damping of a mode by this contact, over a sample
+  float give, half_loss;                 // b, the same, makes b give / (angle^2 + b give) the contact spring's share of the energy, and
+                                         // angle times half_loss times that the damping by the spring
   float signal[kQuantum + 1];            // N, at each sample of the quantum and the first one after it; linear between them
   bool forces;                           // signal is not all zero
 };

@@ -203,7 +203,8 @@ inline F calc_brake(const Drive& drive, int end, int mode, F scale, F angle) noe
     F along = F::zero();
     for (int i = 0; i < kStrikeRows; ++i) along = fma(F::all(push.brake[i]), F::convert(push.row[i] + mode), along);
     along = along * scale;
-    x = fma(along, along, x);
+    const F taken = along * along, spring = F::all(push.give) * taken;
+    x = x + taken + F::all(push.half_loss) * angle * spring / (angle * angle + spring + F::all(1e-30F));
   }
   x = x * angle / (angle + x + F::all(1e-30F));
   const F p = fma(fma(x, F::all(1.0F / 6.0F), F::all(0.5F)), x * x, x);

@@ -209,6 +209,26 @@ Moments calc_pulse_moments(PulseShape shape, double start, double length) noexce
   return shape == PulseShape::kHertz ? calc_hertz_moments(start, length) : calc_gauss_moments(start, length);
 }
 
+Moments calc_level_moments(double start, double length) noexcept {
+  const double from = std::clamp(start, 0.0, 1.0), to = std::clamp(start + length, 0.0, 1.0);
+  if (!(to > from)) return {};
+  // The integral of T_j(x) is (T_{j+1}(x) / (j + 1) - T_{j-1}(x) / (j - 1)) / 2, and dx = 2 du.
+  const double x = 2.0 * from - 1.0, y = 2.0 * to - 1.0;
+  std::array<double, kMoments + 1> tx{1.0, x}, ty{1.0, y};
+  for (std::size_t j = 2; j < tx.size(); ++j) {
+    tx[j] = 2.0 * x * tx[j - 1] - tx[j - 2];
+    ty[j] = 2.0 * y * ty[j - 1] - ty[j - 2];
+  }
+  Moments moments{};
+  moments[0] = (to - from) / length;
+  moments[1] = moments[0] * (from + to - 1.0);
+  for (std::size_t j = 2; j < kMoments; ++j) {
+    const auto n = static_cast<double>(j);
+    moments[j] = 0.25 * ((ty[j + 1] - tx[j + 1]) / (n + 1.0) - (ty[j - 1] - tx[j - 1]) / (n - 1.0)) / length;
+  }
+  return moments;
+}
+
 std::array<double, kMoments> get_chebyshev_points() noexcept {
   std::array<double, kMoments> points{};
   for (int k = 0; k < kMoments; ++k) points[k] = 0.5 * (1.0 + std::cos(pi * (k + 0.5) / kMoments));

@@ -28,6 +28,11 @@ double calc_pulse(PulseShape shape, double x) noexcept;
 /// throw; any thread.
 Moments calc_pulse_moments(PulseShape shape, double start, double length) noexcept;
 
+/// The same of a force that is constant from `start` to `start + length`, in closed form; right to 1e-10 for lengths of at least
+/// kShortestStep.
+inline constexpr double kShortestStep = 1e-6;
+Moments calc_level_moments(double start, double length) noexcept;
+
 /// T_j(2 u - 1) for all j.
 Moments calc_chebyshev(double u) noexcept;
 

@@ -65,7 +65,14 @@ void Voice::take_over(Voice& other, Succession& succession) noexcept {
       continue;
     }
     pulses_.push_back(pulse);
-    find_rows(pulses_.back());
+    find_rows(pulses_.back().triangle, pulses_.back().row);
+  }
+  forces_.clear();
+  for (const Steps& steps : other.forces_) {
+    if (forces_.size() == forces_.capacity() || static_cast<std::size_t>(steps.triangle) >= model_->triangles_.size())
+      ++counters_.refused;
+    else
+      forces_.push_back(steps);
   }
   fade_.fill(0.0F);
   inherits_ = other.is_awake();

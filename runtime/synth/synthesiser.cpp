@@ -35,7 +35,8 @@ SynthesiserOptions check(SynthesiserOptions options) {
     if (!std::isfinite(x)) refuse("a listener at a finite place");
   if (const char* fault = find_fault(options.ground); fault != nullptr) throw InputError(std::string("ground: ") + fault);
   if (options.max_bodies < 1 || options.max_bodies > kMostBodies) refuse("room for one to 1,048,576 bodies");
-  if (options.max_strikes < 1 || options.max_waypoints < 2 || options.ring_events < 1) refuse("room for strikes, waypoints and events");
+  if (options.max_strikes < 1 || options.max_forces < 0 || options.max_waypoints < 2 || options.ring_events < 1)
+    refuse("room for strikes, waypoints and events");
   if (!(options.longest_m > 0.0 && options.longest_m < 1e5)) refuse("a longest distance below 100 km");
   return options;
 }
@@ -112,6 +113,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                              BodyFrame{.rate_hz = options_.rate_hz,
                                        .microphones_m = options_.microphones_m,
                                        .max_strikes = options_.max_strikes,
+                                       .max_forces = settings.max_forces >= 0 ? settings.max_forces : options_.max_forces,
                                        .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
                                        .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
                                        .silence_pa = settings.silence_pa,
@@ -296,15 +298,16 @@ void Synthesiser::watch_marks() noexcept {
   is_overtaken_ = is_overtaken;
 }
 
-void Synthesiser::take(const stream::Impulse& impulse) noexcept {
-  Body* body = find_body(impulse.body);
+template <class Strike>
+void Synthesiser::take_strike(const Strike& strike) noexcept {
+  Body* body = find_body(strike.body);
   if (body == nullptr) return;
   count(*body, [&] {
-    if (!body->take(impulse, sample_)) return;
-    set_awake(impulse.body);
+    if (!body->take(strike, sample_)) return;
+    set_awake(strike.body);
     give_floor(*body);
   });
-  publish(impulse.body);
+  publish(strike.body);
 }
 
 void Synthesiser::take(const stream::Contact& contact) noexcept {
@@ -332,7 +335,8 @@ void Synthesiser::take_events() noexcept {
   stream::Event event;
   while (ring_.pop(event)) {
     if (const auto* mark = std::get_if<stream::Mark>(&event)) take(*mark);
-    if (const auto* impulse = std::get_if<stream::Impulse>(&event)) take(*impulse);
+    if (const auto* impulse = std::get_if<stream::Impulse>(&event)) take_strike(*impulse);
+    if (const auto* force = std::get_if<stream::Force>(&event)) take_strike(*force);
     if (const auto* contact = std::get_if<stream::Contact>(&event)) take(*contact);
     if (const auto* motion = std::get_if<stream::Motion>(&event)) take(*motion);
     if (const auto* listener = std::get_if<stream::Listener>(&event)) take(*listener);

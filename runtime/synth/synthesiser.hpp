@@ -36,7 +36,8 @@ struct SynthesiserOptions {
   std::vector<Vec3> microphones_m{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}};
   Vec3 listener_m{};
   int max_bodies = 64;
-  int max_strikes = 64;                                     // that a body may have waiting or acting at once
+  int max_strikes = 64;                                     // pulses that a body may have waiting or acting at once
+  int max_forces = 128;                                     // stream::Forces that it may
   int max_waypoints = 64;                                   // of a body's way that are remembered
   int ring_events = 4096;                                   // that may wait between two calls of process()
   double longest_m = 60.0;                                  // what is further away is not heard
@@ -54,6 +55,7 @@ struct BodySettings {
   Surface surface{};          // what contacts that last touch
   double longest_m = 0.0;     // as in SynthesiserOptions; 0: what it says there
   int max_waypoints = 0;
+  int max_forces = -1;  // as there; -1: what it says there
   Isa isa = Isa::kBest;
   bool audits_energy = false;  // get_energy_rise()
 };
@@ -74,7 +76,7 @@ struct EffectCounters {
 
 /// Since the beginning.
 struct SynthesiserCounters {
-  std::int64_t strikes = 0;       // played
+  std::int64_t strikes = 0;       // played; a pulse of several stream::Forces is one
   std::int64_t refused = 0;       // events for a body that is not there, strikes outside its surface or for which it has no room
   std::int64_t late = 0;          // strikes that began before the horizon and were moved there
   std::int64_t faults = 0;        // events that cannot be played (stream::find_fault)
@@ -200,7 +202,8 @@ class Synthesiser {
   void take_events() noexcept;
   void take(const stream::Mark& mark) noexcept;
   void watch_marks() noexcept;
-  void take(const stream::Impulse& impulse) noexcept;
+  template <class Strike>
+  void take_strike(const Strike& strike) noexcept;
   void take(const stream::Contact& contact) noexcept;
   void take(const stream::Motion& motion) noexcept;
   void take(const stream::Listener& listener) noexcept;

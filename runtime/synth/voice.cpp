@@ -22,6 +22,14 @@ constexpr bool kHasContacts = kCompiledEffects.has_any(kContactEffects);
 constexpr std::int64_t kCullEvery = 8;  // periods
 
 bool is_finite(const stream::Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
+stream::Vec3 widen(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+double dot(const stream::Vec3& a, const stream::Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+stream::Vec3 subtract(const stream::Vec3& a, double s, const stream::Vec3& b) {
+  return {a[0] - s * b[0], a[1] - s * b[1], a[2] - s * b[2]};
+}
+
+// A direction that the samples of a force have no more of than this share of the largest is rounding of single precision.
+constexpr double kParallel = 3e-7;
 
 }  // namespace
 
@@ -36,6 +44,7 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
   bounds_.resize(model_->sound_.size());
   damped_amplitude_.resize(model_->damped_.size());
   pulses_.reserve(static_cast<std::size_t>(std::max(1, options.max_strikes)));
+  forces_.reserve(static_cast<std::size_t>(std::max(0, options.max_forces)));
 }
 
 bool Voice::strike(const stream::Impulse& impulse) noexcept {
@@ -50,12 +59,7 @@ bool Voice::strike(const stream::Impulse& impulse) noexcept {
   pulse.shape = impulse.shape;
   pulse.length = calc_pulse_length(impulse.shape, impulse.duration_s * model_->rate_hz_);
   pulse.begin = impulse.time_s * model_->rate_hz_ - 0.5 * pulse.length;
-  // The sample at the horizon is still to come: what happens after the one before it can still be heard.
-  const double earliest = static_cast<double>(horizon_ - 1);
-  if (!(pulse.begin > earliest)) {
-    pulse.begin = std::nextafter(earliest, earliest + 1.0);
-    ++counters_.late;
-  }
+  begin_in_time(pulse.begin);
   pulse.strength_n_s = static_cast<float>(std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]));
   pulse.triangle = impulse.triangle;
   for (int corner = 0; corner < 3; ++corner) {
@@ -63,17 +67,91 @@ bool Voice::strike(const stream::Impulse& impulse) noexcept {
       pulse.weight[corner * 3 + axis] = static_cast<float>(impulse.barycentric[corner] * impulse.impulse_n_s[axis]);
     }
   }
-  find_rows(pulse);
+  find_rows(pulse.triangle, pulse.row);
   pulses_.push_back(pulse);
   ++counters_.accepted;
   return true;
 }
 
-void Voice::find_rows(Pulse& pulse) const noexcept {
-  const auto& triangle = model_->triangles_[static_cast<std::size_t>(pulse.triangle)];
-  for (int corner = 0; corner < 3; ++corner) {
-    for (int axis = 0; axis < 3; ++axis) pulse.row[corner * 3 + axis] = model_->get_row(triangle[corner], axis);
+/// The sample at the horizon is still to come: what happens after the one before it can still be heard. What is earlier moves there.
+void Voice::begin_in_time(double& begin) noexcept {
+  const double earliest = static_cast<double>(horizon_ - 1);
+  if (begin > earliest) return;
+  begin = std::nextafter(earliest, earliest + 1.0);
+  ++counters_.late;
+}
+
+bool Voice::push(const stream::Force& force) noexcept {
+  bool sane = std::isfinite(force.time_s) && std::isfinite(force.step_s) && force.step_s > 0.0 && force.count >= 1 &&
+              force.count <= stream::kMostForceSteps && is_finite(force.barycentric) && force.triangle >= 0 &&
+              static_cast<std::size_t>(force.triangle) < model_->triangles_.size();
+  for (std::size_t k = 0; sane && k < static_cast<std::size_t>(force.count); ++k) sane = is_finite(widen(force.impulse_n_s[k]));
+  if (!sane || forces_.size() == forces_.capacity()) {
+    ++counters_.refused;
+    return false;
   }
+  Steps steps{};
+  steps.begin = force.time_s * model_->rate_hz_;
+  steps.step = std::max(force.step_s * model_->rate_hz_, kShortestStep);
+  begin_in_time(steps.begin);
+  steps.triangle = force.triangle;
+  steps.count = force.count;
+  for (std::size_t corner = 0; corner < 3; ++corner) steps.barycentric[corner] = static_cast<float>(force.barycentric[corner]);
+  // Directions one by one, each that of the largest sample of what is left.
+  std::array<stream::Vec3, stream::kMostForceSteps> left{};
+  const auto count = static_cast<std::size_t>(force.count);
+  double strength = 0.0, largest = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    left[k] = widen(force.impulse_n_s[k]);
+    strength += std::sqrt(dot(left[k], left[k]));
+  }
+  steps.strength_n_s = static_cast<float>(strength);
+  for (; steps.axes < 3; ++steps.axes) {
+    const auto most =
+        std::max_element(left.begin(), left.begin() + force.count, [](const auto& a, const auto& b) { return dot(a, a) < dot(b, b); });
+    const double size = std::sqrt(dot(*most, *most));
+    if (steps.axes == 0) largest = size;
+    if (!(size > kParallel * largest)) break;
+    const stream::Vec3 unit{(*most)[0] / size, (*most)[1] / size, (*most)[2] / size};
+    for (std::size_t axis = 0; axis < 3; ++axis) steps.axis[steps.axes][axis] = static_cast<float>(unit[axis]);
+    for (std::size_t k = 0; k < count; ++k) {
+      const double along = dot(left[k], unit);
+      steps.along[steps.axes][k] = static_cast<float>(along);
+      left[k] = subtract(left[k], along, unit);
+    }
+  }
+  if (steps.axes > 0) forces_.push_back(steps);
+  ++counters_.accepted;
+  return true;
+}
+
+void Voice::find_rows(std::int32_t triangle, const std::int16_t** row) const noexcept {
+  const auto& corners = model_->triangles_[static_cast<std::size_t>(triangle)];
+  for (int corner = 0; corner < 3; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) row[corner * 3 + axis] = model_->get_row(corners[corner], axis);
+  }
+}
+
+/// Rows and weights of touch_ for a unit impulse along one direction of a force.
+void Voice::find_touch(const Steps& steps, int axis) noexcept {
+  find_rows(steps.triangle, touch_.row);
+  for (int corner = 0; corner < 3; ++corner) {
+    for (int k = 0; k < 3; ++k) touch_.weight[corner * 3 + k] = steps.barycentric[corner] * steps.axis[axis][k];
+  }
+}
+
+/// The moments of a force over one interval, in which its first step begins at `begin` and steps have the length `step`.
+Voice::StepMoments Voice::calc_moments(const Steps& steps, double begin, double step) {
+  StepMoments sum{};
+  const int first = static_cast<int>(std::clamp(std::floor(-begin / step), 0.0, static_cast<double>(steps.count)));
+  for (int k = first; k < steps.count && begin + k * step < 1.0; ++k) {
+    const Moments moments = calc_level_moments(begin + k * step, step);
+    for (int axis = 0; axis < steps.axes; ++axis) {
+      const double along = steps.along[axis][k];
+      for (int j = 0; j < kMoments; ++j) sum[axis][j] += along * moments[j];
+    }
+  }
+  return sum;
 }
 
 void Voice::process(std::span<float> pressure_pa) noexcept {
@@ -107,7 +185,8 @@ void Voice::render(int quanta) noexcept {
     cut_ = groups_;
     if (start / kPeriod % kCullEvery == 0 && is_awake()) cull();
   }
-  silent_ = !is_awake() && !fading_ && pulses_.empty() && (!kHasContacts || contacts_ == nullptr || contacts_->is_resting());
+  silent_ =
+      !is_awake() && !fading_ && pulses_.empty() && forces_.empty() && (!kHasContacts || contacts_ == nullptr || contacts_->is_resting());
   if (silent_) return;
   const bool touched = kHasContacts && contacts_ != nullptr && !contacts_->is_idle();
   std::fill(block_.begin(), block_.begin() + rendered_, 0.0F);
@@ -152,6 +231,7 @@ void Voice::render(int quanta) noexcept {
   }
   const auto heard = static_cast<double>(horizon_ - 1);
   std::erase_if(pulses_, [heard](const Pulse& pulse) { return pulse.begin + pulse.length <= heard; });
+  std::erase_if(forces_, [heard](const Steps& steps) { return steps.calc_end() <= heard; });
 }
 
 /// Whether a pulse acts in the quantum that begins at `sample`. The interval of sample n is (n - 1, n].
@@ -160,6 +240,9 @@ bool Voice::is_struck(std::int64_t sample) const noexcept {
     if (pulse.begin <= static_cast<double>(sample + kQuantum - 1) && pulse.begin + pulse.length > static_cast<double>(sample - 1)) {
       return true;
     }
+  }
+  for (const Steps& steps : forces_) {
+    if (steps.begin <= static_cast<double>(sample + kQuantum - 1) && steps.calc_end() > static_cast<double>(sample - 1)) return true;
   }
   return false;
 }
@@ -197,14 +280,52 @@ void Voice::strike_quantum(std::int64_t sample, int quantum, float* out) noexcep
     kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, quantum, state_.data(), starts_.data(), live_, out);
     counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
   }
+  // Forces may be parts of one pulse, which only together lift a mode above the floor.
+  float strength = 0.0F;
+  for (const Steps& steps : forces_) strength += steps.strength_n_s;
+  for (const Steps& steps : forces_) {
+    if (steps.begin > static_cast<double>(sample - 1 + kQuantum) || steps.calc_end() <= static_cast<double>(sample - 1)) continue;
+    wake(find_reach(strength));
+    push_steps(steps, sample, quantum, out);
+  }
+}
+
+/// What a force makes in one quantum: a pulse along each of its directions.
+void Voice::push_steps(const Steps& steps, std::int64_t sample, int quantum, float* out) noexcept {
+  const double begin = steps.begin - static_cast<double>(sample - 1), end = steps.calc_end() - static_cast<double>(sample - 1);
+  touch_.first = std::clamp(static_cast<int>(std::ceil(begin)) - 1, 0, kQuantum);
+  touch_.last = std::clamp(static_cast<int>(std::ceil(end)), touch_.first, kQuantum);
+  std::array<StepMoments, kQuantum> moments;
+  for (int n = touch_.first; n < touch_.last; ++n) moments[static_cast<std::size_t>(n)] = calc_moments(steps, begin - n, steps.step);
+  for (int axis = 0; axis < steps.axes; ++axis) {
+    find_touch(steps, axis);
+    for (int n = touch_.first; n < touch_.last; ++n) {
+      for (int j = 0; j < kTerms; ++j) touch_.moment[n][j] = static_cast<float>(moments[static_cast<std::size_t>(n)][axis][j]);
+    }
+    kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, quantum, state_.data(), starts_.data(), live_, out);
+    counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
+  }
 }
 
 /// phi . impulse of one of the modes that do not ring [N s kg^-1/2].
-double Voice::calc_amplitude(const Pulse& pulse, std::size_t mode) const noexcept {
+double Voice::calc_amplitude(const std::int16_t* const* row, const float* weight, std::size_t mode) const noexcept {
   const std::size_t column = static_cast<std::size_t>(groups_) * kGroup + mode;
   double amplitude = 0.0;
-  for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(pulse.weight[r]) * pulse.row[r][column];
+  for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(weight[r]) * row[r][column];
   return amplitude * model_->damped_[mode].scale;
+}
+
+/// phi of one of them along the directions of a force.
+std::array<double, 3> Voice::calc_amplitudes(const Steps& steps, std::size_t mode) const noexcept {
+  const std::int16_t* row[kStrikeRows];
+  float weight[kStrikeRows];
+  find_rows(steps.triangle, row);
+  std::array<double, 3> amplitudes{};
+  for (int axis = 0; axis < steps.axes; ++axis) {
+    for (int r = 0; r < kStrikeRows; ++r) weight[r] = steps.barycentric[r / 3] * steps.axis[axis][r % 3];
+    amplitudes[static_cast<std::size_t>(axis)] = calc_amplitude(row, weight, mode);
+  }
+  return amplitudes;
 }
 
 /// A sample of a mode whose fast root f dies at once: with A the integral of the force times e^{-s age}, s the slow root, and B that of f
@@ -226,9 +347,20 @@ void Voice::follow_force(std::size_t mode, std::int64_t sample, int n) noexcept 
     const double begin = pulse.begin - static_cast<double>(sample - 1);
     if (begin > 1.0 || begin + pulse.length <= 0.0) continue;
     const Moments moments = calc_pulse_moments(pulse.shape, begin, pulse.length);
-    const double amplitude = calc_amplitude(pulse, mode);
+    const double amplitude = calc_amplitude(pulse.row, pulse.weight, mode);
     for (int j = 0; j < kMoments; ++j) slow += amplitude * moments[j] * m.force_q[j];
     if (pulse.length > 2.0 * lag) fast += amplitude * calc_pulse(pulse.shape, (1.0 - lag - begin) / pulse.length) * rate_hz / pulse.length;
+  }
+  for (const Steps& steps : forces_) {
+    const double begin = steps.begin - static_cast<double>(sample - 1);
+    if (begin > 1.0 || steps.calc_end() <= static_cast<double>(sample - 1)) continue;
+    const StepMoments moments = calc_moments(steps, begin, steps.step);
+    const std::array<double, 3> amplitudes = calc_amplitudes(steps, mode);
+    const double at = std::floor((1.0 - lag - begin) / steps.step);
+    for (int axis = 0; axis < steps.axes; ++axis) {
+      for (int j = 0; j < kMoments; ++j) slow += amplitudes[axis] * moments[axis][j] * m.force_q[j];
+      if (at >= 0.0 && at < steps.count) fast += amplitudes[axis] * steps.along[axis][static_cast<int>(at)] * rate_hz / steps.step;
+    }
   }
   const double width = m.fast - m.slow;
   state = {(slow - fast / m.fast) / width, (fast - m.slow * slow) / width};
@@ -270,10 +402,26 @@ void Voice::add_damped(std::int64_t sample, bool struck, bool driven, float* out
           if (moments[0] == 0.0) continue;
           for (std::size_t i = first; i < last; ++i) {
             const auto& m = modes[i];
-            const double amplitude = calc_amplitude(pulse, i);
+            const double amplitude = calc_amplitude(pulse.row, pulse.weight, i);
             for (int j = 0; j < kMoments; ++j) {
               damped_[i].q += amplitude * moments[j] * m.force_q[j];
               damped_[i].v += amplitude * moments[j] * m.force_v[j];
+            }
+          }
+        }
+        for (const Steps& steps : forces_) {
+          const double begin = steps.begin - static_cast<double>(sample - 1 + n),
+                       end = steps.calc_end() - static_cast<double>(sample - 1 + n);
+          if (begin * substeps - step > 1.0 || end * substeps - step <= 0.0) continue;
+          const StepMoments moments = calc_moments(steps, begin * substeps - step, steps.step * substeps);
+          for (std::size_t i = first; i < last; ++i) {
+            const auto& m = modes[i];
+            const std::array<double, 3> amplitudes = calc_amplitudes(steps, i);
+            for (int axis = 0; axis < steps.axes; ++axis) {
+              for (int j = 0; j < kMoments; ++j) {
+                damped_[i].q += amplitudes[axis] * moments[axis][j] * m.force_q[j];
+                damped_[i].v += amplitudes[axis] * moments[axis][j] * m.force_v[j];
+              }
             }
           }
         }
@@ -362,13 +510,14 @@ void Voice::reset() noexcept {
   damped_live_ = false;
   fading_ = inherits_ = false;
   pulses_.clear();
+  forces_.clear();
   ++counters_.resets;
 }
 
 std::size_t Voice::calc_bytes() const {
   return sizeof(Voice) + state_.capacity() * sizeof(ModeState) + starts_.capacity() * sizeof(Starts) +
          damped_.capacity() * sizeof(DampedState) + damped_amplitude_.capacity() * sizeof(double) + pulses_.capacity() * sizeof(Pulse) +
-         bounds_.capacity() * sizeof(float);
+         forces_.capacity() * sizeof(Steps) + bounds_.capacity() * sizeof(float);
 }
 
 int Voice::get_live_mode_count() const {

@@ -23,6 +23,7 @@ namespace carillon::synth {
 
 struct VoiceOptions {
   int max_strikes = 256;      // pulses that may be waiting or acting at once
+  int max_forces = 256;       // stream::Forces that may; a pulse of an impact is a few, a long one some dozens
   double silence_pa = 1e-10;  // below this bound on its pressure at 1 m (-106 dB re 20 uPa) a body sleeps
   Isa isa = Isa::kBest;
   bool audits_energy = false;  // VoiceCounters::energy_rise
@@ -66,6 +67,9 @@ class Voice {
   /// Registers a pulse. Times are since the first sample of this voice; `body` and `other` of the impulse are not looked at. False when it
   /// was refused. [audio-thread]: no heap, no lock, no throw.
   bool strike(const stream::Impulse& impulse) noexcept;
+
+  /// The same for a force that is known step by step; played exactly.
+  bool push(const stream::Force& force) noexcept;
 
   /// Contacts that last act from the next quantum on, or no more (nullptr). They must be of this voice's model and outlive their use. What
   /// is attached first hears of its first sample; release() before it is taken away, or a force is cut off. [audio-thread]
@@ -114,7 +118,8 @@ class Voice {
   bool is_awake() const { return live_ > 0 || damped_live_; }
   /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
   bool is_idle() const {
-    return !is_awake() && !fading_ && !inherits_ && pulses_.empty() && held_ == 0 && (contacts_ == nullptr || contacts_->is_resting());
+    return !is_awake() && !fading_ && !inherits_ && pulses_.empty() && forces_.empty() && held_ == 0 &&
+           (contacts_ == nullptr || contacts_->is_resting());
   }
   /// As process() for a multiple of kQuantum samples of a voice that is idle, whose zeros nobody wants. [audio-thread]
   void skip(std::int64_t samples) noexcept { horizon_ += samples; }
@@ -134,9 +139,26 @@ class Voice {
     float strength_n_s = 0.0F;  // size of the impulse
     std::int32_t triangle = 0;
   };
+  /// A force on its way. Its directions are those that its samples need: one where all are parallel.
+  struct Steps {
+    double begin = 0.0, step = 0.0;  // in samples
+    std::int32_t triangle = 0;
+    int count = 0, axes = 0;
+    float strength_n_s = 0.0F;  // no more than this impulse reaches the body
+    float barycentric[3];
+    float axis[3][3];                         // unit
+    float along[3][stream::kMostForceSteps];  // impulse of each step along each [N s]
+    double calc_end() const { return begin + count * step; }
+  };
+  using StepMoments = std::array<Moments, 3>;  // along each axis
+
   void render(int quanta) noexcept;
+  void begin_in_time(double& begin) noexcept;
+  void find_touch(const Steps& steps, int axis) noexcept;
+  static StepMoments calc_moments(const Steps& steps, double begin, double step);
+  void push_steps(const Steps& steps, std::int64_t sample, int quantum, float* out) noexcept;
   bool is_struck(std::int64_t sample) const noexcept;
-  void find_rows(Pulse& pulse) const noexcept;
+  void find_rows(std::int32_t triangle, const std::int16_t** row) const noexcept;
   DampedState get_mode_state(int mode) const noexcept;
   void ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign, std::array<float, kPeriod>& out) const noexcept;
   void wake(int groups) noexcept;
@@ -144,7 +166,8 @@ class Voice {
   void strike_quantum(std::int64_t sample, int quantum, float* out) noexcept;
   void add_damped(std::int64_t sample, bool struck, bool driven, float* out) noexcept;
   void follow_force(std::size_t mode, std::int64_t sample, int n) noexcept;
-  double calc_amplitude(const Pulse& pulse, std::size_t mode) const noexcept;
+  double calc_amplitude(const std::int16_t* const* row, const float* weight, std::size_t mode) const noexcept;
+  std::array<double, 3> calc_amplitudes(const Steps& steps, std::size_t mode) const noexcept;
   void begin_period() noexcept;
   void cull() noexcept;
   void fade_out(int groups) noexcept;
@@ -178,6 +201,7 @@ class Voice {
   std::vector<double> damped_amplitude_;
   std::vector<float> bounds_;  // of measure()
   std::vector<Pulse> pulses_;  // capacity max_strikes, never grown
+  std::vector<Steps> forces_;  // capacity max_forces, never grown
   Touch touch_;
   alignas(64) std::array<float, kPeriod> block_{}, fade_{};
 };

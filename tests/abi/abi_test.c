@@ -272,6 +272,52 @@ static void check_events(carillon_synth* synth, int32_t body) {
   CHECK(carillon_push_listener(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_listener(NULL, &listener) == CARILLON_BAD_ARGUMENT);
 }
 
+static void check_forces(const carillon_model* model) {
+  static const double place[3] = {0, 1, 0};
+  double steps[40][3];
+  carillon_options options;
+  carillon_synth* synth;
+  int32_t body;
+  carillon_force force;
+  carillon_counters before, after;
+  int k;
+  carillon_counters_init(&before);
+  carillon_counters_init(&after);
+  carillon_force_init(&force);
+  carillon_force_init(NULL);
+  carillon_options_init(&options);
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_add_body(synth, model, place, &body, NULL, 0) == CARILLON_OK);
+  CHECK(carillon_get_counters(synth, &before) == CARILLON_OK);
+  CHECK(carillon_push_force(synth, &force) == CARILLON_BAD_ARGUMENT);
+  for (k = 0; k < 40; ++k) {
+    steps[k][0] = steps[k][1] = 0;
+    steps[k][2] = 1e-4 * (k + 1);
+  }
+  force.body = body;
+  force.time_s = carillon_horizon_s(synth) + 0.001;
+  force.step_s = 2.5e-6;
+  force.impulse_n_s = (const double(*)[3])steps;
+  force.count = 40;
+  CHECK(carillon_push_force(synth, &force) == CARILLON_OK);
+  CHECK(play(synth, 100) > 0);
+  CHECK(carillon_get_counters(synth, &after) == CARILLON_OK);
+  CHECK(after.strikes == before.strikes + 1 && after.late == before.late && after.refused == before.refused);
+  steps[39][1] = nan("");
+  CHECK(carillon_push_force(synth, &force) == CARILLON_BAD_INPUT);
+  (void)play(synth, 2);
+  CHECK(carillon_get_counters(synth, &after) == CARILLON_OK);
+  CHECK(after.strikes == before.strikes + 1 && after.faults == before.faults + 1);
+  steps[39][1] = 0;
+  force.step_s = 0;
+  CHECK(carillon_push_force(synth, &force) == CARILLON_BAD_INPUT);
+  force.step_s = 1e-5;
+  force.count = 0;
+  CHECK(carillon_push_force(synth, &force) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_push_force(synth, NULL) == CARILLON_BAD_ARGUMENT && carillon_push_force(NULL, &force) == CARILLON_BAD_ARGUMENT);
+  carillon_destroy(synth);
+}
+
 static void check_contacts(const carillon_model* model) {
   static const double place[3] = {0, 1, 0};
   carillon_options options;
@@ -546,6 +592,7 @@ int main(int argc, char** argv) {
   check_bodies(bank, model);
   carillon_bank_close(bank); /* the model stays */
   check_synth(model);
+  check_forces(model);
   check_contacts(model);
   check_surfaces(model);
   carillon_model_release(model);

@@ -142,9 +142,7 @@ TEST(time, settling_stack) {
     hold("settling_stack", course.last_s, 0.1, part + ", last hit [s]");
     hold("settling_stack", calc_rise_um(course), 1e-4, part + ", energy gained, as a height [um]");
     hold("settling_stack", std::abs(course.end[3][2] - 0.175), 5e-4, part + ", height of the uppermost [m]");
-    // The uppermost lands on boxes that still rock, and is kicked aside by friction within its cone; how far depends on the offset. Of 40
-    // offsets from 1.4 to 3 mm 9 end more than 0.2 mm aside, and none more than 0.64. It is not the choice of the nearest face: with
-    // Simbody's contact mesh the same offsets slip, 7 of the first 34 by more than 0.2 mm, and one of them by 1.0.
+    // The uppermost lands on boxes that still rock, and is kicked aside by friction within its cone; how far depends on the offset.
     hold("settling_stack", std::abs(course.end[3][0]), 7e-4, part + ", way aside of the uppermost [m]");
   }
 }

@@ -53,6 +53,30 @@ TEST(Feed, HandsOnMoreThanTheRingHolds) {
   EXPECT_EQ(counters.faults, 1);
 }
 
+// A pulse of 13 ms in 82 pieces, and single steps: all of it is played, and none of it late, also by a click that must know it earlier.
+TEST(Feed, HandsOnForcesBeforeTheyBegin) {
+  const auto model = synth::Model::make(testing::make_cube_bank({{500.0, 20.0}}), {.rate_hz = kRate});
+  synth::Synthesiser synthesiser({.rate_hz = kRate, .ring_events = 16});
+  const int body =
+      synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}, .effects = synth::kUsualEffects.with(synth::Effect::kAccelerationNoise)});
+  std::vector<stream::Event> events;
+  const std::vector<Vec3> steps(1300, {1e-6, 0.0, 1e-5});
+  stream::split_force({.time_s = 0.02, .step_s = 1e-5}, steps, [&](const stream::Force& piece) { events.emplace_back(piece); });
+  for (int i = 0; i < 200; ++i) events.emplace_back(stream::Force{.time_s = 0.05 + 5e-4 * i, .step_s = 1e-4, .count = 1});
+  events.emplace_back(stream::Force{.time_s = 0.2, .step_s = 1e-4, .body = 3, .count = 1});
+  const Events kept = make_events(events);
+  Feed feed(kept, {{.number = body, .moves = true, .lead_s = model->get_sphere_radius_m() / synth::kSoundSpeedMs}}, {});
+  play(synthesiser, feed, 0.2);
+  const synth::SynthesiserCounters counters = synthesiser.get_counters();
+  EXPECT_EQ(counters.strikes, 1 + 200);
+  EXPECT_EQ(synthesiser.get_effect_counters(body).units[synth::Effect::kHertzPulse], 82 + 200) << "all its pieces";
+  EXPECT_EQ(counters.late + counters.refused + counters.faults + counters.overflows, 0);
+  const Tally tally = count_impulses(kept, 1);
+  EXPECT_EQ(tally.impulses, 201) << "pieces of one pulse are one";
+  EXPECT_EQ(tally.body_impulses[0], 201);
+  EXPECT_EQ(tally.contacts, 201);
+}
+
 // A body whose sound needs a second to arrive, with a waypoint a millisecond: the synthesiser must remember a second of them, and no more.
 TEST(Feed, KnowsHowManyWaypointsAreUnderWay) {
   std::vector<stream::Event> events;

@@ -22,6 +22,8 @@ std::string read_text(const std::string& file) {
 Scene parse(const std::string& text) { return parse_scene(config::parse_document(text, "/somewhere/scene.json")); }
 
 const std::string kBody = R"("bodies": [{"name": "a", "bank": "a.h5"}])";
+std::string with_strike(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n\"strikes\": [{" + keys + "}]}"; }
+const std::string kMalletPlace = R"("time_s": 0, "body": "a", "triangle": 0, )";
 
 TEST(Scene, AWholeSceneIsRead) {
   const Scene scene = parse(read_text(std::string(CARILLON_SOURCE_DIR) + "/tests/host/scenes/drop.json"));
@@ -52,6 +54,26 @@ TEST(Scene, StrikesAreRead) {
   EXPECT_EQ(scene.strikes[1].duration_s, 0.0);
   EXPECT_EQ(scene.strikes[1].place, "/somewhere/scene.json:3");
   EXPECT_TRUE(parse("{\"duration_s\": 2, " + kBody + "}").strikes.empty());
+}
+
+TEST(Scene, MalletsAreRead) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kBody + R"(, "strikes": [
+    {"time_s": 0.5, "body": "a", "triangle": 7, "mallet": {"mass_kg": 0.02, "speed_m_s": 2, "radius_m": 0.01, "young_modulus_pa": 3e9}},
+    {"time_s": 1, "body": "a", "triangle": 7, "mallet": {"mass_kg": 0.02, "speed_m_s": 2, "felt": {"stiffness_n_m_p": 1e8, "exponent": 3},
+      "restitution": 0.5, "friction": 0.3, "direction": [0, 3, -4]}}]})");
+  ASSERT_EQ(scene.strikes.size(), 2u);
+  const Mallet &hard = *scene.strikes[0].mallet, &felt = *scene.strikes[1].mallet;
+  EXPECT_TRUE(hard.mass_kg == 0.02 && hard.speed_m_s == 2.0 && hard.radius_m == 0.01 && hard.young_modulus_pa == 3e9 &&
+              hard.poisson_ratio == 0.3);
+  EXPECT_TRUE(!hard.felt && hard.restitution == 1.0 && hard.friction == 0.0 && !hard.direction);
+  EXPECT_TRUE(felt.felt->stiffness_n_m_p == 1e8 && felt.felt->exponent == 3.0 && felt.restitution == 0.5 && felt.friction == 0.3);
+  EXPECT_NEAR((*felt.direction)[1], 0.6, 1e-15);
+  EXPECT_NEAR((*felt.direction)[2], -0.8, 1e-15);
+  EXPECT_TRUE(scene.warnings.empty());
+  const Scene dense =
+      parse(with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 2, "radius_m": 0.01, "young_modulus_pa": 3e9})"));
+  ASSERT_EQ(dense.warnings.size(), 1u);
+  EXPECT_NE(dense.warnings[0].find("denser than osmium"), std::string::npos);
 }
 
 TEST(Scene, ManyStrikesAreReadInOnePassOfTheText) {
@@ -212,7 +234,6 @@ TEST_P(BadSceneTest, IsRefusedWithAMessageThatNamesThePlace) {
 std::string with_body(const std::string& keys) {
   return "{\"duration_s\": 1,\n \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\",\n  " + keys + "}]}";
 }
-std::string with_strike(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n\"strikes\": [{" + keys + "}]}"; }
 std::string with_root(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n" + keys + "}"; }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -304,6 +325,41 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"strike_at_nobody",
                  with_strike("\"time_s\": 0, \"body\": \"b\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"),
                  {":2:", "body", "no body is called \"b\""}},
+        BadScene{"mallet_and_impulse",
+                 with_strike(kMalletPlace +
+                             R"("impulse_n_s": [0, 0, 1], "mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}})"),
+                 {"impulse_n_s", "follows from the \"mallet\""}},
+        BadScene{
+            "mallet_and_duration",
+            with_strike(kMalletPlace + R"("duration_s": 0, "mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}})"),
+            {"duration_s", "follows from the \"mallet\""}},
+        BadScene{"mallet_of_no_hardness",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1})"),
+                 {"young_modulus_pa", "felt"}},
+        BadScene{"mallet_without_radius",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "young_modulus_pa": 3e9})"),
+                 {"radius_m", "missing"}},
+        BadScene{
+            "mallet_hard_and_felt",
+            with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "radius_m": 0.01, "felt": {"stiffness_n_m_p": 1e8}})"),
+            {"radius_m", "felt", "keep one"}},
+        BadScene{"mallet_without_mass",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 0, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}})"),
+                 {"mass_kg", "out of range"}},
+        BadScene{"mallet_at_rest",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": -2, "felt": {"stiffness_n_m_p": 1e8}})"),
+                 {"speed_m_s", "out of range"}},
+        BadScene{
+            "mallet_with_a_wild_exponent",
+            with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8, "exponent": 60}})"),
+            {"exponent", "out of range"}},
+        BadScene{"mallet_without_direction",
+                 with_strike(kMalletPlace +
+                             R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}, "direction": [0, 0, 0]})"),
+                 {"direction", "no direction"}},
+        BadScene{"mallet_mistyped",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stifness": 1e8}})"),
+                 {"stiffness_n_m_p"}},
         BadScene{"strike_without_time", with_strike("\"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"), {"time_s", "missing"}},
         BadScene{"strike_after_the_end",
                  with_strike("\"time_s\": 1.5, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"),

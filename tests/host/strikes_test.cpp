@@ -9,9 +9,16 @@
 namespace carillon::host {
 namespace {
 
-class Strikes : public ::testing::Test {
+/// Of strikes without mallets, in order of time.
+std::vector<contact::Impulse> make_impulses(const Scene& scene, const std::vector<const bank::Bank*>& banks) {
+  std::vector<contact::Impulse> impulses;
+  for (const stream::Event& event : make_strikes(scene, banks).events) impulses.push_back(std::get<stream::Impulse>(event));
+  return impulses;
+}
+
+class StrikesOfAScene : public ::testing::Test {
  protected:
-  Strikes() : bank_(testing::make_cube_bank({{1000.0, 1.0}})) {
+  StrikesOfAScene() : bank_(testing::make_cube_bank({{1000.0, 1.0}})) {
     scene_.file = "scene.json";
     scene_.duration_s = 1.0;
     scene_.bodies.resize(1);
@@ -39,7 +46,7 @@ class Strikes : public ::testing::Test {
   Scene scene_;
 };
 
-TEST_F(Strikes, APointOfTheSurfaceIsStruckWhereItIs) {
+TEST_F(StrikesOfAScene, APointOfTheSurfaceIsStruckWhereItIs) {
   for (const Vec3& point : {Vec3{0.05, 0.01, -0.02}, Vec3{-0.03, 0.05, 0.04}, Vec3{0.0, 0.0, -0.05}, Vec3{0.05, 0.05, 0.05}}) {
     const contact::Impulse impulse = strike(point);
     EXPECT_NEAR(impulse.barycentric[0] + impulse.barycentric[1] + impulse.barycentric[2], 1.0, 1e-12);
@@ -52,7 +59,7 @@ TEST_F(Strikes, APointOfTheSurfaceIsStruckWhereItIs) {
   }
 }
 
-TEST_F(Strikes, APointBesideTheSurfaceStrikesTheNearestPlace) {
+TEST_F(StrikesOfAScene, APointBesideTheSurfaceStrikesTheNearestPlace) {
   // Of a cube that is the point with every coordinate cut to its side, for all points outside.
   for (int i = 0; i < 1000; ++i) {
     const Vec3 point{0.09 * std::sin(1.0 + 1.7 * i), 0.09 * std::sin(2.0 + 2.9 * i), 0.09 * std::sin(3.0 + 4.3 * i)};
@@ -69,7 +76,7 @@ TEST_F(Strikes, APointBesideTheSurfaceStrikesTheNearestPlace) {
   }
 }
 
-TEST_F(Strikes, APointFarAwayIsAMistakeOfUnits) {
+TEST_F(StrikesOfAScene, APointFarAwayIsAMistakeOfUnits) {
   try {
     strike({50.0, 0.0, 0.0});
     FAIL() << "it was accepted";
@@ -80,7 +87,7 @@ TEST_F(Strikes, APointFarAwayIsAMistakeOfUnits) {
   }
 }
 
-TEST_F(Strikes, ATriangleIsStruckInItsMiddleAndHasToExist) {
+TEST_F(StrikesOfAScene, ATriangleIsStruckInItsMiddleAndHasToExist) {
   scene_.strikes = {{.place = "scene.json:7", .body = 0, .time_s = 0.25, .point_m = {}, .triangle = 11, .impulse_n_s = {0, 0, 1}}};
   const Vec3 place = find_place(make_impulses(scene_, {&bank_}).at(0));  // of the corners 1, 7, 5
   EXPECT_NEAR(place[0], 0.05, 1e-12);
@@ -96,7 +103,7 @@ TEST_F(Strikes, ATriangleIsStruckInItsMiddleAndHasToExist) {
   }
 }
 
-TEST_F(Strikes, AreEqualUnlessTheyAreToVary) {
+TEST_F(StrikesOfAScene, AreEqualUnlessTheyAreToVary) {
   scene_.strikes.assign(4000, {.place = "scene.json:7",
                                .body = 0,
                                .time_s = 0.25,

@@ -75,6 +75,33 @@ TEST(Planner, ABodyThatIsStruckHasWhatItsStrikeCallsFor) {
   EXPECT_LE(changes[1].time_s, 1.0 - kLeadS);
 }
 
+// Two thousand steps of 1 us each: a Hertz pulse of 2 ms. Each piece of it alone is 40 dB less.
+TEST(Planner, APulseInPiecesIsJudgedAsOne) {
+  constexpr double kLength = 2e-3;
+  constexpr int kSteps = 2000;
+  const auto make_pieces = [](double impulse_n_s) {
+    std::vector<stream::Vec3> steps;
+    for (int k = 0; k < kSteps; ++k) steps.push_back({0, 0, std::pow(std::sin(pi * (k + 0.5) / kSteps), 1.5)});
+    double area = 0.0;
+    for (const stream::Vec3& step : steps) area += step[2];
+    for (stream::Vec3& step : steps) step[2] *= impulse_n_s / area;
+    std::vector<stream::Event> events;
+    stream::split_force({.time_s = 1.0 - 0.5 * kLength, .step_s = kLength / kSteps, .triangle = 3}, steps,
+                        [&](const stream::Force& piece) { events.emplace_back(piece); });
+    return events;
+  };
+  Stage stage;
+  for (const double impulse_n_s : {0.01, 1e-6, 1e-9}) {
+    const auto as_one = play(stage.facts, {make_strike(1.0, impulse_n_s, kLength)}),
+               in_pieces = play(stage.facts, make_pieces(impulse_n_s));
+    ASSERT_EQ(in_pieces.size(), as_one.size()) << impulse_n_s;
+    for (std::size_t i = 0; i < as_one.size(); ++i) {
+      EXPECT_EQ(in_pieces[i].effects, as_one[i].effects) << impulse_n_s;
+      EXPECT_NEAR(in_pieces[i].time_s, as_one[i].time_s, 0.011) << impulse_n_s;
+    }
+  }
+}
+
 TEST(Planner, ItIsOffWhenItHasDiedAwayAndTheSoundHasArrived) {
   Stage stage;
   const auto changes = play(stage.facts, {make_strike(1.0, 0.01)});
@@ -321,6 +348,8 @@ TEST(Planner, ContactsThatLastCallForWhatTheyDo) {
   EXPECT_FALSE(touch({.sweep_m_s = 0.3, .spin_rad_s = 10.0}, false).has(Effect::kRoughness));
   // A dashpot z adds z phi^2 / 2 to the decay d = 20 / s of a mode of phi = 1; e = sqrt(2e-5) of the decay can be told.
   const double limit = 2.0 * 20.0 * std::sqrt(2.0 * kTellableShare);
+  EXPECT_TRUE(touch({.impedance_n_s_m = 0.1 * limit}, true).has(Effect::kContactDamping)) << "the contact's own spring loses more";
+  stage.facts.ground.modulus_pa = 0.0;  // no spring
   EXPECT_FALSE(touch({.impedance_n_s_m = 0.9 * limit}, true).has(Effect::kContactDamping));
   EXPECT_TRUE(touch({.impedance_n_s_m = 1.1 * limit}, true).has(Effect::kContactDamping));
   EXPECT_FALSE(touch({.impedance_n_s_m = 1e3}, false).has(Effect::kContactDamping)) << "of a body that is silent";

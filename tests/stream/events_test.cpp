@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 namespace carillon::stream::tests {
 namespace {
@@ -33,7 +34,62 @@ std::string spoil(T event, Spoil change) {
   return find(event);
 }
 
+Force make_force(int count = 3) {
+  Force force{.step_s = 1e-5, .count = static_cast<std::int16_t>(count)};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) force.impulse_n_s[k] = {0.0F, -1e-4F, 1e-3F};
+  return force;
+}
+
+TEST(Force, WithAFaultIsFound) {
+  EXPECT_EQ(find(make_force()), "");
+  EXPECT_EQ(find(make_force(kMostForceSteps)), "");
+  const auto change = [](auto&& work) { return spoil(make_force(), work); };
+  EXPECT_EQ(change([](Force& e) { e.count = 0; }), "the number of steps is not 1 to 16");
+  EXPECT_EQ(change([](Force& e) { e.count = kMostForceSteps + 1; }), "the number of steps is not 1 to 16");
+  for (const double bad : {kNan, kInfinity, 0.0, -1e-5})
+    EXPECT_EQ(change([&](Force& e) { e.step_s = bad; }), "the length of a step is not above 0");
+  for (const double bad : {kNan, kInfinity}) {
+    EXPECT_EQ(change([&](Force& e) { e.impulse_n_s[2][1] = static_cast<float>(bad); }), "an impulse is not finite");
+    EXPECT_EQ(change([&](Force& e) { e.time_s = bad; }), "the time is not finite");
+  }
+  EXPECT_EQ(change([](Force& e) { e.impulse_n_s[3][0] = static_cast<float>(kNan); }), "") << "beyond the count nothing is looked at";
+  EXPECT_EQ(change([](Force& e) { e.triangle = -1; }), "the index of the triangle is negative");
+}
+
+TEST(Force, IsCutIntoPiecesThatFollowEachOther) {
+  for (const std::size_t steps : {1U, 16U, 17U, 1300U}) {
+    std::vector<Vec3> impulses;
+    for (std::size_t k = 0; k < steps; ++k) impulses.push_back({1e-6 * static_cast<double>(k), -0.5, 0.25});
+    std::vector<Force> pieces;
+    split_force({.time_s = 0.5, .step_s = 1e-5, .triangle = 4}, impulses, [&](const Force& piece) { pieces.push_back(piece); });
+    ASSERT_EQ(pieces.size(), (steps + 15) / 16);
+    Vec3 sum{};
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      EXPECT_EQ(find(pieces[i]), "");
+      EXPECT_EQ(pieces[i].continues, i > 0);
+      EXPECT_EQ(pieces[i].triangle, 4);
+      EXPECT_NEAR(pieces[i].time_s, 0.5 + 16e-5 * static_cast<double>(i), 1e-15);
+      const Vec3 own = calc_impulse(pieces[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += own[axis];
+    }
+    const auto n = static_cast<double>(steps);
+    EXPECT_NEAR(sum[0], 1e-6 * n * (n - 1.0) / 2.0, 1e-7 * (1.0 + sum[0]));
+    EXPECT_EQ(sum[1], -0.5 * n);
+  }
+}
+
+TEST(Force, AtOnceActsInTheMiddleOfItsSteps) {
+  Force force = make_force(4);
+  force.time_s = 1.0;
+  force.impulse_n_s[3] = {};
+  const Impulse impulse = to_impulse(force);
+  EXPECT_NEAR(impulse.time_s, 1.0 + 1.5e-5, 1e-15);
+  EXPECT_NEAR(impulse.impulse_n_s[2], 3e-3, 1e-9);
+  EXPECT_EQ(impulse.duration_s, 0.0);
+}
+
 TEST(Events, CanBeCopiedByteByByte) {
+  EXPECT_LE(sizeof(Event), 256U) << "every queue holds them";
   EXPECT_TRUE(std::is_trivially_copyable_v<Event>);
   EXPECT_TRUE(std::is_nothrow_copy_constructible_v<Event>);
 }

@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <random>
 #include <string>
@@ -50,7 +51,24 @@ double draw_time(std::mt19937_64& random) { return 1e-3 * static_cast<double>(ra
 Event draw_event(std::mt19937_64& random) {
   const double u = static_cast<double>(random() % 1000) / 1000.0 / 3.0, v = 1.0 / 3.0;
   const Vec3 inside{u, v, 1.0 - u - v};
-  switch (random() % 5) {
+  switch (random() % 6) {
+    case 4: {
+      Force force{draw_time(random),
+                  draw_amount(random) * 6e-10 + 1e-300,
+                  1,
+                  0,
+                  11,
+                  static_cast<std::int16_t>(1 + random() % 16),
+                  random() % 2 == 0,
+                  inside};
+      for (std::size_t k = 0; k < static_cast<std::size_t>(force.count); ++k) {
+        for (float& x : force.impulse_n_s[k]) {
+          const float any = std::bit_cast<float>(static_cast<std::uint32_t>(random()));
+          x = std::abs(any) <= 1e9F ? any : static_cast<float>(draw(random));
+        }
+      }
+      return force;
+    }
     case 0:
       return Mark{draw_time(random)};
     case 1:
@@ -102,6 +120,13 @@ void expect_same(const Impulse& a, const Impulse& b) {
   expect_bits(a.duration_s, b.duration_s);
 }
 
+void expect_same(const Force& a, const Force& b) {
+  expect_bits(std::array{a.time_s, a.step_s}, std::array{b.time_s, b.step_s});
+  EXPECT_TRUE(a.body == b.body && a.other == b.other && a.triangle == b.triangle && a.count == b.count && a.continues == b.continues);
+  expect_bits(a.barycentric, b.barycentric);
+  EXPECT_EQ(std::memcmp(&a.impulse_n_s, &b.impulse_n_s, sizeof a.impulse_n_s), 0);
+}
+
 void expect_same(const Contact& a, const Contact& b) {
   expect_bits(a.time_s, b.time_s);
   EXPECT_TRUE(a.id == b.id && a.body == b.body && a.other == b.other && a.triangle == b.triangle && a.state == b.state);
@@ -145,6 +170,28 @@ std::string replace(std::string text, const std::string& from, const std::string
   const auto at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return text.replace(at, from.size(), to);
+}
+
+const std::string kForce =
+    R"({"force": {"time_s": 0.5, "step_s": 1e-5, "body": 0, "triangle": 3, "barycentric": [1, 0, 0], "impulse_n_s": [[0, 0, 1e-3], [0, 0, 2e-3]]}})"
+    "\n";
+
+TEST(Recording, ReadsAForceAndRefusesWhatIsNone) {
+  const Recording read = parse_recording(kHeader + kForce, "run.jsonl");
+  const auto& force = std::get<Force>(read.events[0]);
+  EXPECT_TRUE(force.count == 2 && !force.continues && force.other == -1 && force.step_s == 1e-5 && force.impulse_n_s[1][2] == 2e-3F);
+  const auto refuse = [&](const std::string& from, const std::string& to, const std::string& says) {
+    expect_error(kHeader + replace(kForce, from, to), says);
+  };
+  refuse("1e-5", "0", "run.jsonl:2: the length of a step is not above 0");
+  refuse("1e-5", "1", "is more than any that is played");
+  refuse("[[0, 0, 1e-3], [0, 0, 2e-3]]", "[]", "impulse_n_s");
+  refuse("2e-3]", "2e10]", "is more than any that is played");
+  refuse("2e-3]", "2e-3, 1]", "impulse_n_s");
+  std::string many = "[[0, 0, 1e-3]";
+  for (int k = 0; k < kMostForceSteps; ++k) many += ", [0, 0, 1e-3]";
+  refuse("[[0, 0, 1e-3], [0, 0, 2e-3]]", many + "]", "impulse_n_s");
+  refuse("\"step_s\"", "\"steps\"", "step_s");
 }
 
 TEST(Recording, RefusesAmountsThatNothingHas) {

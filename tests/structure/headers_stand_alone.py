@@ -13,8 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 source, build, compiler = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
 
-# The ways in which the files of each folder of ours are compiled, from the build's own commands. There may be two: Simbody 3.7's headers
-# are C++17, and so are the few files that include them.
+# The ways in which the files of each folder of ours are compiled, from the build's own commands. There may be several.
 flags = {}
 proven = set()
 for command in json.loads((build / "compile_commands.json").read_text()):

@@ -16,7 +16,6 @@ LIBRARIES = {
     "hdf5": ["hdf5", "H5"],
     "openssl": ["openssl/"],
     "eigen": ["Eigen/", "unsupported/Eigen/"],
-    "simbody": ["Simbody.h", "SimTKcommon", "SimTKmath", "simbody/", "SimTK"],
     "sndfile": ["sndfile"],
     "cairo": ["cairo"],
     "portaudio": ["portaudio.h"],
@@ -35,13 +34,17 @@ LAW = {
     "runtime/config": ([], ["json", "fmt"]),
     "runtime/version": ([], ["fmt"]),
     "runtime/bank": (["runtime/config", "runtime/version"], ["json", "fmt", "hdf5", "openssl", "cli"]),
+    "runtime/support": (["runtime/config", "runtime/bank"], ["fmt"]),
     "runtime/stream": (["runtime/config"], ["fmt"]),
     "runtime/radiation": (["runtime/config", "runtime/bank"], []),
     "runtime/synth": (["runtime/config", "runtime/bank", "runtime/stream"], []),
     "runtime/plan": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth"], ["fmt"]),
-    "runtime/abi": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth"], []),
-    "runtime/contact": (["runtime/config", "runtime/bank", "runtime/stream"], ["fmt", "simbody"]),
-    "runtime/host": (["runtime/config", "runtime/version", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
+    "runtime/abi": (["runtime/config", "runtime/bank", "runtime/support", "runtime/stream", "runtime/radiation", "runtime/synth"], []),
+    "runtime/impact": ([], []),
+    "runtime/shape": (["runtime/config", "runtime/bank", "runtime/impact"], []),
+    "runtime/rigid": (["runtime/config", "runtime/impact", "runtime/shape"], ["eigen", "fmt"]),
+    "runtime/contact": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/impact", "runtime/shape", "runtime/rigid"], ["fmt"]),
+    "runtime/host": (["runtime/config", "runtime/version", "runtime/bank", "runtime/support", "runtime/stream", "runtime/impact", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
     "runtime/live": (["runtime/config", "runtime/version", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact", "runtime/host"], ["fmt", "cli", "portaudio"]),
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
@@ -68,7 +71,7 @@ LAW = {
     "precompute": (["runtime/config", "runtime/version", "precompute/petsc", "precompute/io"], ["fmt", "cli", "mpi"]),
 }
 # Finer than folders: the only files that may include these.
-ONLY_IN = {"hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/io/run_record\.cpp|precompute/slabs/layout\.cpp)$"), "simbody": re.compile(r"^runtime/contact/[a-z0-9_]+\.(cpp|hpp)$"),
+ONLY_IN = {"hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/io/run_record\.cpp|precompute/slabs/layout\.cpp)$"),
            "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 

@@ -29,6 +29,7 @@ using testing::InventedMode;
 using testing::make_cube_bank;
 constexpr double kRate = 48000.0;
 const Surface kOther{.roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 70e9};
+const Surface kRigidOther{.roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 0.0};  // no spring: what is left is its impedance
 const EffectSet kNoise{Effect::kRoughness, Effect::kRolling};
 const EffectSet kBrake{Effect::kContactDamping};
 
@@ -428,7 +429,7 @@ TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
                         c.impedance_n_s_m = impedance * (1.0 + 0.5 * std::sin(40.0 * t));
                         return c;
                       }),
-         0.064);
+         0.064, 480, kRigidOther);
     const double exact = calc_dense_energy(
         modes, {0.9, -0.6, 1.1, 0.4}, 1e-3,
         [&](double t) { return impedance * (1.0 + 0.5 * std::sin(40.0 * t)) * std::min(1.0, t / 5e-3); }, 0.064);
@@ -437,6 +438,39 @@ TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
     EXPECT_LT(exact, 0.98 * free) << "it matters";
     // The loss in nepers agrees to 2 %: modes far apart do not hear of each other.
     EXPECT_NEAR(std::log(free / voice.calc_energy_j()), std::log(free / exact), 0.02 * std::log(free / exact)) << impedance;
+  }
+}
+
+TEST(ContactForces, TakeWhatTheContactsSpringLosesHoweverLittleItMoves) {
+  // A spring k (1 + i eta) at the point, weak against the mode: omega'^2 = omega^2 + k (1 + i eta) phi^2, so d = eta k phi^2 / (2 omega).
+  // Steel on steel loses 0.01; wood and plastics ten times that, by the part of the give that is theirs.
+  const double freq = 1000.0, phi = 0.9, omega = 2.0 * pi * freq;
+  const auto model = Model::make(make_cube_bank({{freq, 1e-3, 1.0, {0.0, 0.0, phi}}}));
+  const auto play_at = [&](double impulse, double own_pa, double other_pa, double patch_m, double seconds) {
+    ContactForces contacts(model, {.surface = {.modulus_pa = own_pa}, .effects = kBrake});
+    Voice voice(model);
+    voice.strike({.time_s = 1e-9, .impulse_n_s = {0.0, 0.0, impulse}});
+    const auto rest = [&](double t) {
+      Contact c = make_sliding(t, 0.0);
+      c.patch_radius_m = patch_m;
+      c.impedance_n_s_m = 1e-6;
+      return c;
+    };
+    play(voice, contacts, make_records(0.4, rest), 0.02, 480, {.modulus_pa = other_pa});
+    const double before = voice.calc_energy_j();
+    play(voice, contacts, {}, seconds, 480, {.modulus_pa = other_pa});
+    return std::log(before / voice.calc_energy_j()) / (2.0 * seconds);
+  };
+  for (const double impulse : {1.0, 1e-6}) {
+    for (const auto& [own, other, loss] :
+         {std::tuple{200e9, 200e9, 0.01}, {10e9, 10e9, 0.1}, {10e9, 200e9, (0.1 / 10 + 0.01 / 200) / (1.0 / 10 + 1.0 / 200)}}) {
+      const double patch = 1e-6, stiffness = 2.0 / (1.0 / own + 1.0 / other) * patch;
+      const double expected = 1e-3 + 0.5 * 1e-6 * phi * phi + loss * stiffness * phi * phi / (2.0 * omega);
+      EXPECT_NEAR(play_at(impulse, own, other, patch, 0.3) / expected, 1.0, 0.01) << impulse << " " << own << " " << other;
+    }
+    // A spring that pins the mode takes no more than all of it loses by itself: D = eta omega / 2, kept below omega as D omega / (D +
+    // omega).
+    EXPECT_NEAR(play_at(impulse, 10e9, 10e9, 1.0, 0.02) / (0.05 * omega / 1.05), 1.0, 0.02);
   }
 }
 

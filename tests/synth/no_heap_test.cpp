@@ -166,6 +166,10 @@ TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
     for (int k = 0; k < 10; ++k) {
       synthesiser.push(stream::Impulse{.time_s = synthesiser.get_horizon_s() + 1e-4 * k, .body = k % 5, .impulse_n_s = {0.0, 0.0, 1.0}});
       synthesiser.push(stream::Motion{synthesiser.get_horizon_s(), k % 4, {1.0, 2.0, 0.001 * i}, {}});
+      stream::Force force{
+          .time_s = synthesiser.get_horizon_s() + 1e-4 * k, .step_s = 7e-6, .body = k % 5, .count = stream::kMostForceSteps};
+      force.impulse_n_s.fill({0.1F, -0.01F * static_cast<float>(k), 1.0F});
+      synthesiser.push(force);
     }
     synthesiser.set_budget(i % 60 < 30 ? 20.0 * 48000.0 : 1e12);
     synthesiser.process(out.data(), 2, 1 + i);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -131,6 +133,25 @@ TEST(Pulse, ChebyshevSeriesHoldsARotationUpToNyquist) {
     for (int j = 0; j < kMoments; ++j) sum += coefficients[j] * t[j];
     EXPECT_NEAR(sum, std::cos(angle * u), 1e-9);
   }
+}
+
+/// A constant force, by a sum over a hundred thousand points.
+TEST(LevelMoments, AreThoseOfTheirPart) {
+  for (const auto& [start, length] :
+       {std::array{0.2, 0.3}, std::array{-0.7, 1.1}, std::array{0.9, 5.0}, std::array{-3.0, 7.0}, std::array{0.5, 1e-3}}) {
+    Moments expected{};
+    constexpr int kPoints = 100000;
+    const double from = std::clamp(start, 0.0, 1.0), to = std::clamp(start + length, 0.0, 1.0);
+    for (int i = 0; i < kPoints; ++i) {
+      const Moments t = calc_chebyshev(from + (to - from) * (i + 0.5) / kPoints);
+      for (std::size_t j = 0; j < t.size(); ++j) expected[j] += t[j] * (to - from) / kPoints / length;
+    }
+    const Moments moments = calc_level_moments(start, length);
+    for (std::size_t j = 0; j < moments.size(); ++j) EXPECT_NEAR(moments[j], expected[j], 1e-8) << start << " " << length << " " << j;
+  }
+  EXPECT_EQ(calc_level_moments(1.0, 2.0), Moments{});
+  EXPECT_EQ(calc_level_moments(-2.0, 2.0), Moments{});
+  EXPECT_NEAR(calc_level_moments(0.4, kShortestStep)[0], 1.0, 1e-9);
 }
 
 }  // namespace

@@ -1,0 +1,48 @@
+// GROUP time: supports that no wall is.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "runtime/support/losses.hpp"
+#include "tests/bank/example_bank.hpp"
+#include "tests/hard/figure.hpp"
+
+namespace carillon::hard {
+namespace {
+
+TEST(time, support_extremes) {
+  double most_decay = 0.0, most_shift = 0.0, wrong = 0.0;
+  for (const double softer : {1.0, 1e3, 1e6, 1e12}) {
+    for (const double area : {0.0, 1e-30, 2e-4, 1e6}) {
+      for (const double normal : {1.0, 0.0}) {
+        for (const std::string& name : config::list_base_names()) {
+          bank::Bank bank = bank::example::make_supported_bank(2, 9);
+          for (std::size_t s = 0; s < 2; ++s) {
+            bank.supports.area_m2[s] = area;
+            bank.supports.normal[s] = {normal, 0.0, 0.0};
+          }
+          config::Object words = config::parse_document("{\"on\": " + config::quote(name) + ", \"loss\": 1}", "words").root();
+          config::Fixing fixing = *config::read_fixing(words);
+          fixing.base.young_modulus_pa /= softer;
+          const support::Losses losses = support::calc_losses(bank, {.all = fixing});
+          for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+            const double omega = std::sqrt(bank.eigenvalue_rad2_s2[m]);
+            const bool is_number =
+                std::isfinite(losses.decay_per_s[m]) && std::isfinite(losses.shift_rad_s[m]) && losses.decay_per_s[m] >= 0.0;
+            wrong += is_number ? 0.0 : 1.0;
+            most_decay = std::max(most_decay, losses.decay_per_s[m] / omega);
+            most_shift = std::max(most_shift, std::abs(losses.shift_rad_s[m]) / omega);
+          }
+          support::apply(losses, bank);
+          wrong += static_cast<double>(bank::find_faults(bank).size());
+        }
+      }
+    }
+  }
+  hold("support_extremes", wrong, 0.0, "numbers that are none, faults of the bank");
+  hold("support_extremes", most_decay, support::kMostDecay * (1.0 + 1e-12), "decay over the frequency");
+  hold("support_extremes", most_shift, support::kMostShift * (1.0 + 1e-12), "shift over the frequency");
+}
+
+}  // namespace
+}  // namespace carillon::hard
