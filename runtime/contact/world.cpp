@@ -217,7 +217,7 @@ class World::Course {
     const double started_s = get_cpu_s();
     while (!begun_ || (until_s - reached_s_ > kShortest && !is_over())) {
       step(sink);
-      if (get_cpu_s() - started_s >= cpu_s) break;
+      if (std::isfinite(cpu_s) && get_cpu_s() - started_s >= cpu_s) break;
     }
     seconds_cpu_ += get_cpu_s() - started_s;
     return reached_s_;
