@@ -194,6 +194,8 @@ class Space {
 
   // step.cpp: one group through one small step
   void step_island(Island& island, double start_s, double step_s);
+  void note_crowd(const Island& island, double time_s);
+  void strike_at_once(Island& island, double start_s, double step_s);
   void predict(const Island& island, double h, bool at_rest);
   Point make_point(const Contact& contact) const;
   void make_points(Island& island, double h, bool leaves_impacts);

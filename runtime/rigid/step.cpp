@@ -32,9 +32,8 @@ constexpr int kGuesses = 6;           // of a factorised problem in a step
 constexpr int kMostGuesses = 12;      // where rest is to be proven
 constexpr double kRetry = 4e-3;       // s; a group whose guesses failed goes by sweeps for so long
 constexpr int kMostMissed = 30;       // in a step: instants at which nothing struck after all
-constexpr int kMostApart = 2;         // impacts of a group in a step, each at its instant; then all that strike within it are one
-constexpr int kMostImpacts = 4;       // of a group in a step
-constexpr double kCrowded = 2e-3;     // s; for so long a group begins with the one for all
+constexpr int kMostImpacts = 3;       // of a group in a step, each at its instant; a group with more is crowded
+constexpr double kCrowded = 2e-3;     // s; for so long after
 
 }  // namespace
 
@@ -42,13 +41,15 @@ void Space::step_island(Island& island, double start_s, double step_s) {
   for (std::size_t n = 0; n < island.bodies.size(); ++n) index_[static_cast<std::size_t>(island.bodies[n])] = static_cast<int>(n);
   stepped_ = &island.bodies;
   double done = 0.0;
-  int missed = 0;
-  int impacts = std::any_of(island.bodies.begin(), island.bodies.end(),
-                            [&](int body) { return crowded_until_s_[static_cast<std::size_t>(body)] > start_s; })
-                    ? kMostApart
-                    : 0;
+  int impacts = 0, missed = 0;
   bool begun = false;
   const double g = norm(gravity_);
+  const bool is_crowded = std::any_of(island.bodies.begin(), island.bodies.end(),
+                                      [&](int body) { return crowded_until_s_[static_cast<std::size_t>(body)] > start_s; });
+  if (is_crowded) {
+    strike_at_once(island, start_s, step_s);
+    impacts = kMostImpacts;
+  }
   while (step_s - done > kShortest) {
     const double h = step_s - done;
     time_s_ = start_s + done;
@@ -62,7 +63,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
     sum_turned();
     double at = h;
     std::vector<Ref> first;
-    together_s_ = impacts < kMostApart ? kTogether : std::max(h, kTogether);
+    together_s_ = kTogether;
     const bool struck = impacts < kMostImpacts && find_impact(island, h, at, first);
     keep_impulses(at, h);
     for (Pair* pair : island.pairs) pair->travelled_m += (calc_pair_speed(pair->a, pair->b) + g * h) * at + 1e-12;
@@ -75,8 +76,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
       if (confirm_impact(first, step_s - done, kDeep * (1 + missed))) {
         strike(island, first, time_s_);
         ++costs_.impacts;
-        if (++impacts == kMostApart + 1)
-          for (const int body : island.bodies) crowded_until_s_[static_cast<std::size_t>(body)] = start_s + kCrowded;
+        if (++impacts == kMostImpacts) note_crowd(island, start_s + step_s);
       } else if (++missed > kMostMissed) {
         impacts = kMostImpacts;
       }
@@ -85,6 +85,24 @@ void Space::step_island(Island& island, double start_s, double step_s) {
       for (Pair* pair : island.pairs) update(*pair, step_s - done);
   }
   for (const int body : island.bodies) index_[static_cast<std::size_t>(body)] = -1;
+}
+
+void Space::note_crowd(const Island& island, double time_s) {
+  for (const int body : island.bodies) crowded_until_s_[static_cast<std::size_t>(body)] = time_s + kCrowded;
+}
+
+/// The impacts of a crowded group: all touches that close within a step strike at its beginning.
+void Space::strike_at_once(Island& island, double start_s, double step_s) {
+  time_s_ = start_s;
+  together_s_ = step_s;
+  std::vector<Ref> first;
+  for (Pair* pair : island.pairs)
+    for (std::size_t k = 0; k < pair->contacts.size() && is_stepped(*pair); ++k)
+      if (is_fast(pair->contacts[k], step_s) && calc_approach(pair->contacts[k]) > 0.0) first.push_back({pair, k});
+  if (!confirm_impact(first, step_s, std::numeric_limits<double>::infinity())) return;
+  if (first.front().pair != first.back().pair) note_crowd(island, start_s + step_s);
+  strike(island, first, time_s_);
+  ++costs_.impacts;
 }
 
 /// What every body of the group does without contacts; `at_rest`: as if it had no velocity.

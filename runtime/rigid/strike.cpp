@@ -116,7 +116,7 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
 }
 
 /// Looks at the pairs of an impact again, as they are at its instant: an edge that passes another one close by was taken for a plane until
-/// now. Leaves what really strikes.
+/// now. Leaves what really strikes: what closes within together_s_ of the first, which is nearer than near_m (infinite: of now).
 bool Space::confirm_impact(std::vector<Ref>& first, double step_s, double near_m) {
   std::vector<Pair*> pairs;
   for (const Ref& ref : first)
@@ -130,7 +130,7 @@ bool Space::confirm_impact(std::vector<Ref>& first, double step_s, double near_m
       const Contact& c = pair->contacts[k];
       const double approach = calc_approach(c);
       if (c.presses || approach <= 0.5 * kSlowest || (c.touching && c.touch.gap_m <= kTouch) ||
-          c.touch.gap_m > std::max(approach * together_s_ + kTouch, near_m))
+          c.touch.gap_m > std::max(approach * together_s_ + kTouch, std::isfinite(near_m) ? near_m : 0.0))
         continue;
       first.push_back({pair, k});
       any = any || c.touch.gap_m <= near_m;
@@ -229,6 +229,7 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
   Strike record;
   record.time_s = time_s;
   record.together_s = together_s_;
+  movers_.resize(island.bodies.size());
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const auto i = static_cast<std::size_t>(island.bodies[n]);
     movers_[n] = {1.0 / solids_[i].mass_kg, placed_[i].inverse_inertia, states_[i].velocity, placed_[i].spin};
