@@ -183,6 +183,7 @@ class World::Course {
   Course(const WorldSpec& spec, const WorldOptions& options)
       : options_(options), space_(make_space(spec, options)), lasting_(list_matter(spec)) {
     check_overlaps(spec);
+    prepare_shapes(spec.ground.has_value());
     if (!options_.audits_energy) return;
     for (int i = 0; i < count(); ++i)
       if (!space_.solid(i).fixed) energy_.weight_n += space_.solid(i).mass_kg * impact::norm(spec.gravity_m_s2);
@@ -314,7 +315,9 @@ class World::Course {
     sink(stream::Mark{mark_s});
   }
 
+  std::vector<std::vector<int>> find_near() const;
   void check_overlaps(const WorldSpec& spec) const;
+  void prepare_shapes(bool has_ground) const;
 
   WorldOptions options_;
   rigid::Space space_;
@@ -329,7 +332,45 @@ class World::Course {
   double least_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
 };
 
+/// Which bodies each body shares some of its box with; of a pair, only the later one, and none of two that are fixed. In order.
+std::vector<std::vector<int>> World::Course::find_near() const {
+  std::vector<shape::Box> boxes;
+  std::vector<int> order;
+  for (int i = 0; i < count(); ++i) {
+    boxes.push_back(space_.solid(i).shape->calc_box(rigid::place(space_.solid(i), space_.state(i)).frame));
+    order.push_back(i);
+  }
+  const auto box = [&](int body) -> const shape::Box& { return boxes[static_cast<std::size_t>(body)]; };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return box(a).low[0] < box(b).low[0]; });
+  std::vector<std::vector<int>> near(boxes.size());
+  for (auto a = order.begin(); a != order.end(); ++a) {
+    for (auto b = a + 1; b != order.end() && box(*b).low[0] <= box(*a).high[0]; ++b) {
+      if (space_.solid(*a).fixed && space_.solid(*b).fixed) continue;
+      const auto is_apart = [&](std::size_t k) { return box(*a).low[k] > box(*b).high[k] || box(*b).low[k] > box(*a).high[k]; };
+      if (!is_apart(1) && !is_apart(2)) near[static_cast<std::size_t>(std::min(*a, *b))].push_back(std::max(*a, *b));
+    }
+  }
+  for (std::vector<int>& bodies : near) std::sort(bodies.begin(), bodies.end());
+  return near;
+}
+
+/// What searches will need of the shapes is made now: a scene that is heard as it runs must not wait for it. Polyhedra need it against
+/// other bodies alone, and not against each other.
+void World::Course::prepare_shapes(bool has_ground) const {
+  for (int a = 0; a < count(); ++a) {
+    const rigid::Solid& solid = space_.solid(a);
+    const auto can_meet = [&](const rigid::Solid& other) {
+      return !(solid.fixed && other.fixed) && !(solid.shape->is_polyhedron() && other.shape->is_polyhedron());
+    };
+    bool meets_bodies = false;
+    for (int b = 0; b < count() && !meets_bodies; ++b) meets_bodies = b != a && can_meet(space_.solid(b));
+    const bool meets_ground = has_ground && !solid.fixed && !solid.shape->is_polyhedron();
+    if (meets_bodies || meets_ground) solid.shape->prepare(meets_bodies);
+  }
+}
+
 void World::Course::check_overlaps(const WorldSpec& spec) const {
+  const std::vector<std::vector<int>> near = find_near();
   const auto allowed_m = [&](int body) { return std::min(2e-4, 5e-3 * space_.solid(body).shape->get_size_m()); };
   for (int a = 0; a < count(); ++a) {
     const rigid::Placed at_a = rigid::place(space_.solid(a), space_.state(a));
@@ -343,8 +384,7 @@ void World::Course::check_overlaps(const WorldSpec& spec) const {
         throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much",
                                      spec.bodies[static_cast<std::size_t>(a)].name, depth * 1e3, spec.ground->height_m));
     }
-    for (int b = a + 1; b < count(); ++b) {
-      if (space_.solid(a).fixed && space_.solid(b).fixed) continue;
+    for (const int b : near[static_cast<std::size_t>(a)]) {
       Vec3 where{};
       const double depth = shape::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
                                                rigid::place(space_.solid(b), space_.state(b)).frame, where);
