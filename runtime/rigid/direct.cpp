@@ -18,6 +18,8 @@ namespace {
 
 using impact::cross;
 using impact::dot;
+using impact::find_across;
+using impact::norm;
 using impact::operator+;
 using impact::operator-;
 using impact::operator*;
@@ -30,18 +32,10 @@ constexpr int kDense = 12;            // bodies; more are factorised as a sparse
 
 enum class Hold : char { kOpen, kSticks, kSlides };
 
-double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
-
 Row6 make_row(const Vec3& linear, const Vec3& angular) {
   Row6 r;
   r << linear[0], linear[1], linear[2], angular[0], angular[1], angular[2];
   return r;
-}
-
-/// A vector at right angles to n.
-Vec3 find_across(const Vec3& n) {
-  const Vec3 c = std::abs(n[0]) < 0.6 ? cross(n, Vec3{1, 0, 0}) : cross(n, Vec3{0, 1, 0});
-  return (1.0 / norm(c)) * c;
 }
 
 /// The system of one guess. Blocks by pairs of bodies.
