@@ -267,8 +267,10 @@ class World::Course {
     if (!space_.is_at_window()) return;
     if (!slept) audit();
     reached_s_ = space_.get_time();
-    for (int i = 0; i < count(); ++i)
-      if (is_over() || (!space_.is_still(i) && !slept) || just_slept(i)) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+    for (int i = 0; i < count(); ++i) {
+      const bool fell_asleep = just_slept(i);
+      if (is_over() || (!space_.is_still(i) && !slept) || fell_asleep) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+    }
     emit(sink);
   }
 
