@@ -323,6 +323,7 @@ class World::Course {
     energy_.motion_j = books.motion_j;
     energy_.modes_j = books.modes_j;
     energy_.most_modes_j = std::max(energy_.most_modes_j, books.modes_j);
+    if (books.modes_j > 0.0) energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j - books.motion_j));
     energy_.lost_j = books.lost_j;
     energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
     energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - least_j_);
