@@ -243,8 +243,10 @@ class World::Course {
     if (!space_.is_at_window()) return;
     if (!slept) audit();
     reached_s_ = space_.get_time();
-    for (int i = 0; i < count(); ++i)
-      if (is_over() || (!space_.is_still(i) && !slept) || just_slept(i)) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+    for (int i = 0; i < count(); ++i) {
+      const bool fell_asleep = just_slept(i);
+      if (is_over() || (!space_.is_still(i) && !slept) || fell_asleep) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+    }
     emit(sink);
   }
 
@@ -297,6 +299,7 @@ class World::Course {
     energy_.motion_j = books.motion_j;
     energy_.modes_j = books.modes_j;
     energy_.most_modes_j = std::max(energy_.most_modes_j, books.modes_j);
+    if (books.modes_j > 0.0) energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j - books.motion_j));
     energy_.lost_j = books.lost_j;
     energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
     energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - least_j_);

@@ -179,6 +179,8 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
     const contact::EnergyAudit& bodies = figures.audit->bodies;
     fmt::print(notes, "energy of bodies   rises by {:.2g} J at most, and by {:.2g} J at a hit; the largest of motion is {:.3g} J\n",
                bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j);
+    fmt::print(notes, "books              {:.4g} J = motion {:.4g} + modes {:.4g} + lost {:.4g}, to {:.2g}; modes had {:.3g} J at most\n",
+               bodies.start_j, bodies.motion_j, bodies.modes_j, bodies.lost_j, bodies.error_j, bodies.most_modes_j);
     fmt::print(notes, "energy of modes    rises by a share of {:.2g} at most while nothing acts\n", figures.audit->modes_rise);
     fmt::print(notes, "energy books       at the start {:.4g} J; at the end, of that:\n", bodies.start_j);
     fmt::print(notes, "  motion           {:.4g} J, kinetic and of gravity\n", bodies.motion_j);

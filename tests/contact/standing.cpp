@@ -37,6 +37,21 @@ TEST(Standing, ABoxOnOthersDoesNotCreep) {
   EXPECT_LT(course.last_hit_s, 1.0);
 }
 
+TEST(Standing, WhatFallsAsleepSaysSoByALastMotionAtRest) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04});
+  WorldSpec w;
+  w.ground = GroundSpec{};
+  w.bodies = {make_body(box, {0, 0, 0.06})};
+  w.bodies[0].initial.rotation = {1.0, 0.3, 0.2, 0.1};
+  World world(w, {.end_s = 10.0});
+  stream::Motion last;
+  world.advance(5.0, std::numeric_limits<double>::infinity(), [&](const stream::Event& e) {
+    if (const auto* m = std::get_if<stream::Motion>(&e)) last = *m;
+  });
+  EXPECT_LT(last.time_s, 4.0);
+  EXPECT_EQ(norm(last.velocity_m_s), 0.0);
+}
+
 TEST(Standing, OnASlopeThatFrictionHoldsNothingCreeps) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04}), plane = make_box({1.0, 0.4, 0.04});
   for (const double part : {0.5, 0.9, 0.98}) {
