@@ -45,7 +45,7 @@ constexpr double kShortest = 1e-9;  // s; an integration that needs shorter step
 class Tree final : public Mechanism {
  public:
   Tree(const std::vector<Member>& members, const std::vector<Joint>& joints, const Vec3& gravity)
-      : matter_(system_), forces_(system_), gravity_(forces_, matter_, to_simtk(gravity)), bodies_(members.size()) {
+      : matter_(system_), bodies_(members.size()) {
     matter_.setShowDefaultGeometry(false);
     build(members, joints);
     state_ = system_.realizeTopology();
@@ -55,6 +55,9 @@ class Tree final : public Mechanism {
       const MobilizedBody& body = matter_.getMobilizedBody(d.body);
       for (int k = 0; k < body.getNumU(state_); ++k) damping_[static_cast<std::size_t>(body.getFirstUIndex(state_)) + k] = d.damping;
     }
+    weights_.resize(matter_.getNumBodies());
+    weights_.setToZero();
+    for (std::size_t i = 0; i < members.size(); ++i) weights_[bodies_[i]][1] = members[i].mass_kg * to_simtk(gravity);
     start(members);
   }
 
@@ -120,8 +123,9 @@ class Tree final : public Mechanism {
   }
 
   void find_accelerations(const Coordinates& at, std::vector<Spatial>& out) override {
-    set(at, Stage::Dynamics);
+    set(at, Stage::Velocity);
     (void)calc_accelerations();
+    matter_.calcBodyAccelerationFromUDot(state_, rates_, body_rates_);
     out.resize(bodies_.size());
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const SpatialVec& a = body_rates_[bodies_[i]];
@@ -288,7 +292,7 @@ class Tree final : public Mechanism {
     const std::size_t nq = static_cast<std::size_t>(q.size()), nu = static_cast<std::size_t>(u.size());
     for (std::size_t i = 0; i < nq; ++i) q[static_cast<int>(i)] = x[i];
     for (std::size_t i = 0; i < nu; ++i) u[static_cast<int>(i)] = x[nq + i];
-    system_.realize(state_, Stage::Dynamics);
+    system_.realize(state_, Stage::Velocity);
     const double power = calc_accelerations();
     const SimTK::Vector& qdot = state_.getQDot();
     k.resize(nq + nu + 1);
@@ -297,7 +301,7 @@ class Tree final : public Mechanism {
     k[nq + nu] = power;
   }
 
-  /// By gravity, which Simbody has, and damping; the power of the damping.
+  /// By gravity and damping; the power of the damping.
   double calc_accelerations() {
     const SimTK::Vector& u = state_.getU();
     mobility_forces_.resize(u.size());
@@ -307,8 +311,9 @@ class Tree final : public Mechanism {
       mobility_forces_[i] = -damping * u[i];
       power += damping * u[i] * u[i];
     }
-    const SimTK::Vector_<SpatialVec>& on = system_.getRigidBodyForces(state_, Stage::Dynamics);
-    matter_.calcAccelerationIgnoringConstraints(state_, mobility_forces_, on, rates_, body_rates_);
+    // M u' = forces - bias, the bias by Newton and Euler's recursion.
+    matter_.calcResidualForceIgnoringConstraints(state_, mobility_forces_, weights_, SimTK::Vector(), residual_);
+    matter_.multiplyByMInv(state_, -residual_, rates_);
     return power;
   }
 
@@ -334,8 +339,6 @@ class Tree final : public Mechanism {
 
   SimTK::MultibodySystem system_;
   SimTK::SimbodyMatterSubsystem matter_;
-  SimTK::GeneralForceSubsystem forces_;
-  SimTK::Force::UniformGravity gravity_;
   std::vector<SimTK::MobilizedBodyIndex> bodies_;
   std::vector<Damped> damped_;
   std::vector<double> damping_;
@@ -343,8 +346,8 @@ class Tree final : public Mechanism {
   Coordinates start_;
   double start_error_ = 0.0;
   std::vector<double> x_, y_, k1_, k2_, k3_, k4_, k5_;
-  SimTK::Vector mobility_forces_, rates_;
-  SimTK::Vector_<SpatialVec> body_rates_;
+  SimTK::Vector mobility_forces_, residual_, rates_;
+  SimTK::Vector_<SpatialVec> weights_, body_rates_;
 };
 
 }  // namespace
