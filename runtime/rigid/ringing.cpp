@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "runtime/impact/predict.hpp"
+#include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
 
 namespace carillon::rigid {
@@ -16,8 +17,6 @@ namespace {
 using impact::cross;
 using impact::dot;
 
-constexpr double kSlowest = 1e-3;   // m/s
-constexpr double kTouchM = 1e-7;    // m; nearer than this is in touch
 constexpr int kMostPresses = 8;     // of one impact
 constexpr double kLongest = 50e-3;  // s; what presses for longer rests
 
@@ -88,21 +87,19 @@ shape::Place Space::find_place(int body, const shape::Touch& touch, bool is_a) c
                                       back * ((is_a ? -1.0 : 1.0) * touch.normal));
 }
 
-/// 1/R of the summed curvatures, within what a contact can have (calc_hertz_duration).
-double Space::calc_contact_radius(const shape::Touch& touch, int a, int b) const {
-  double largest = 0.5 * solid(a).shape->get_size_m();
-  if (b >= 0) largest = std::min(largest, 0.5 * solid(b).shape->get_size_m());
-  const double curvature = std::max(touch.curvature_a_per_m + touch.curvature_b_per_m, 0.0);
-  return 1.0 / std::clamp(curvature, 1.0 / std::max(largest, 0.5e-3), 1.0 / 0.5e-3);
+impact::Spring Space::make_spring(const shape::Touch& touch, int a, int b) const {
+  const Elasticity ea = get_elasticity(a), eb = get_elasticity(b);
+  return {.stiffness = impact::calc_hertz_stiffness(ea.young_modulus_pa, ea.poisson_ratio, eb.young_modulus_pa, eb.poisson_ratio,
+                                                    calc_contact_radius(touch, a, b))};
 }
 
 /// Caps the restitution of every hit by what its modes take; true where an impact has to be integrated.
-bool Space::predict_hits(const std::vector<std::pair<Pair*, std::size_t>>& taken, std::vector<Hit>& hits, std::vector<Point>& points) {
+bool Space::predict_hits(const std::vector<Ref>& taken, std::vector<Hit>& hits, std::vector<Point>& points) {
   bool integrate = false;
   for (std::size_t n = 0; n < hits.size(); ++n) {
     Hit& hit = hits[n];
-    const Contact& c = taken[n].first->contacts[taken[n].second];
-    if (!(hit.approach_m_s > kSlowest) || (c.touching && c.touch.gap_m <= 1e-7)) continue;
+    const Contact& c = taken[n].get();
+    if (!(hit.approach_m_s > kSlowest) || (c.touching && c.touch.gap_m <= kTouch)) continue;
     if (Ringing* own = find_own_ringing(hit); own != nullptr) {
       integrate = true;
       continue;
@@ -110,11 +107,7 @@ bool Space::predict_hits(const std::vector<std::pair<Pair*, std::size_t>>& taken
     if (!rings(hit.a) && !rings(hit.b)) continue;
     if (!(hit.restitution > 0.0)) continue;  // it stays: weight keeps the surfaces together (strike())
     const double inverse_mass = dot(hit.touch.normal, calc_mobility(movers_, points[n]) * hit.touch.normal);
-    const Solid& a = solid(hit.a);
-    const double young = hit.b >= 0 ? solid(hit.b).young_modulus_pa : ground_->young_modulus_pa;
-    const double poisson = hit.b >= 0 ? solid(hit.b).poisson_ratio : ground_->poisson_ratio;
-    const impact::Spring spring{.stiffness = impact::calc_hertz_stiffness(a.young_modulus_pa, a.poisson_ratio, young, poisson,
-                                                                          calc_contact_radius(hit.touch, hit.a, hit.b))};
+    const impact::Spring spring = make_spring(hit.touch, hit.a, hit.b);
     std::vector<double> phi[2];
     impact::Side sides[2];
     for (const int side : {0, 1}) {
@@ -174,18 +167,18 @@ std::vector<double> Space::find_shape(int body, const std::vector<double>& shape
 
 /// Begins an impact with modes, or lets the hits join one that is on its way. False where there are too many points: the rigid impact
 /// stands.
-bool Space::begin_ringing(const std::vector<std::pair<Pair*, std::size_t>>& taken, const std::vector<Hit>& hits, double time_s) {
+bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s) {
   std::vector<std::size_t> order;
   for (std::size_t n = 0; n < hits.size(); ++n)
     if (hits[n].approach_m_s > kSlowest) order.push_back(n);
   if (order.empty()) return false;
   // What leans on something else is struck as a rigid body, with what stands behind it.
-  for (const auto& [pair, contact] : taken) {
-    const Contact& c = pair->contacts[contact];
-    if (!c.touching || c.presses || c.touch.gap_m > kTouchM) continue;
+  for (const Ref& ref : taken) {
+    const Contact& c = ref.get();
+    if (!c.touching || c.presses || c.touch.gap_m > kTouch) continue;
     for (const std::size_t n : order)
       for (const int body : {hits[n].a, hits[n].b})
-        if (body >= 0 && moves(body) && (body == pair->a || body == pair->b) && !in_ringing_[static_cast<std::size_t>(body)]) return false;
+        if (moves(body) && (body == c.a || body == c.b) && !in_ringing_[static_cast<std::size_t>(body)]) return false;
   }
   Ringing* joined = nullptr;
   // A hit on a shelf that an impact of another group has stays out of this one.
@@ -199,13 +192,11 @@ bool Space::begin_ringing(const std::vector<std::pair<Pair*, std::size_t>>& take
     if (joined == nullptr)
       joined = found;
     else
-      release(*found, time_s);  // what it has in its springs is lost
+      end_ringing(*found, time_s);  // what it has in its springs is lost
   }
-  ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
   if (order.size() + (joined != nullptr ? joined->presses.size() : 0) > kMostPresses) {
     if (joined != nullptr) {
-      release(*joined, time_s);
-      ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+      end_ringing(*joined, time_s);
       joined = nullptr;
     }
     if (order.size() > kMostPresses) {
@@ -240,7 +231,7 @@ bool Space::begin_ringing(const std::vector<std::pair<Pair*, std::size_t>>& take
   std::list<std::vector<double>> shapes;  // kept until the impact has them
   for (const std::size_t n : order) {
     const Hit& hit = hits[n];
-    Contact& c = taken[n].first->contacts[taken[n].second];
+    Contact& c = taken[n].get();
     Press press;
     press.a = hit.a;
     press.b = hit.b;
@@ -253,11 +244,7 @@ bool Space::begin_ringing(const std::vector<std::pair<Pair*, std::size_t>>& take
     contact.normal = hit.touch.normal;
     // Surfaces are where the motion of the rigid bodies has them; what modes lift or lower there is small, and must not press a spring.
     contact.gap_m = std::max(hit.touch.gap_m, 0.0);
-    const Solid& first = solid(hit.a);
-    const double young = hit.b >= 0 ? solid(hit.b).young_modulus_pa : ground_->young_modulus_pa;
-    const double poisson = hit.b >= 0 ? solid(hit.b).poisson_ratio : ground_->poisson_ratio;
-    contact.spring.stiffness = impact::calc_hertz_stiffness(first.young_modulus_pa, first.poisson_ratio, young, poisson,
-                                                            calc_contact_radius(hit.touch, hit.a, hit.b));
+    contact.spring = make_spring(hit.touch, hit.a, hit.b);
     contact.restitution = calc_pair_restitution(hit.a, hit.b);
     contact.friction = calc_pair_friction(hit.a, hit.b);
     if (rings(hit.a)) {
@@ -308,13 +295,10 @@ void Space::release_what_rests(const Island& island) {
   if (ringings_.empty()) return;
   for (const Pair* pair : island.pairs)
     for (const Contact& c : pair->contacts) {
-      if (c.presses || c.touch.gap_m > kTouchM) continue;
+      if (c.presses || c.touch.gap_m > kTouch) continue;
       for (const int body : {pair->a, pair->b}) {
-        Ringing* ringing = body >= 0 && moves(body) ? find_ringing(body) : nullptr;
-        const Vec3 u = calc_velocity(pair->a, c.touch.where_m) - calc_velocity(pair->b, c.touch.where_m);
-        if (ringing == nullptr || std::abs(dot(u, c.touch.normal)) > kSlowest) continue;
-        release(*ringing, time_s_);
-        ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+        Ringing* ringing = moves(body) ? find_ringing(body) : nullptr;
+        if (ringing != nullptr && std::abs(calc_approach(c)) <= kSlowest) end_ringing(*ringing, time_s_);
       }
     }
 }
@@ -455,10 +439,15 @@ void Space::release(Ringing& ringing, double time_s) {
     for (Contact& c : pair.contacts)
       for (const Press& press : ringing.presses) {
         const bool same = (press.a == key.first && press.b == key.second) || (press.b == key.first && press.a == key.second);
-        if (same && c.presses) c.presses = false, c.touching = false, c.since_s = time_s;
+        if (same && c.presses) c.presses = false, c.touching = false;
       }
   ringing.impact = nullptr;
   ringing.bodies.clear();
+}
+
+void Space::end_ringing(Ringing& ringing, double time_s) {
+  release(ringing, time_s);
+  ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
 }
 
 Books Space::calc_books() const {

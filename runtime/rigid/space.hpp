@@ -47,7 +47,6 @@ struct Contact {
   Vec3 impulse{}, couple{};  // of the last step, on a [N s, N m s]
   double step_s = 0.0;       // its length
   double lost_j = 0.0;       // by it, in that step
-  double since_s = 0.0;      // touching since, or apart since
 };
 
 /// One point of an impact. Momentum and place in the world.
@@ -105,7 +104,6 @@ class Space {
   const Solid& solid(int body) const { return solids_[static_cast<std::size_t>(body)]; }
   const State& state(int body) const { return states_[static_cast<std::size_t>(body)]; }
   const std::vector<State>& states() const { return states_; }
-  bool is_asleep(int body) const { return asleep_[static_cast<std::size_t>(body)] != 0; }
   /// Fixed or asleep.
   bool is_still(int body) const { return !moves(body); }
   bool is_all_asleep() const;
@@ -140,8 +138,15 @@ class Space {
     std::vector<int> bodies;
     std::vector<Pair*> pairs;
   };
-  struct Box {
-    Vec3 low{}, high{};
+  /// A contact by its place in a pair.
+  struct Ref {
+    Pair* pair = nullptr;
+    std::size_t contact = 0;
+    Contact& get() const { return pair->contacts[contact]; }
+    bool operator==(const Ref&) const = default;
+  };
+  struct Elasticity {
+    double young_modulus_pa = 0.0, poisson_ratio = 0.0;
   };
 
   /// The modal state of a body at a time.
@@ -164,62 +169,18 @@ class Space {
     std::vector<int> bodies;  // in the order of the impact's
     std::vector<Press> presses;
   };
-  struct RowOf {
-    Pair* pair = nullptr;
-    std::size_t contact = 0;
-  };
 
+  // space.cpp: windows, pairs, groups
   void open_window(double end_s);
-  void count_groups(const std::vector<Box>& boxes);
+  void count_islands();
   void add_pair(int a, int b);
   void sort_near();
   void search(Pair& pair, double step_s);
   void refresh(Pair& pair);
   void update(Pair& pair, double step_s);
   std::vector<Island> make_islands();
-  void step_island(Island& island, double start_s, double step_s);
-  void solve(double tolerance_m_s);
-  void predict(const Island& island, double h, bool at_rest);
-  void make_points(Island& island, double h, bool leaves_impacts);
-  bool is_fast(const Contact& contact, double approach, double h) const;
-  bool find_impact(const Island& island, double h, double& at_s, std::vector<std::pair<Pair*, std::size_t>>& first);
-  bool confirm_impact(std::vector<std::pair<Pair*, std::size_t>>& first, double step_s, double near_m);
-  double calc_loss(const Point& point, double part) const;
-  double calc_energy(const Island& island) const;
-  void take_gain(const Island& island, double before_j);
-  void strike(Island& island, const std::vector<std::pair<Pair*, std::size_t>>& first, double time_s);
-  bool predict_hits(const std::vector<std::pair<Pair*, std::size_t>>& taken, std::vector<Hit>& hits, std::vector<Point>& points);
-  bool begin_ringing(const std::vector<std::pair<Pair*, std::size_t>>& taken, const std::vector<Hit>& hits, double time_s);
-  void release_what_rests(const Island& island);
-  void advance_ringings(const Island& island, double to_s, double part_s, double step_s);
-  void give_to_modes(Strike& record, double taken_j);
-  void keep_pulses(Ringing& ringing);
-  void hand_out_forces(Press& press);
-  void release(Ringing& ringing, double time_s);
-  Ring& ring_until(int body, double time_s);
-  impact::Body make_struck(int body, double time_s);
-  shape::Place find_place(int body, const shape::Touch& touch, bool is_a) const;
-  std::vector<double> find_shape(int body, const std::vector<double>& shape) const;
-  Ringing* find_ringing(int body);
-  Ringing* find_own_ringing(const Hit& hit);
-  bool is_pressed(const Pair& pair, const Vec3& where) const;
-  double calc_contact_radius(const shape::Touch& touch, int a, int b) const;
-  /// Does an impact with modes move this body at present?
-  bool has_impact(int body) const { return body >= 0 && moves(body) && in_ringing_[static_cast<std::size_t>(body)] != 0; }
-  bool rings(int body) const { return body >= 0 && solids_[static_cast<std::size_t>(body)].modes != nullptr; }
-  bool may_rest(const Island& island);
-  bool rests(Island& island, double h);
-  State calc_moved(int body, const Mover& mover, const Vec3& turned, double part_s, double step_s) const;
   void place_body(int body);
   void check_finite(int body) const;
-  bool is_fixed(int body) const { return body < 0 || solids_[static_cast<std::size_t>(body)].fixed; }
-  bool moves(int body) const { return !is_fixed(body) && !asleep_[static_cast<std::size_t>(body)]; }
-  /// Are both bodies of a pair, as far as they move, in the group that is being stepped? A touch that was found in this step waits for the
-  /// next.
-  bool is_stepped(const Pair& pair) const {
-    const auto is_in = [this](int body) { return is_fixed(body) || index_[static_cast<std::size_t>(body)] >= 0; };
-    return is_in(pair.a) && is_in(pair.b);
-  }
   void wake(int body);
   void reach_out(int body);
   double calc_pair_friction(int a, int b) const;
@@ -227,7 +188,71 @@ class Space {
   double calc_pair_speed(int a, int b) const;
   double calc_pair_size(int a, int b) const;
   Vec3 calc_velocity(int body, const Vec3& where) const;
-  Box calc_box(int body, double grown_m) const;
+  double calc_approach(const Contact& contact) const;
+  shape::Box calc_box(int body, double grown_m) const;
+
+  // step.cpp: one group through one small step
+  void step_island(Island& island, double start_s, double step_s);
+  void predict(const Island& island, double h, bool at_rest);
+  Point make_point(const Contact& contact) const;
+  void make_points(Island& island, double h, bool leaves_impacts);
+  void solve(double tolerance_m_s);
+  void sum_turned();
+  State calc_moved(std::size_t n, double part_s, double step_s) const;
+  double calc_loss(const Point& point, double part) const;
+  void keep_impulses(double at_s, double h);
+  void move_bodies(const Island& island, double to_s, double part_s, double h, double before_j);
+  double calc_energy(const Island& island) const;
+  void take_gain(const Island& island, double before_j);
+  bool may_rest(const Island& island, double h);
+  bool rests(Island& island, double h);
+
+  // strike.cpp: impacts
+  Elasticity get_elasticity(int body) const;
+  double calc_contact_radius(const shape::Touch& touch, int a, int b) const;
+  bool is_fast(const Contact& contact, double h) const;
+  bool find_impact(const Island& island, double h, double& at_s, std::vector<Ref>& first);
+  bool confirm_impact(std::vector<Ref>& first, double step_s, double near_m);
+  std::vector<Ref> gather_points(const Island& island, const std::vector<Ref>& first) const;
+  Hit make_hit(const Contact& contact, Point& point) const;
+  double calc_conserving_part(const std::vector<Mover>& before, const std::vector<Point>& points) const;
+  double give_impulses(Strike& record, const std::vector<Point>& points);
+  void strike(Island& island, const std::vector<Ref>& first, double time_s);
+  void give_to_modes(Strike& record, double taken_j);
+
+  // ringing.cpp: impacts with modes
+  bool predict_hits(const std::vector<Ref>& taken, std::vector<Hit>& hits, std::vector<Point>& points);
+  bool begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s);
+  void release_what_rests(const Island& island);
+  void advance_ringings(const Island& island, double to_s, double part_s, double step_s);
+  void keep_pulses(Ringing& ringing);
+  void hand_out_forces(Press& press);
+  void release(Ringing& ringing, double time_s);
+  void end_ringing(Ringing& ringing, double time_s);
+  Ring& ring_until(int body, double time_s);
+  impact::Body make_struck(int body, double time_s);
+  impact::Spring make_spring(const shape::Touch& touch, int a, int b) const;
+  shape::Place find_place(int body, const shape::Touch& touch, bool is_a) const;
+  std::vector<double> find_shape(int body, const std::vector<double>& shape) const;
+  Ringing* find_ringing(int body);
+  Ringing* find_own_ringing(const Hit& hit);
+  bool is_pressed(const Pair& pair, const Vec3& where) const;
+
+  /// Does an impact with modes move this body at present?
+  bool has_impact(int body) const { return moves(body) && in_ringing_[static_cast<std::size_t>(body)] != 0; }
+  bool rings(int body) const { return body >= 0 && solids_[static_cast<std::size_t>(body)].modes != nullptr; }
+  /// -1 is the ground: fixed.
+  bool is_fixed(int body) const { return body < 0 || solids_[static_cast<std::size_t>(body)].fixed; }
+  bool moves(int body) const { return !is_fixed(body) && !asleep_[static_cast<std::size_t>(body)]; }
+  /// In the group that is being stepped; -1: does not move.
+  int find_index(int body) const { return moves(body) ? index_[static_cast<std::size_t>(body)] : -1; }
+  const shape::Shape* get_shape(int body) const { return body >= 0 ? solid(body).shape.get() : nullptr; }
+  /// Are both bodies of a pair, as far as they move, in the group that is being stepped? A touch that was found in this step waits for the
+  /// next.
+  bool is_stepped(const Pair& pair) const {
+    const auto is_in = [this](int body) { return is_fixed(body) || index_[static_cast<std::size_t>(body)] >= 0; };
+    return is_in(pair.a) && is_in(pair.b);
+  }
 
   std::vector<Solid> solids_;
   std::vector<State> states_;
@@ -258,14 +283,14 @@ class Space {
   std::vector<Vec3> free_spin_;
   std::vector<Placed> free_;
   std::vector<Point> points_;
-  std::vector<RowOf> rows_;  // of points_
+  std::vector<Vec3> turned_;  // angular impulses on them
+  std::vector<Ref> rows_;     // of points_
   std::vector<std::size_t> order_;
   std::vector<shape::Touch> touches_;
 };
 
 /// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), kept within 5 us .. 20 ms.
-/// 1/R is the summed curvature, kept within 1/(0.5 mm) and 1/`largest_radius_m`.
-double calc_hertz_duration(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double curvature_per_m, double mass_kg,
-                           double speed_m_s, double largest_radius_m);
+double calc_hertz_duration(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double radius_m, double mass_kg,
+                           double speed_m_s);
 
 }  // namespace carillon::rigid

@@ -1,0 +1,30 @@
+// Which bodies belong together: a union-find.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+namespace carillon::rigid {
+
+class Groups {
+ public:
+  explicit Groups(int count) : parent_(static_cast<std::size_t>(count)) { std::iota(parent_.begin(), parent_.end(), 0); }
+  /// The smallest number in the group of `i`.
+  int find(int i) {
+    while (at(i) != i) i = at(i) = at(at(i));
+    return i;
+  }
+  void join(int i, int j) {
+    const auto [low, high] = std::minmax({find(i), find(j)});
+    at(high) = low;
+  }
+
+ private:
+  int& at(int i) { return parent_[static_cast<std::size_t>(i)]; }
+  std::vector<int> parent_;
+};
+
+}  // namespace carillon::rigid

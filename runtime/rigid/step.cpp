@@ -1,0 +1,387 @@
+// Method: one group through one small step. A touch that lasts is a row of one velocity problem; impulses act at the middle of the step and
+//   places follow from the mean of the velocities at its two ends. With the arm from x0 + h v0 / 2 momentum and angular momentum of a free
+//   group are conserved to rounding, and a contact that neither slides nor strikes does no work. Rest is proven by a solution with zero
+//   velocities.
+// Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the step with the impulse at its middle.
+// Deviations: fast touches end the step at their instant (strike.cpp).
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "runtime/rigid/limits.hpp"
+#include "runtime/rigid/space.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+using impact::cross;
+using impact::dot;
+
+constexpr double kShortest = 1e-9;    // s; what is left of a step and shorter than this is not made
+constexpr double kFarTooDeep = 5e-5;  // m; from here on it comes up at any price
+constexpr double kSettling = 0.02;    // m/s; a group that is slower is about to rest
+constexpr double kAtRest = 1e-6;      // m/s
+constexpr double kSlow = 5e-3;        // m/s; of what may be about to rest
+constexpr double kPatience = 0.02;    // s; for so long
+constexpr double kBalanced = 1e-4;    // of gravity: what a solution with zero velocity may leave
+constexpr int kMostMissed = 30;       // in a step: instants at which nothing struck after all
+constexpr int kMostImpacts = 8;       // of a group in a step
+
+}  // namespace
+
+void Space::step_island(Island& island, double start_s, double step_s) {
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) index_[static_cast<std::size_t>(island.bodies[n])] = static_cast<int>(n);
+  stepped_ = &island.bodies;
+  double done = 0.0;
+  int impacts = 0, missed = 0;
+  const double g = norm(gravity_);
+  while (step_s - done > kShortest) {
+    const double h = step_s - done;
+    time_s_ = start_s + done;
+    const bool slow = impacts == 0 && done == 0.0 && may_rest(island, h);
+    if (slow && rests(island, h)) break;
+    release_what_rests(island);
+    predict(island, h, false);
+    make_points(island, h, impacts < kMostImpacts);
+    const double tolerance = options_.tolerance * std::max(g, 1.0) * h;
+    const double energy_before = calc_energy(island);
+    solve(tolerance);
+    sum_turned();
+    double at = h;
+    std::vector<Ref> first;
+    const bool struck = impacts < kMostImpacts && find_impact(island, h, at, first);
+    keep_impulses(at, h);
+    for (Pair* pair : island.pairs) pair->travelled_m += (calc_pair_speed(pair->a, pair->b) + g * h) * at + 1e-12;
+    move_bodies(island, start_s + done + at, at, h, energy_before);
+    done += at;
+    if (struck) {
+      time_s_ = start_s + done;
+      for (Pair* pair : island.pairs)
+        if (!pair->contacts.empty()) refresh(*pair);
+      if (confirm_impact(first, step_s - done, kDeep * (1 + missed))) {
+        strike(island, first, time_s_);
+        ++costs_.impacts;
+        ++impacts;
+      } else if (++missed > kMostMissed) {
+        impacts = kMostImpacts;
+      }
+    }
+    if (step_s - done > kShortest)
+      for (Pair* pair : island.pairs) update(*pair, step_s - done);
+  }
+  for (const int body : island.bodies) index_[static_cast<std::size_t>(body)] = -1;
+}
+
+/// What every body of the group does without contacts; `at_rest`: as if it had no velocity.
+void Space::predict(const Island& island, double h, bool at_rest) {
+  movers_.resize(island.bodies.size());
+  free_spin_.resize(island.bodies.size());
+  free_.resize(island.bodies.size());
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    const auto i = static_cast<std::size_t>(island.bodies[n]);
+    State from = states_[i];
+    if (at_rest) from.velocity = from.momentum = {};
+    const State to = fly(solids_[i], from, gravity_, h);
+    const Placed there = place(solids_[i], to);
+    movers_[n] = {1.0 / solids_[i].mass_kg, there.inverse_inertia, to.velocity, there.spin};
+    free_spin_[n] = there.spin;
+    free_[n] = there;
+  }
+}
+
+/// A contact as it is now, between the bodies of the group that is being stepped.
+Point Space::make_point(const Contact& c) const {
+  Point p;
+  p.a = find_index(c.a);
+  p.b = find_index(c.b);
+  p.normal = c.touch.normal;
+  if (p.a >= 0) p.arm_a = c.touch.where_m - states_[static_cast<std::size_t>(c.a)].centre;
+  if (p.b >= 0) p.arm_b = c.touch.where_m - states_[static_cast<std::size_t>(c.b)].centre;
+  p.friction = calc_pair_friction(c.a, c.b);
+  return p;
+}
+
+void Space::make_points(Island& island, double h, bool leaves_impacts) {
+  points_.clear();
+  rows_.clear();
+  for (Pair* pair : island.pairs) {
+    if (!is_stepped(*pair)) continue;
+    for (std::size_t k = 0; k < pair->contacts.size(); ++k) {
+      Contact& c = pair->contacts[k];
+      const shape::Touch& t = c.touch;
+      const double approach = calc_approach(c);
+      if (c.presses || (leaves_impacts && is_fast(c, h))) continue;
+      // The impact has these bodies; what stands still and rings goes on carrying others.
+      if (has_impact(pair->a) || has_impact(pair->b)) continue;
+      if (t.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(gravity_) * h * h && !c.touching) continue;
+      Point p = make_point(c);
+      // Where the impulse acts: half a step on, the same point for both bodies.
+      struct Side {
+        Vec3 middle{}, first{}, last{};  // centre half a step on; arms at both ends
+      };
+      const auto make_side = [&](int body, int index) {
+        const auto i = static_cast<std::size_t>(body), n = static_cast<std::size_t>(index);
+        Side side;
+        side.middle = states_[i].centre + (0.5 * h) * states_[i].velocity;
+        side.first = t.where_m - states_[i].centre;
+        side.last = t.smooth ? side.first : free_[n].rotation * (transpose(placed_[i].rotation) * side.first);
+        return side;
+      };
+      Vec3 where{};
+      Side sa, sb;
+      if (p.a >= 0) sa = make_side(pair->a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
+      if (p.b >= 0) {
+        sb = make_side(pair->b, p.b);
+        const Vec3 other = sb.middle + 0.5 * (sb.first + sb.last);
+        where = p.a >= 0 ? 0.5 * (where + other) : other;
+      }
+      // What the arms turn beyond that point until the end of the step belongs to the velocity there.
+      Vec3 beyond{};
+      if (p.a >= 0) {
+        p.arm_a = where - sa.middle;
+        beyond = beyond + cross(free_spin_[static_cast<std::size_t>(p.a)], 0.5 * (sa.last - sa.first));
+      }
+      if (p.b >= 0) {
+        p.arm_b = where - sb.middle;
+        beyond = beyond - cross(free_spin_[static_cast<std::size_t>(p.b)], 0.5 * (sb.last - sb.first));
+      }
+      // What touches and is at rest stays so exactly: a picometre is no gap, and would be a force.
+      const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
+      double least = rests ? 0.0 : std::min(0.0, approach - 2.0 * t.gap_m / h);
+      // What is too deep comes up, at half the power that the contact loses, so that no energy comes of it.
+      if (t.gap_m < -kDeep) {
+        const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
+        const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep ? 0.005 : paid);
+        if (approach > -up) least = up;
+      }
+      p.wanted = least * t.normal - beyond;
+      const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
+      if (t.smooth && curvature > 0.0) {
+        p.rolling_m = options_.rolling_resistance / curvature;
+        p.twisting_m = 1e-2 * p.friction / curvature;
+      }
+      p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
+      p.couple = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.couple;
+      points_.push_back(p);
+      rows_.push_back({pair, k});
+    }
+  }
+  // From below to above, so that a sweep carries the weight down a pile.
+  order_.resize(points_.size());
+  std::iota(order_.begin(), order_.end(), std::size_t{0});
+  const auto height = [&](std::size_t n) { return -dot(rows_[n].get().touch.where_m, gravity_); };
+  std::stable_sort(order_.begin(), order_.end(), [&](std::size_t x, std::size_t y) { return height(x) < height(y); });
+  std::vector<Point> points;
+  std::vector<Ref> rows;
+  for (const std::size_t n : order_) points.push_back(points_[n]), rows.push_back(rows_[n]);
+  points_.swap(points);
+  rows_.swap(rows);
+}
+
+/// Small groups at once; large ones in sweeps, which begin at the impulses of the step before.
+void Space::solve(double tolerance_m_s) {
+  ++costs_.solves;
+  if (points_.empty()) return;
+  const std::vector<Mover> free = movers_;
+  const std::vector<Point> begun = points_;
+  // Contacts take energy from the motion without them, or none.
+  const auto gains = [&] {
+    double gained = 0.0, size = 0.0;
+    for (const Point& p : points_) {
+      const double work = 0.5 * dot(p.impulse, calc_relative_velocity(free, p) + calc_relative_velocity(movers_, p));
+      gained += work;
+      size += std::abs(work);
+    }
+    return gained > 1e-9 * size;
+  };
+  // What is about to rest is worth it: sweeps would let a pile tremble for long.
+  double fastest = 0.0;
+  for (std::size_t n = 0; n < stepped_->size(); ++n) {
+    const auto i = static_cast<std::size_t>((*stepped_)[n]);
+    fastest = std::max(fastest, norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m);
+  }
+  const int most_direct = fastest < kSettling ? options_.most_settling : options_.most_direct;
+  if (static_cast<int>(movers_.size()) <= most_direct) {
+    if (solver_.solve_directly(movers_, points_, 12) && !gains()) return;
+    movers_ = free;
+    points_ = begun;
+  }
+  solver_.solve(movers_, points_, tolerance_m_s, options_.most_sweeps);
+  costs_.sweeps += solver_.get_sweeps();
+  if (!gains()) return;
+  // Sweeps that begin at zero impulses never add any.
+  movers_ = free;
+  points_ = begun;
+  for (Point& p : points_) p.impulse = p.couple = {};
+  solver_.solve(movers_, points_, tolerance_m_s, options_.most_sweeps);
+  costs_.sweeps += solver_.get_sweeps();
+}
+
+/// The angular impulses of all points on each body.
+void Space::sum_turned() {
+  turned_.assign(movers_.size(), Vec3{});
+  for (const Point& p : points_) {
+    if (p.a >= 0) turned_[static_cast<std::size_t>(p.a)] = turned_[static_cast<std::size_t>(p.a)] + cross(p.arm_a, p.impulse) + p.couple;
+    if (p.b >= 0) turned_[static_cast<std::size_t>(p.b)] = turned_[static_cast<std::size_t>(p.b)] - cross(p.arm_b, p.impulse) - p.couple;
+  }
+}
+
+/// The nth body of the group, a part of the step on: what the contacts gave it acts all along.
+State Space::calc_moved(std::size_t n, double part_s, double step_s) const {
+  const auto i = static_cast<std::size_t>((*stepped_)[n]);
+  State to = fly(solids_[i], states_[i], gravity_, part_s);
+  const Vec3 gained = (1.0 / step_s) * (movers_[n].velocity - (states_[i].velocity + step_s * gravity_));
+  to.velocity = to.velocity + part_s * gained;
+  to.centre = to.centre + (0.5 * part_s * part_s) * gained;
+  const Vec3 spun = movers_[n].spin - free_spin_[n];
+  to.rotation = normalise(multiply(make_turn((0.5 * part_s * part_s / step_s) * spun), to.rotation));
+  to.momentum = to.momentum + (part_s / step_s) * turned_[n];
+  return to;
+}
+
+/// What a point took from the motion in the first part of a step [J]: its impulses times the means of the velocities before and after.
+double Space::calc_loss(const Point& p, double part) const {
+  Vec3 u = part * calc_relative_velocity(movers_, p), w = part * calc_relative_spin(movers_, p);
+  const auto add = [&](int index, const Vec3& arm, double sign) {
+    if (index < 0) return;
+    const auto i = static_cast<std::size_t>((*stepped_)[static_cast<std::size_t>(index)]);
+    u = u + ((2.0 - part) * sign) * (states_[i].velocity + cross(placed_[i].spin, arm));
+    w = w + ((2.0 - part) * sign) * placed_[i].spin;
+  };
+  add(p.a, p.arm_a, 1.0);
+  add(p.b, p.arm_b, -1.0);
+  return -0.5 * part * (dot(p.impulse, u) + dot(p.couple, w));
+}
+
+/// Writes the impulses of a step into its contacts; `at_s` of it is made.
+void Space::keep_impulses(double at_s, double h) {
+  for (std::size_t n = 0; n < points_.size(); ++n) {
+    Contact& c = rows_[n].get();
+    c.impulse = points_[n].impulse;
+    c.couple = points_[n].couple;
+    c.step_s = h;
+    c.lost_j = calc_loss(points_[n], 1.0);
+    lost_j_ += at_s < h ? calc_loss(points_[n], at_s / h) : c.lost_j;
+    c.touching = dot(c.impulse, c.touch.normal) > 0.0 || (c.touching && c.touch.gap_m <= kTouch);
+  }
+}
+
+/// Takes the bodies of a group through the part of a step that is made.
+void Space::move_bodies(const Island& island, double to_s, double part_s, double h, double before_j) {
+  bool rings = false;
+  std::vector<State> moved;
+  std::vector<char> is_ringing;  // one that ends in this part has been moved by it, too
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    is_ringing.push_back(in_ringing_[static_cast<std::size_t>(island.bodies[n])]);
+    rings = rings || is_ringing.back() != 0;
+    moved.push_back(calc_moved(n, part_s, h));
+  }
+  if (rings) advance_ringings(island, to_s, part_s, h);
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    const int body = island.bodies[n];
+    if (!is_ringing[n]) states_[static_cast<std::size_t>(body)] = moved[n];
+    check_finite(body);
+    place_body(body);
+  }
+  if (!rings) take_gain(island, before_j);
+}
+
+/// Kinetic and of gravity [J].
+double Space::calc_energy(const Island& island) const {
+  double sum = 0.0;
+  for (const int body : island.bodies) {
+    const auto i = static_cast<std::size_t>(body);
+    sum += rigid::calc_kinetic(solids_[i], states_[i], placed_[i]) - solids_[i].mass_kg * dot(gravity_, states_[i].centre);
+  }
+  return sum;
+}
+
+/// Contacts do no work on a group, but for rounding, for what comes up from too deep and for surfaces whose curvature changes within a
+/// step. What the group gained by that its motion pays back, where it touches what does not move (a free group would lose momentum).
+void Space::take_gain(const Island& island, double before_j) {
+  const double gained = calc_energy(island) - before_j;
+  if (!(gained > 0.0)) return;
+  if (std::all_of(rows_.begin(), rows_.end(), [&](const Ref& row) { return moves(row.pair->a) && moves(row.pair->b); })) return;
+  double kinetic = 0.0;
+  for (const int body : island.bodies) {
+    const auto i = static_cast<std::size_t>(body);
+    kinetic += rigid::calc_kinetic(solids_[i], states_[i], placed_[i]);
+  }
+  lost_j_ += std::min(gained, kinetic);
+  const double part = kinetic > gained ? std::sqrt(1.0 - gained / kinetic) : 0.0;
+  for (const int body : island.bodies) {
+    State& s = states_[static_cast<std::size_t>(body)];
+    s.velocity = part * s.velocity;
+    s.momentum = part * s.momentum;
+    place_body(body);
+  }
+}
+
+/// Counts how long the bodies of a group have been slow; true once all have been for long enough.
+bool Space::may_rest(const Island& island, double h) {
+  bool all = true;
+  for (const int body : island.bodies) {
+    const auto i = static_cast<std::size_t>(body);
+    const double speed = norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m;
+    slow_s_[i] = speed < kSlow && !in_ringing_[i] ? slow_s_[i] + h : 0.0;
+    all = all && slow_s_[i] > kPatience;
+  }
+  return all;
+}
+
+/// Puts the group to sleep if contact forces exist that balance all of its bodies at rest.
+bool Space::rests(Island& island, double h) {
+  bool touches = false;
+  for (const Pair* pair : island.pairs)
+    touches = touches || std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
+  if (!touches) return false;
+  std::vector<State> kept;
+  for (const int body : island.bodies) {
+    State& s = states_[static_cast<std::size_t>(body)];
+    kept.push_back(s);
+    s.velocity = s.momentum = {};
+    place_body(body);
+  }
+  predict(island, h, true);
+  make_points(island, h, false);
+  const double g = std::max(norm(gravity_), 1e-9);
+  for (Point& p : points_) p.impulse = p.couple = {};
+  const bool found = solver_.solve_directly(movers_, points_, 12);
+  if (!found) {
+    predict(island, h, true);
+    solver_.solve(movers_, points_, 1e-2 * kBalanced * g * h, 4 * options_.most_sweeps);
+    costs_.sweeps += solver_.get_sweeps();
+  }
+  ++costs_.solves;
+  bool balanced = true;
+  std::vector<char> carried(island.bodies.size(), 0);  // what drifts where nothing pulls is at rest nowhere
+  for (const Point& p : points_)
+    for (const int n : {p.a, p.b})
+      if (n >= 0 && dot(p.impulse, p.normal) > 0.0) carried[static_cast<std::size_t>(n)] = 1;
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    const auto i = static_cast<std::size_t>(island.bodies[n]);
+    balanced = balanced && carried[n] && norm(movers_[n].velocity) + norm(movers_[n].spin) * solids_[i].radius_m < kBalanced * g * h;
+  }
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    const auto i = static_cast<std::size_t>(island.bodies[n]);
+    if (balanced) {
+      asleep_[i] = 1;
+      lost_j_ += rigid::calc_kinetic(solids_[i], kept[n]);
+    } else {
+      states_[i] = kept[n];
+      slow_s_[i] = 0.5 * kPatience;
+      place_body(island.bodies[n]);
+    }
+  }
+  if (balanced)
+    for (std::size_t n = 0; n < points_.size(); ++n) {
+      Contact& c = rows_[n].get();
+      c.impulse = points_[n].impulse;
+      c.couple = points_[n].couple;
+      c.step_s = h;
+      c.touching = dot(c.impulse, c.touch.normal) > 0.0;
+    }
+  return balanced;
+}
+
+}  // namespace carillon::rigid

@@ -1,0 +1,310 @@
+// Method: the instant of an impact is found on the paths of a step; its points and what touches their bodies are solved at once, with
+//   Newton's restitution and Coulomb's cone, unless the modes take part (ringing.cpp).
+// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996), instants of impact; K. L. Johnson, "Contact
+//   mechanics" (1985), eq. 11.24.
+// Deviations: impulses are scaled back where friction and restitution together would gain energy.
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "runtime/impact/predict.hpp"
+#include "runtime/rigid/limits.hpp"
+#include "runtime/rigid/space.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+using impact::cross;
+using impact::dot;
+
+constexpr double kInstant = 1e-9;  // m; how well an instant of impact is found
+constexpr double kLongestHertz = 20e-3;
+
+}  // namespace
+
+double calc_hertz_duration(double young_a, double poisson_a, double young_b, double poisson_b, double radius, double mass, double speed) {
+  const double compliance = (1 - poisson_a * poisson_a) / young_a + (1 - poisson_b * poisson_b) / young_b;
+  const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, 1e-3)), 0.2);
+  return std::clamp(duration, 5e-6, kLongestHertz);
+}
+
+Space::Elasticity Space::get_elasticity(int body) const {
+  if (body < 0) return {ground_->young_modulus_pa, ground_->poisson_ratio};
+  return {solid(body).young_modulus_pa, solid(body).poisson_ratio};
+}
+
+/// 1/R is the summed curvature, kept within 1/(0.5 mm) and one over half the size of the smaller body.
+double Space::calc_contact_radius(const shape::Touch& touch, int a, int b) const {
+  const double curvature = std::max(touch.curvature_a_per_m + touch.curvature_b_per_m, 0.0);
+  return 1.0 / std::clamp(curvature, 1.0 / std::max(0.5 * calc_pair_size(a, b), kSharpest), 1.0 / kSharpest);
+}
+
+double Space::calc_contact_time(const Hit& hit, double mass_kg, double speed_m_s) const {
+  const Elasticity a = get_elasticity(hit.a), b = get_elasticity(hit.b);
+  return calc_hertz_duration(a.young_modulus_pa, a.poisson_ratio, b.young_modulus_pa, b.poisson_ratio,
+                             calc_contact_radius(hit.touch, hit.a, hit.b), mass_kg, speed_m_s);
+}
+
+/// Will this touch come so fast within the step that it strikes?
+bool Space::is_fast(const Contact& c, double h) const {
+  if (c.presses || (c.touching && c.touch.gap_m <= kTouch)) return false;
+  const double approach = calc_approach(c), gap = std::max(c.touch.gap_m, 0.0);
+  double pull = 0.0;  // closing acceleration in flight
+  if (moves(c.a)) pull -= dot(gravity_, c.touch.normal);
+  if (moves(c.b)) pull += dot(gravity_, c.touch.normal);
+  const double square = approach * approach + 2.0 * std::max(pull, 0.0) * gap;
+  if (square <= kSlowest * kSlowest) return false;
+  // What has just rebounded comes back within the step only if it is slow.
+  if (approach < 0.0) return pull > 0.0 && -approach + std::sqrt(square) <= pull * h;
+  return gap <= approach * h + 0.5 * norm(gravity_) * h * h + 1e-6;
+}
+
+/// The first instant, from now, at which a fast touch closes on the paths of the step.
+bool Space::find_impact(const Island& island, double h, double& at_s, std::vector<Ref>& first) {
+  struct Candidate {
+    Ref ref;
+    double at;
+  };
+  std::vector<Candidate> candidates;
+  for (Pair* pair : island.pairs)
+    for (std::size_t k = 0; k < pair->contacts.size() && is_stepped(*pair); ++k) {
+      const Contact& c = pair->contacts[k];
+      if (!is_fast(c, h)) continue;
+      const double approach = calc_approach(c), later = -dot(calc_relative_velocity(movers_, make_point(c)), c.touch.normal);
+      const double rate = (later - approach) / h;
+      // gap = approach s + rate s^2 / 2
+      const double gap = std::max(c.touch.gap_m, 0.0), root = approach * approach + 2.0 * rate * gap;
+      if (root < 0.0) continue;
+      if (approach <= 0.0 && rate <= 0.0) continue;
+      const double at = approach > 0.0 ? 2.0 * gap / (approach + std::sqrt(root)) : (std::sqrt(root) - approach) / rate;
+      if (at <= h) candidates.push_back({{pair, k}, at});
+    }
+  if (candidates.empty()) return false;
+  const auto earliest = std::min_element(candidates.begin(), candidates.end(), [](const auto& x, const auto& y) { return x.at < y.at; });
+  // The path is not quite straight: the instant of the first is looked for on it.
+  double at = earliest->at;
+  Pair& pair = *earliest->ref.pair;
+  const shape::Touch now = earliest->ref.get().touch;
+  const auto look = [&](double s) {
+    const auto get_frame = [&](int body) {
+      if (body < 0) return shape::Frame{};
+      if (!moves(body)) return placed_[static_cast<std::size_t>(body)].frame;
+      return place(solid(body), calc_moved(static_cast<std::size_t>(find_index(body)), s, h)).frame;
+    };
+    shape::Touch touch = now;
+    shape::refresh(touch, *solid(pair.a).shape, get_frame(pair.a), get_shape(pair.b), get_frame(pair.b), pair.memory);
+    return touch.gap_m;
+  };
+  if (at > 0.0) {
+    double s0 = 0.0, g0 = now.gap_m, s1 = at, g1 = look(s1);
+    for (int n = 0; n < 8 && std::abs(g1) > kInstant && s1 != s0 && g1 != g0; ++n) {
+      const double s2 = std::clamp(s1 - g1 * (s1 - s0) / (g1 - g0), 0.0, h);
+      s0 = s1;
+      g0 = g1;
+      s1 = s2;
+      g1 = look(s1);
+    }
+    at = s1;
+    if (g1 > 1e-6) return false;  // it does not come so far within the step after all
+  }
+  at_s = at;
+  for (const Candidate& c : candidates)
+    if (c.at <= earliest->at + kTogether) first.push_back(c.ref);
+  return true;
+}
+
+/// Looks at the pairs of an impact again, as they are at its instant: an edge that passes another one close by was taken for a plane until
+/// now. Leaves what really strikes.
+bool Space::confirm_impact(std::vector<Ref>& first, double step_s, double near_m) {
+  std::vector<Pair*> pairs;
+  for (const Ref& ref : first)
+    if (std::find(pairs.begin(), pairs.end(), ref.pair) == pairs.end()) pairs.push_back(ref.pair);
+  first.clear();
+  bool any = false;
+  for (Pair* pair : pairs) {
+    search(*pair, std::max(step_s, 1e-5));
+    refresh(*pair);
+    for (std::size_t k = 0; k < pair->contacts.size(); ++k) {
+      const Contact& c = pair->contacts[k];
+      const double approach = calc_approach(c);
+      if (c.presses || approach <= 0.5 * kSlowest || (c.touching && c.touch.gap_m <= kTouch) ||
+          c.touch.gap_m > std::max(approach * kTogether + kTouch, near_m))
+        continue;
+      first.push_back({pair, k});
+      any = any || c.touch.gap_m <= near_m;
+    }
+  }
+  return any;
+}
+
+/// The points that strike now, and those in touch with the bodies that they move, three bodies far; in order.
+std::vector<Space::Ref> Space::gather_points(const Island& island, const std::vector<Ref>& first) const {
+  std::vector<Ref> taken = first;
+  std::set<int> bodies;
+  for (const Ref& ref : first) bodies.insert(ref.pair->a), bodies.insert(ref.pair->b);
+  for (int far = 0; far < 3; ++far) {
+    std::set<int> next = bodies;
+    for (Pair* pair : island.pairs) {
+      if (!is_stepped(*pair)) continue;
+      const auto is_struck = [&](int body) { return moves(body) && bodies.contains(body); };
+      if (!is_struck(pair->a) && !is_struck(pair->b)) continue;
+      for (std::size_t k = 0; k < pair->contacts.size(); ++k) {
+        const Contact& c = pair->contacts[k];
+        if (c.presses) continue;
+        const bool soon = c.touch.gap_m - calc_approach(c) * kTogether <= kTouch;
+        if (!soon && !(c.touching && c.touch.gap_m <= kDeep)) continue;
+        const Ref ref{pair, k};
+        if (std::find(taken.begin(), taken.end(), ref) == taken.end()) taken.push_back(ref);
+        next.insert(pair->a);
+        next.insert(pair->b);
+      }
+    }
+    if (next == bodies) break;
+    bodies = next;
+  }
+  std::sort(taken.begin(), taken.end(), [](const Ref& x, const Ref& y) {
+    return std::tuple(x.pair->a, x.pair->b, x.contact) < std::tuple(y.pair->a, y.pair->b, y.contact);
+  });
+  return taken;
+}
+
+/// A point of an impact of the group's bodies, which have their velocities in `movers_`; `p` gets the velocity that it is to have.
+Hit Space::make_hit(const Contact& c, Point& p) const {
+  Hit hit{.a = c.a, .b = c.b, .touch = c.touch};
+  hit.approach_m_s = -dot(calc_relative_velocity(movers_, p), p.normal);
+  if (hit.approach_m_s <= kSlowest) return hit;
+  if (!(c.touching && c.touch.gap_m <= kTouch)) {
+    // A rebound whose flight, 2 e v / g, is shorter than the contact itself is none: weight keeps the surfaces together.
+    const double e = calc_pair_restitution(c.a, c.b), mass = 1.0 / dot(p.normal, calc_mobility(movers_, p) * p.normal);
+    const double pull = std::abs(dot(gravity_, p.normal)), flight = 2.0 * e * hit.approach_m_s;
+    hit.restitution = flight > pull * calc_contact_time(hit, mass, hit.approach_m_s) ? e : 0.0;
+  }
+  p.wanted = (hit.restitution * hit.approach_m_s) * p.normal;  // across, it may stick where it stops
+  return hit;
+}
+
+/// With friction Newton's restitution can gain energy (Kane 1984): the part of all impulses with which it does not.
+double Space::calc_conserving_part(const std::vector<Mover>& before, const std::vector<Point>& points) const {
+  double linear = 0.0, square = 0.0;
+  for (const Point& p : points) {
+    const Vec3 u0 = calc_relative_velocity(before, p), u1 = calc_relative_velocity(movers_, p);
+    linear += dot(p.impulse, u0);
+    square += 0.5 * dot(p.impulse, u1 - u0);
+  }
+  return linear + square <= 0.0 || square <= 0.0 ? 1.0 : std::clamp(-linear / square, 0.0, 1.0);
+}
+
+/// Gives the bodies of an impact the impulses of its hits. Records where they were; returns what their motion lost [J].
+double Space::give_impulses(Strike& record, const std::vector<Point>& points) {
+  std::set<int> moved;
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    if (record.hits[n].impulse == Vec3{}) continue;
+    if (points[n].a >= 0) moved.insert(record.hits[n].a);
+    if (points[n].b >= 0) moved.insert(record.hits[n].b);
+  }
+  double before_j = 0.0, after_j = 0.0;
+  for (const int body : moved) {
+    record.bodies.push_back(body);
+    record.before.push_back(state(body));
+    before_j += calc_kinetic(solid(body), state(body));
+  }
+  const auto give = [&](int body, const Vec3& arm, const Vec3& impulse) {
+    State& s = states_[static_cast<std::size_t>(body)];
+    s.velocity = s.velocity + (1.0 / solid(body).mass_kg) * impulse;
+    s.momentum = s.momentum + cross(arm, impulse);
+  };
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const Hit& hit = record.hits[n];
+    if (points[n].a >= 0) give(hit.a, points[n].arm_a, hit.impulse);
+    if (points[n].b >= 0) give(hit.b, points[n].arm_b, -1.0 * hit.impulse);
+  }
+  for (const int body : moved) after_j += calc_kinetic(solid(body), state(body));
+  return before_j - after_j;
+}
+
+void Space::strike(Island& island, const std::vector<Ref>& first, double time_s) {
+  const std::vector<Ref> taken = gather_points(island, first);
+  Strike record;
+  record.time_s = time_s;
+  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+    const auto i = static_cast<std::size_t>(island.bodies[n]);
+    movers_[n] = {1.0 / solids_[i].mass_kg, placed_[i].inverse_inertia, states_[i].velocity, placed_[i].spin};
+  }
+  std::vector<Point> points;
+  double scale = kSlowest;
+  for (const Ref& ref : taken) {
+    points.push_back(make_point(ref.get()));
+    record.hits.push_back(make_hit(ref.get(), points.back()));
+    scale = std::max(scale, std::abs(record.hits.back().approach_m_s));
+  }
+  if (!record.hits.empty() && predict_hits(taken, record.hits, points) && begin_ringing(taken, record.hits, time_s)) return;
+  // A rigid impact ends the impacts with modes that its bodies were moved by.
+  for (const Hit& hit : record.hits)
+    for (const int body : {hit.a, hit.b})
+      if (has_impact(body)) end_ringing(*find_ringing(body), time_s);
+  const std::vector<Mover> before = movers_;
+  solver_.share(movers_, points, static_cast<int>(std::min<std::size_t>(20 * points.size(), 400)));
+  solver_.solve_on(movers_, points, 1e-9 * scale, points.size() <= 16 ? 1000 : 60);
+  const double part = calc_conserving_part(before, points);
+  for (std::size_t n = 0; n < points.size(); ++n) record.hits[n].impulse = part * points[n].impulse;
+  give_to_modes(record, give_impulses(record, points));
+  for (const int body : record.bodies) {
+    place_body(body);
+    slow_s_[static_cast<std::size_t>(body)] = 0.0;
+    record.after.push_back(state(body));
+    reach_out(body);
+  }
+  for (std::size_t n = 0; n < taken.size(); ++n) {
+    Contact& c = taken[n].get();
+    const bool rebounds = record.hits[n].restitution > 0.0;
+    c.touching = !rebounds && c.touch.gap_m <= kDeep;
+    if (rebounds) c.impulse = c.couple = {};
+  }
+  strikes_.push_back(std::move(record));
+}
+
+/// What the pulses of a rigid impact give the modes, at most what the motion lost; the rest of that is lost.
+void Space::give_to_modes(Strike& record, double taken_j) {
+  struct Share {
+    int body;
+    std::vector<double> kick;
+  };
+  std::vector<Share> shares;
+  double given = 0.0;
+  for (const Hit& hit : record.hits) {
+    if (hit.impulse == Vec3{} || !(hit.approach_m_s > kSlowest)) continue;
+    for (const bool is_a : {true, false}) {
+      const int body = is_a ? hit.a : hit.b;
+      if (!rings(body) || in_ringing_[static_cast<std::size_t>(body)]) continue;
+      const auto i = static_cast<std::size_t>(body);
+      const Vec3 impulse = transpose(placed_[i].rotation) * ((is_a ? 1.0 : -1.0) * hit.impulse);
+      const std::vector<double> shape = solids_[i].find_shape(find_place(body, hit.touch, is_a));
+      const double push = dot(hit.impulse, hit.touch.normal);
+      const double mass = push > 0.0 ? push / ((1.0 + hit.restitution) * hit.approach_m_s) : 0.0;
+      if (!(mass > 0.0)) continue;
+      const double length = calc_contact_time(hit, mass, hit.approach_m_s);
+      Ring& ring = ring_until(body, std::max(record.time_s + 0.5 * length, rings_[i].time_s));
+      const auto& omega = solids_[i].modes->get_omega();
+      Share share{body, std::vector<double>(omega.size())};
+      const double before = solids_[i].modes->calc_energy(ring.q, ring.q_dot);
+      for (std::size_t m = 0; m < omega.size(); ++m) {
+        share.kick[m] = (shape[3 * m] * impulse[0] + shape[3 * m + 1] * impulse[1] + shape[3 * m + 2] * impulse[2]) *
+                        std::sqrt(impact::calc_pulse_spectrum(omega[m] * length));
+        ring.q_dot[m] += share.kick[m];
+      }
+      given += solids_[i].modes->calc_energy(ring.q, ring.q_dot) - before;
+      shares.push_back(std::move(share));
+    }
+  }
+  if (given > std::max(taken_j, 0.0) && !shares.empty()) {
+    // More than there was: the pulses are given as far as it goes. A rigid impact is only taken where modes get next to nothing.
+    for (const Share& share : shares)
+      for (std::size_t m = 0; m < share.kick.size(); ++m) rings_[static_cast<std::size_t>(share.body)].q_dot[m] -= share.kick[m];
+    given = 0.0;
+  }
+  record.modes_j = given;
+  lost_j_ += taken_j - given;
+}
+
+}  // namespace carillon::rigid
