@@ -501,7 +501,7 @@ Statistics World::get_statistics() const { return course_->get_statistics(); }
 std::vector<std::string> ask_about_links(const WorldSpec& spec) {
   using impact::operator-;
   using rigid::operator*;
-  constexpr double kFar = 10.0;  // radii of a body
+  constexpr double kFar = 30.0;  // radii of a body
   std::vector<std::string> questions;
   const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
     const BodySpec& b = spec.bodies[static_cast<std::size_t>(body)];

@@ -123,6 +123,7 @@ void Impact::place_body(Body body) {
   check(body.q.size() == modes && body.q_dot.size() == modes, "a modal state has another size than the modes");
   body.moved_m = body.turned_rad = {};
   body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
+  body.work_j = 0.0;
   inverse_inertia_.push_back(body.mass_kg > 0.0 && !body.on_joints ? calc_inverse(body.inertia_kg_m2) : Mat3{});
   if (modes > 0) {
     Group group;
@@ -440,7 +441,9 @@ void Impact::step() {
     body.moved_m = body.moved_m + moved;
     body.turned_rad = body.turned_rad + turned;
     if (body.on_joints) {
-      on_joints_j_ += dot(force, moved) + dot(couple, turned);
+      const double work = dot(force, moved) + dot(couple, turned);
+      on_joints_j_ += work;
+      body.work_j += work;
       body.shift_n_s2 = body.shift_n_s2 + h_ * body.impulse_n_s + half * force;
       body.turning_n_m_s2 = body.turning_n_m_s2 + h_ * body.couple_n_m_s + half * couple;
       body.impulse_n_s = body.impulse_n_s + h_ * force;
@@ -522,6 +525,7 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
       body.velocity_m_s = bodies[b].velocity_m_s;
       body.spin_rad_s = bodies[b].spin_rad_s;
       body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
+      body.work_j = 0.0;
       continue;
     }
     inverse_inertia_[b] = body.mass_kg > 0.0 ? calc_inverse(body.inertia_kg_m2) : Mat3{};

@@ -44,6 +44,7 @@ struct Body {
   Mobility mobility{};
   Vec3 impulse_n_s{}, couple_n_m_s{};   // out: what the contacts gave it since the beginning or the last update(), and ...
   Vec3 shift_n_s2{}, turning_n_m_s2{};  // ... how far that moves it: its integral over time
+  double work_j = 0.0;                  // out: that the contacts did on it meanwhile
 };
 
 /// A point where two of the bodies touch. Frame and mobilities are constant until update().

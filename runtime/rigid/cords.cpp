@@ -109,7 +109,11 @@ Point Space::make_cord_point(const Contact& c, double h) const {
   const double along = dot(u, p.normal), error = dot(u, c.touch.normal), gap = c.touch.gap_m;
   // Taut: as fast along the middle at the end as against it now, which keeps the length; what it stretches by now it does not keep.
   double least = c.touching && gap <= kTouch ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
-  if (gap < -kDeep) least += std::min(0.02 * (-kDeep - gap) / h, 5e-3);
+  // What is too long is taken in as what is too deep comes up, at half the power that the cord loses (step.cpp).
+  if (gap < -kDeep) {
+    const double pull = dot(c.impulse, c.touch.normal), paid = pull > 0.0 ? std::max(0.5 * c.lost_j / pull, 0.0) : 0.0;
+    least += std::min(0.02 * (-kDeep - gap) / h, gap < -kFarTooDeep ? 5e-3 : paid);
+  }
   p.wanted = least * p.normal - (a.beyond - b.beyond);
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;

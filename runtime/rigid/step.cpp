@@ -17,14 +17,13 @@ namespace {
 using impact::cross;
 using impact::dot;
 
-constexpr double kShortest = 1e-9;    // s; what is left of a step and shorter than this is not made
-constexpr double kFarTooDeep = 5e-5;  // m; from here on it comes up at any price
-constexpr double kSettling = 0.02;    // m/s; a group that is slower is about to rest
-constexpr double kAtRest = 1e-6;      // m/s
-constexpr double kSlow = 5e-3;        // m/s; of what may be about to rest
-constexpr double kPatience = 0.02;    // s; for so long
-constexpr int kMostMissed = 30;       // in a step: instants at which nothing struck after all
-constexpr int kMostImpacts = 8;       // of a group in a step
+constexpr double kShortest = 1e-9;  // s; what is left of a step and shorter than this is not made
+constexpr double kSettling = 0.02;  // m/s; a group that is slower is about to rest
+constexpr double kAtRest = 1e-6;    // m/s
+constexpr double kSlow = 5e-3;      // m/s; of what may be about to rest
+constexpr double kPatience = 0.02;  // s; for so long
+constexpr int kMostMissed = 30;     // in a step: instants at which nothing struck after all
+constexpr int kMostImpacts = 8;     // of a group in a step
 
 }  // namespace
 
