@@ -235,8 +235,8 @@ impact::Mobility Space::calc_own_mobility(const Linked& linked, int member) cons
   return own;
 }
 
-/// The mechanism of a body that an impact with modes has moved on by `time_s`; of what contacts do in a step, `part_s` is made.
-void Space::advance_linked_ringing(Linked& linked, const impact::Body& struck, double time_s, double part_s, double step_s) {
+/// The mechanism of a body that an impact with modes has moved on by `time_s`, of which the contacts of the step have their part.
+void Space::advance_linked_ringing(Linked& linked, const impact::Body& struck, double time_s, double step_s) {
   const auto calc = [&] {
     double kinetic = 0.0, all = linked.now.lost_j;
     for (const int body : linked.bodies) {
@@ -254,7 +254,7 @@ void Space::advance_linked_ringing(Linked& linked, const impact::Body& struck, d
   const std::vector<double> du = linked.mechanism->calc_push(moved, impulses), dq = linked.mechanism->calc_push(moved, shifts);
   moved = linked.mechanism->move(moved, dq, 0.0, 1.0);
   moved = linked.mechanism->move(moved, du, 1.0, 0.0);
-  if (!linked.push.empty()) moved = linked.mechanism->move(moved, linked.push, part_s / step_s, 0.5 * part_s * part_s / step_s);
+  if (!linked.push.empty()) moved = linked.mechanism->move(moved, linked.push, time_s / step_s, 0.5 * time_s * time_s / step_s);
   linked.now = std::move(moved);
   place_linked(linked);
   if (!linked.push.empty() || !linked.hangs) return;

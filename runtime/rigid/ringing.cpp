@@ -351,6 +351,7 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
       release(ringing, to_s);  // its bodies stay where they are for this part
       continue;
     }
+    std::vector<joints::Spatial> pulls(bodies.size());
     for (std::size_t k = 0; k < bodies.size(); ++k) {
       const int body = ringing.bodies[k];
       if (!moves(body)) continue;
@@ -362,17 +363,12 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
       b.acceleration_m_s2 = gravity_;
       b.spin_acceleration_rad_s2 = placed_[i].inverse_inertia * cross(states_[i].momentum, placed_[i].spin);
       put_on_joints(body, b);
-      // What other contacts do comes at once: the impact's own steps may be longer than this part.
-      const double part = part_s / step_s;
+      // What cords and other contacts do acts as long as the impact goes on in this part, whose own steps may be longer.
       const Vec3 free = b.on_joints ? free_velocity_[static_cast<std::size_t>(index_[i])] : states_[i].velocity + step_s * gravity_;
-      const Vec3 pushed = part * (mover.velocity - free);
-      const Vec3 spun = part * (mover.spin - free_spin_[static_cast<std::size_t>(index_[i])]);
-      if (b.on_joints) {
-        b.velocity_m_s = b.velocity_m_s + pushed;
-        b.spin_rad_s = b.spin_rad_s + spun;
-      } else if (pushed != Vec3{} || spun != Vec3{}) {
-        ringing.impact->push(static_cast<int>(k), pushed, spun);
-      }
+      pulls[k] = {(1.0 / step_s) * (mover.velocity - free),
+                  (1.0 / step_s) * (mover.spin - free_spin_[static_cast<std::size_t>(index_[i])])};
+      b.acceleration_m_s2 = b.acceleration_m_s2 + pulls[k].linear;
+      b.spin_acceleration_rad_s2 = b.spin_acceleration_rad_s2 + pulls[k].angular;
     }
     std::vector<impact::Contact> contacts;
     std::list<std::vector<double>> shapes;
@@ -411,7 +407,7 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
       const int body = ringing.bodies[k];
       if (!moves(body)) continue;
       if (Linked* linked = find_linked(body); linked != nullptr) {
-        advance_linked_ringing(*linked, bodies[k], ringing.impact->get_time() - begun_s, part_s, step_s);
+        advance_linked_ringing(*linked, bodies[k], ringing.impact->get_time() - begun_s, step_s);
         continue;
       }
       State& s = states_[static_cast<std::size_t>(body)];
@@ -425,9 +421,33 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
     // Once a window: pieces of a small step each would be many.
     if (to_s >= window_end_s_ - 1e-9)
       for (Press& press : ringing.presses) hand_out_forces(press);
-    if (ended || to_s - from_s > kLongest) release(ringing, to_s);
+    if (!ended && to_s - from_s <= kLongest) continue;
+    // It has gone beyond the end of the part, and so did the pulls.
+    const double beyond_s = from_s + ringing.impact->get_time() - to_s;
+    const std::vector<int> ringing_bodies = ringing.bodies;
+    release(ringing, to_s);
+    for (std::size_t k = 0; k < bodies.size(); ++k)
+      if (beyond_s > 0.0 && moves(ringing_bodies[k])) take_pull_back(ringing_bodies[k], pulls[k], beyond_s, step_s);
   }
   ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+}
+
+/// Undoes what cords did to a body in the last moments of a step.
+void Space::take_pull_back(int body, const joints::Spatial& pull, double time_s, double step_s) {
+  if (pull.linear == Vec3{} && pull.angular == Vec3{}) return;
+  if (Linked* linked = find_linked(body); linked != nullptr) {
+    if (!linked->push.empty())
+      linked->now = linked->mechanism->move(linked->now, linked->push, -time_s / step_s, 0.5 * time_s * time_s / step_s);
+    place_linked(*linked);
+    return;
+  }
+  const auto i = static_cast<std::size_t>(body);
+  State& s = states_[i];
+  s.velocity = s.velocity - time_s * pull.linear;
+  s.centre = s.centre + (0.5 * time_s * time_s) * pull.linear;
+  const Mat3 inertia = placed_[i].rotation * (solids_[i].inertia_kg_m2 * transpose(placed_[i].rotation));
+  s.momentum = s.momentum - time_s * (inertia * pull.angular);
+  place_body(body);
 }
 
 /// Takes the forces of an impact since the last time into the frames of its bodies, as they are now.

@@ -262,7 +262,7 @@ class Space {
   joints::Coordinates calc_linked_moved(const Linked& linked, double part_s, double step_s) const;
   void give_linked(Linked& linked, const std::vector<joints::Spatial>& impulses);
   void stop_linked(const Island& island);
-  void advance_linked_ringing(Linked& linked, const impact::Body& struck, double time_s, double part_s, double step_s);
+  void advance_linked_ringing(Linked& linked, const impact::Body& struck, double time_s, double step_s);
   impact::Mobility calc_own_mobility(const Linked& linked, int member) const;
   template <typename Do>
   void for_linked(const Island& island, Do&& act) {
@@ -314,6 +314,7 @@ class Space {
   bool begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s);
   void release_what_rests(const Island& island);
   void advance_ringings(const Island& island, double to_s, double part_s, double step_s);
+  void take_pull_back(int body, const joints::Spatial& pull, double time_s, double step_s);
   void keep_pulses(Ringing& ringing);
   void hand_out_forces(Press& press);
   void release(Ringing& ringing, double time_s);
