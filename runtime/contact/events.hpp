@@ -24,6 +24,7 @@ struct Pose {
 struct WorldOptions {
   double contact_step_s =
       2.5e-4;  // the longest step [s] of bodies that touch or may. Flight and the instant of an impact do not depend on it
+  double joint_tolerance = 1e-10;                          // of a step of a mechanism's free motion [rad, m]
   double end_s = std::numeric_limits<double>::infinity();  // the world stops there
   bool islands = true;                                     // false: all bodies in one problem, for comparison
   bool modes = true;                                       // false: impacts do not look at modes, as if banks had none
@@ -54,7 +55,9 @@ struct Statistics {
   std::int64_t islands = 0;     // groups of bodies that may touch each other at present
   std::int64_t searches = 0;    // for the touches of a pair
   std::int64_t impacts = 0;
-  std::int64_t sweeps = 0;  // over the contacts of a group
+  std::int64_t sweeps = 0;      // over the contacts of a group
+  std::int64_t mechanisms = 0;  // groups of bodies on joints
+  std::int64_t flights = 0;     // integrations of their free motion
   double seconds_cpu = 0.0;
   EnergyAudit energy;  // zeros unless asked for
 };

@@ -53,7 +53,8 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   }
   where = (1.0 / push) * where;
   normal = (1.0 / norm(normal)) * normal;
-  const double inverse_mass = calc_inverse_mass(space, strike, first, where, normal);
+  const double inverse_mass =
+      first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : calc_inverse_mass(space, strike, first, where, normal);
   // A resting spot that the impact elsewhere hardly moved, or next to nothing of what sounds at the same instant.
   if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest || push < kMasked * most_push) return;
   const double speed = approach > kSlowest ? approach : push * inverse_mass;
@@ -87,7 +88,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
 void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, std::vector<stream::Event>& events) {
   std::vector<const rigid::Hit*> order;
   for (const rigid::Hit& hit : strike.hits)
-    if (dot(hit.impulse, hit.touch.normal) > 0.0) order.push_back(&hit);
+    if (!hit.is_cord && dot(hit.impulse, hit.touch.normal) > 0.0) order.push_back(&hit);
   std::stable_sort(order.begin(), order.end(),
                    [](const auto* x, const auto* y) { return dot(x->impulse, x->impulse) > dot(y->impulse, y->impulse); });
   const double most_push = order.empty() ? 0.0 : norm(order.front()->impulse);

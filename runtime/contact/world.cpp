@@ -15,6 +15,7 @@
 #include "runtime/contact/lasting.hpp"
 #include "runtime/contact/mode_sets.hpp"
 #include "runtime/contact/pulses.hpp"
+#include "runtime/rigid/groups.hpp"
 #include "runtime/rigid/space.hpp"
 
 namespace carillon::contact {
@@ -149,8 +150,104 @@ void check(const WorldSpec& spec, const WorldOptions& options) {
   for (const BodySpec& body : spec.bodies) check_body(body);
 }
 
+/// "scene.json:12: the joint between 'a' and 'b'"
+std::string describe(const WorldSpec& spec, const std::string& place, const char* what, int body, int to) {
+  const auto name = [&](int b) {
+    return b < 0 ? std::string("the world") : fmt::format("'{}'", spec.bodies[static_cast<std::size_t>(b)].name);
+  };
+  return fmt::format("{}{}the {} between {} and {}", place, place.empty() ? "" : ": ", what, name(body), name(to));
+}
+
+void check_joints(const WorldSpec& spec) {
+  const int count = static_cast<int>(spec.bodies.size());
+  const auto is_fixed = [&](int body) { return body < 0 || spec.bodies[static_cast<std::size_t>(body)].fixed; };
+  const auto check_ends = [&](const std::string& place, const char* what, int body, int to) {
+    if (body < 0 || body >= count || to < -1 || to >= count) throw InputError(fmt::format("{}: a {} names no body", place, what));
+    const std::string who = describe(spec, place, what, body, to);
+    if (body == to) throw InputError(who + " ties a body to itself; name another one, or \"world\"");
+    if (is_fixed(body) && is_fixed(to)) throw InputError(who + " has nothing to hold: neither of them moves");
+    return who;
+  };
+  rigid::Groups groups(count + 1);  // the last: all that does not move
+  const auto find = [&](int body) { return is_fixed(body) ? count : body; };
+  for (const JointSpec& joint : spec.joints) {
+    const std::string who = check_ends(joint.place, "joint", joint.body, joint.to);
+    if (!is_finite(joint.at_m)) throw InputError(who + ": its place must be three finite numbers");
+    const auto length = [](const Vec3& v) { return std::hypot(v[0], v[1], v[2]); };
+    const bool has_axis =
+        joint.kind == joints::Kind::kHinge || joint.kind == joints::Kind::kSlider || joint.kind == joints::Kind::kUniversal;
+    if (has_axis && !(std::abs(length(joint.axis) - 1.0) < 1e-6)) throw InputError(who + ": its axis is not of length 1");
+    if (joint.kind == joints::Kind::kUniversal &&
+        !(std::abs(length(joint.second_axis) - 1.0) < 1e-6 && std::abs(impact::dot(joint.axis, joint.second_axis)) < 1e-6))
+      throw InputError(who + ": its second axis is not of length 1 and at right angles to the first");
+    if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
+      throw InputError(fmt::format("{}: damping {} must be a finite number, 0 or more", who, joint.damping));
+    if (joint.kind == joints::Kind::kWeld && (is_fixed(joint.body) || is_fixed(joint.to)))
+      throw InputError(who + " welds a body to what does not move; set \"fixed\" of that body to true instead");
+    if (groups.find(find(joint.body)) == groups.find(find(joint.to)))
+      throw InputError(who + " closes a loop of joints, which is not supported; replace one joint of the loop by a cord, or leave one out");
+    groups.join(find(joint.body), find(joint.to));
+  }
+  for (const CordSpec& cord : spec.cords) {
+    const std::string who = check_ends(cord.place, "cord", cord.body, cord.to);
+    if (!is_finite(cord.from_m) || !is_finite(cord.to_m)) throw InputError(who + ": its ends must be finite numbers");
+    const double distance = std::hypot(cord.from_m[0] - cord.to_m[0], cord.from_m[1] - cord.to_m[1], cord.from_m[2] - cord.to_m[2]);
+    if (!(cord.restitution >= 0.0 && cord.restitution <= 1.0))
+      throw InputError(fmt::format("{}: restitution {} is not within 0..1", who, cord.restitution));
+    if (!(distance > 1e-4)) throw InputError(who + ": its ends are at one place; give a ball joint instead, or ends that are apart");
+    if (cord.length_m && !(*cord.length_m >= distance - 1e-9 && std::isfinite(*cord.length_m)))
+      throw InputError(
+          fmt::format("{}: it is {:.6g} m long, and its ends are {:.6g} m apart at the start; give at least that, or leave its length out",
+                      who, *cord.length_m, distance));
+  }
+}
+
+rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states) {
+  using impact::operator-;
+  using rigid::operator*;
+  rigid::Links links;
+  for (const JointSpec& j : spec.joints) links.joints.push_back({j.kind, j.body, j.to, j.at_m, j.axis, j.second_axis, j.damping});
+  for (const CordSpec& c : spec.cords) {
+    const auto tie = [&](int body, const Vec3& where) {
+      if (body < 0) return where;
+      const rigid::State& state = states[static_cast<std::size_t>(body)];
+      return rigid::transpose(rigid::make_rotation(state.rotation)) * (where - state.centre);
+    };
+    rigid::Cord cord;
+    // What moves comes first.
+    const bool turned = solids[static_cast<std::size_t>(c.body)].fixed;
+    cord.a = turned ? c.to : c.body;
+    cord.b = turned ? c.body : c.to;
+    cord.at_a = tie(cord.a, turned ? c.to_m : c.from_m);
+    cord.at_b = tie(cord.b, turned ? c.from_m : c.to_m);
+    const Vec3 apart = c.from_m - c.to_m;
+    cord.length_m = std::max(c.length_m.value_or(0.0), std::hypot(apart[0], apart[1], apart[2]));
+    cord.restitution = c.restitution;
+    links.cords.push_back(cord);
+  }
+  return links;
+}
+
+/// A body must begin to move as its joints allow.
+void check_start(const WorldSpec& spec, const rigid::Space& space) {
+  for (std::size_t i = 0; i < spec.bodies.size() && !spec.joints.empty(); ++i) {
+    const BodySpec& body = spec.bodies[i];
+    const double error = space.get_start_error(static_cast<int>(i));
+    if (body.fixed || (is_zero(body.velocity_m_s) && is_zero(body.angular_velocity_rad_s))) continue;
+    double fastest = 0.0;
+    for (const BodySpec& other : spec.bodies)
+      fastest = std::max(fastest, std::hypot(other.velocity_m_s[0], other.velocity_m_s[1], other.velocity_m_s[2]));
+    if (error > 1e-3 + 0.01 * fastest)
+      throw InputError(fmt::format(
+          "body '{}': its velocities at the start differ by {:.3g} m/s from what its joints allow; a body that turns about a joint has "
+          "\"velocity_m_s\" = \"angular_velocity_rad_s\" x (its centre of mass - the joint), and what hangs on it moves along",
+          body.name, error));
+  }
+}
+
 rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
   check(spec, options);
+  check_joints(spec);
   Shapes shapes;
   ModeSets modes;
   std::vector<rigid::Solid> solids;
@@ -164,8 +261,16 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
   if (spec.ground)
     ground = {spec.ground->height_m, spec.ground->restitution, spec.ground->friction, spec.ground->young_modulus_pa,
               spec.ground->poisson_ratio};
-  return rigid::Space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,
-                      {.step_s = options.contact_step_s, .islands = options.islands});
+  const rigid::Links links = make_links(spec, solids, states);
+  try {
+    rigid::Space space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,
+                       {.step_s = options.contact_step_s, .islands = options.islands, .joint_tolerance = options.joint_tolerance}, links);
+    check_start(spec, space);
+    return space;
+  } catch (const std::runtime_error& error) {
+    if (spec.joints.empty()) throw;
+    throw InputError(error.what());
+  }
 }
 
 /// CPU time of this thread alone: sound rendered on another thread is not counted.
@@ -208,6 +313,8 @@ class World::Course {
     s.searches = costs.searches;
     s.impacts = costs.impacts;
     s.sweeps = costs.sweeps;
+    s.mechanisms = space_.count_mechanisms();
+    s.flights = costs.flights;
     s.seconds_cpu = seconds_cpu_;
     s.energy = energy_;
     return s;
@@ -388,6 +495,7 @@ void World::Course::check_overlaps(const WorldSpec& spec) const {
                                      spec.bodies[static_cast<std::size_t>(a)].name, depth * 1e3, spec.ground->height_m));
     }
     for (const int b : near[static_cast<std::size_t>(a)]) {
+      if (space_.is_joined(a, b)) continue;
       Vec3 where{};
       const double depth = shape::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
                                                rigid::place(space_.solid(b), space_.state(b)).frame, where);
@@ -408,6 +516,47 @@ World& World::operator=(World&&) noexcept = default;
 double World::advance(double until_s, double cpu_s, const Sink& sink) { return course_->advance(until_s, cpu_s, sink); }
 
 Statistics World::get_statistics() const { return course_->get_statistics(); }
+
+std::vector<std::string> ask_about_links(const WorldSpec& spec) {
+  using impact::operator-;
+  using rigid::operator*;
+  constexpr double kFar = 30.0;  // radii of a body
+  std::vector<std::string> questions;
+  const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
+    const BodySpec& b = spec.bodies[static_cast<std::size_t>(body)];
+    radius = 0.0;
+    for (const Vec3& v : b.bank->vertices_m) radius = std::max(radius, rigid::norm(v - b.bank->rigid.centre_m));
+    const rigid::Mat3 rotation = rigid::make_rotation(rigid::normalise(b.initial.rotation));
+    return rigid::norm(where - b.initial.position_m - rotation * b.bank->rigid.centre_m);
+  };
+  const auto name = [&](int body) { return spec.bodies[static_cast<std::size_t>(body)].name; };
+  for (const JointSpec& joint : spec.joints) {
+    bool far = true;
+    double nearest = std::numeric_limits<double>::infinity(), of = 0.0;
+    int body = joint.body;
+    for (const int one : {joint.body, joint.to}) {
+      if (one < 0) continue;
+      double radius = 0.0;
+      const double distance = calc_distance(one, joint.at_m, radius);
+      far = far && distance > kFar * radius;
+      if (distance < nearest) nearest = distance, of = radius, body = one;
+    }
+    if (far)
+      questions.push_back(fmt::format("{} is {:.3g} m from the centre of '{}', a body of {:.2g} m: is \"at_m\" the place in the world?",
+                                      describe(spec, joint.place, "joint", joint.body, joint.to), nearest, name(body), 2.0 * of));
+  }
+  for (const CordSpec& cord : spec.cords)
+    for (const bool from : {true, false}) {
+      const int body = from ? cord.body : cord.to;
+      if (body < 0) continue;
+      double radius = 0.0;
+      const double distance = calc_distance(body, from ? cord.from_m : cord.to_m, radius);
+      if (distance > 1.01 * radius)
+        questions.push_back(fmt::format("{} is tied {:.3g} m from the centre of '{}', outside of it: is that the place in the world?",
+                                        describe(spec, cord.place, "cord", cord.body, cord.to), distance, name(body)));
+    }
+  return questions;
+}
 
 Pose calc_pose(const stream::Motion& motion, const Vec3& c) {
   const auto& q = motion.rotation;

@@ -9,6 +9,7 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/contact/events.hpp"
+#include "runtime/joints/mechanism.hpp"
 
 namespace carillon::contact {
 
@@ -36,10 +37,33 @@ struct GroundSpec {
   double roughness_m = 20e-6;  // likewise; concrete, smoothly trowelled
 };
 
+/// Joins a body to another one, or to the world. Places and axes are in the world, as all bodies are placed at the start. Two bodies with a
+/// joint between them do not collide.
+struct JointSpec {
+  joints::Kind kind = joints::Kind::kHinge;
+  int body = 0, to = -1;  // in the list of bodies; -1, or a fixed one: the world
+  Vec3 at_m{};
+  Vec3 axis{};           // of a hinge, a slider; the first of a universal joint, fixed in `to`
+  Vec3 second_axis{};    // of a universal joint, at right angles to the first, fixed in `body`
+  double damping = 0.0;  // N m s per rad, of a slider N s/m; >= 0
+  std::string place{};   // where it comes from, for messages; may be empty
+};
+
+/// A string without mass that does not stretch. Its ends are places in the world at the start.
+struct CordSpec {
+  int body = 0, to = -1;  // -1: the world
+  Vec3 from_m{}, to_m{};
+  std::optional<double> length_m{};  // nothing: taut at the start
+  double restitution = 0.0;          // when it comes taut, 0..1
+  std::string place{};               // where it comes from, for messages; may be empty
+};
+
 struct WorldSpec {
   std::vector<BodySpec> bodies;
   std::optional<GroundSpec> ground;
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
+  std::vector<JointSpec> joints;  // they make no loop
+  std::vector<CordSpec> cords;
 };
 
 /// A world on its way. Bodies that cannot touch each other for the moment are integrated apart, each group with steps of its own
@@ -47,7 +71,8 @@ struct WorldSpec {
 class World {
  public:
   /// Copies the spec; its banks must outlive the world. Throws InputError for a spec that cannot be simulated (the message names the body:
-  /// missing bank, bad number, a surface that is open or not a manifold, bodies that start inside each other).
+  /// missing bank, bad number, a surface that is open or not a manifold, bodies that start inside each other, joints
+  /// that make a loop).
   explicit World(const WorldSpec& spec, const WorldOptions& options = {});
   ~World();
   World(World&&) noexcept;
@@ -69,6 +94,9 @@ class World {
   class Course;
   std::unique_ptr<Course> course_;
 };
+
+/// Questions about joints and cords that may be meant otherwise: far from their bodies. A line each.
+std::vector<std::string> ask_about_links(const WorldSpec& spec);
 
 /// The pose of the mesh frame of a body whose centre of mass lies at `centre_m` in it: x - R(q) c.
 Pose calc_pose(const stream::Motion& motion, const Vec3& centre_m);

@@ -102,6 +102,7 @@ class InOrder {
 void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, InOrder& events,
                  Course& course) {
   contact::World world(make_world(scene), {.contact_step_s = scene.quality.contact_step_s,
+                                           .joint_tolerance = scene.quality.joint_tolerance,
                                            .end_s = scene.duration_s,
                                            .modes = scene.quality.modes_in_impacts,
                                            .lasting_contacts = has_contacts,
@@ -198,6 +199,8 @@ contact::WorldSpec make_world(const Scene& scene) {
   for (const SceneBody& body : scene.bodies) spec.bodies.push_back(body.spec);
   spec.ground = scene.ground;
   spec.gravity_m_s2 = scene.gravity_m_s2;
+  spec.joints = scene.joints;
+  spec.cords = scene.cords;
   return spec;
 }
 
@@ -213,8 +216,10 @@ Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::f
     for (const stream::Event& event : make_still(scene)) events.take(event);
   } else {
     try {
+      for (std::string& question : contact::ask_about_links(make_world(scene))) course.warnings.push_back(std::move(question));
       run_physics(scene, has_contacts, audits, progress, events, course);
     } catch (const InputError& error) {
+      if (std::string_view(error.what()).starts_with(scene.file.string() + ":")) throw;  // of a key, with its line
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     } catch (const SolveError& error) {
       throw SolveError(fmt::format("{}: {}", scene.file.string(), error.what()));

@@ -163,6 +163,9 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
   }
   print_bands(notes, scene, sound.rate_hz);
   fmt::print(notes, "modes sounding     {}\n", figures.modes);
+  if (!scene.joints.empty() || !scene.cords.empty())
+    fmt::print(notes, "joints             {}{}, {} cords\n", scene.joints.size(), scene.joints.empty() ? "" : " (Simbody)",
+               scene.cords.size());
   fmt::print(notes, "contacts           {}\n", figures.tally.contacts);
   constexpr std::size_t kMostPrinted = 8;
   for (std::size_t i = 0; i < std::min(figures.blows.size(), kMostPrinted); ++i) {

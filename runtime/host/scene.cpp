@@ -220,15 +220,92 @@ contact::GroundSpec parse_ground(config::Object& object, std::vector<std::string
 
 using Names = std::map<std::string, std::size_t>;  // of bodies, and their places in the list
 
-/// The body that "body" names.
-std::size_t find_body(config::Object& object, const Names& bodies) {
-  const std::string name = object.string("body");
+/// The body that a key names.
+std::size_t find_body(config::Object& object, const Names& bodies, std::string_view key = "body") {
+  const std::string name = object.string(key);
   if (const auto found = bodies.find(name); found != bodies.end()) return found->second;
   std::vector<std::string> names;
   for (const auto& [known, index] : bodies) names.push_back(known);
   const std::string nearest = config::find_nearest(name, names);
-  object.fail("body", fmt::format("no body is called \"{}\"; {}", name,
-                                  nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
+  object.fail(key, fmt::format("no body is called \"{}\"; {}", name,
+                               nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
+}
+
+/// "world", or a body's name.
+int find_end(config::Object& object, const Names& bodies, std::string_view key) {
+  if (object.string(key) == "world") return -1;
+  return static_cast<int>(find_body(object, bodies, key));
+}
+
+/// A direction, of length 1.
+Vec3 read_direction(config::Object& object, std::string_view key) {
+  if (!object.has(key)) object.numbers<3>(key);  // its message
+  Vec3 v = read_vector(object, key, {}, kFarthestM);
+  const double norm = calc_norm(v);
+  if (!(norm > 1e-9)) object.fail(key, "is no direction; give three numbers that are not all 0");
+  for (double& x : v) x /= norm;
+  return v;
+}
+
+Vec3 read_required_place(config::Object& object, std::string_view key) {
+  if (!object.has(key)) object.numbers<3>(key);  // its message
+  return read_vector(object, key, {}, kFarthestM);
+}
+
+contact::JointSpec parse_joint(config::Object& object, const Names& names) {
+  contact::JointSpec joint;
+  joint.place = object.find_place("");
+  const std::string kind = object.choice("kind", kJointNames);
+  joint.kind = static_cast<joints::Kind>(std::find(kJointNames.begin(), kJointNames.end(), kind) - kJointNames.begin());
+  joint.body = static_cast<int>(find_body(object, names));
+  joint.to = find_end(object, names, "to");
+  joint.at_m = read_required_place(object, "at_m");
+  const bool has_axis = joint.kind == joints::Kind::kHinge || joint.kind == joints::Kind::kSlider || joint.kind == joints::Kind::kUniversal;
+  if (has_axis) joint.axis = read_direction(object, "axis");
+  if (!has_axis && object.has("axis")) object.fail("axis", fmt::format("a {} has none; take it away", kind));
+  if (joint.kind == joints::Kind::kUniversal) {
+    joint.second_axis = read_direction(object, "second_axis");
+    const double cosine =
+        joint.axis[0] * joint.second_axis[0] + joint.axis[1] * joint.second_axis[1] + joint.axis[2] * joint.second_axis[2];
+    if (!(std::abs(cosine) < 1e-3)) object.fail("second_axis", "must be at right angles to \"axis\"");
+    for (std::size_t k = 0; k < 3; ++k) joint.second_axis[k] -= cosine * joint.axis[k];
+    const double norm = calc_norm(joint.second_axis);
+    for (double& x : joint.second_axis) x /= norm;
+  } else if (object.has("second_axis")) {
+    object.fail("second_axis", "belongs to a universal joint alone; take it away");
+  }
+  if (joint.kind == joints::Kind::kWeld) {
+    if (object.has("damping")) object.fail("damping", "a weld does not move; take it away");
+  } else {
+    joint.damping = read_within(object, "damping", 0.0, 0.0, 1e6);
+  }
+  object.finish();
+  return joint;
+}
+
+contact::CordSpec parse_cord(config::Object& object, const Names& names) {
+  contact::CordSpec cord;
+  cord.place = object.find_place("");
+  config::Object from = object.object("from"), to = object.object("to");
+  cord.body = static_cast<int>(find_body(from, names));
+  cord.from_m = read_required_place(from, "at_m");
+  from.finish();
+  cord.to = to.has("body") ? find_end(to, names, "body") : -1;
+  cord.to_m = read_required_place(to, "at_m");
+  to.finish();
+  if (object.has("length_m")) {
+    cord.length_m = object.number("length_m", config::kPositive);
+    const Vec3 apart{cord.from_m[0] - cord.to_m[0], cord.from_m[1] - cord.to_m[1], cord.from_m[2] - cord.to_m[2]};
+    if (!(*cord.length_m >= calc_norm(apart) - 1e-9 && *cord.length_m <= kFarthestM))
+      object.fail(
+          "length_m",
+          fmt::format("{:g} m is less than the {:.6g} m between its ends at the start (or more than {:g} m); give at least that, or "
+                      "leave it out",
+                      *cord.length_m, calc_norm(apart), kFarthestM));
+  }
+  cord.restitution = read_within(object, "restitution", 0.0, 0.0, 1.0);
+  object.finish();
+  return cord;
 }
 
 Mallet parse_mallet(config::Object& object, std::vector<std::string>& warnings) {
@@ -400,6 +477,7 @@ Quality parse_quality(config::Object& object) {
   if (object.has("silence_pa")) quality.silence_pa = read_within(object, "silence_pa", 0.0, 1e-15, 1.0);
   quality.modes = object.integer_if("modes", synth::kGroup, std::numeric_limits<std::int32_t>::max());
   quality.contact_step_s = read_within(object, "contact_step_s", quality.contact_step_s, 1e-5, 2e-3);
+  quality.joint_tolerance = read_within(object, "joint_tolerance", quality.joint_tolerance, 1e-14, 1e-4);
   quality.modes_in_impacts = object.boolean_or("modes_in_impacts", quality.modes_in_impacts);
   quality.instructions = static_cast<synth::Isa>(read_name(object, "instructions", kInstructionNames, "best"));
   object.finish();
@@ -426,7 +504,8 @@ Scene parse_scene(const config::Document& document) {
 
   std::vector<config::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
-    for (const char* later : {"strikes", "listener", "microphones", "effects", "variation", "radiation", "output", "quality"})
+    for (const char* later :
+         {"joints", "cords", "strikes", "listener", "microphones", "effects", "variation", "radiation", "output", "quality"})
       root.has(later);
     root.finish();  // a mistyped key is the likeliest reason
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
@@ -444,6 +523,8 @@ Scene parse_scene(const config::Document& document) {
     if (!names.emplace(name, names.size()).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
   }
+  for (config::Object& object : root.objects("joints")) scene.joints.push_back(parse_joint(object, names));
+  for (config::Object& object : root.objects("cords")) scene.cords.push_back(parse_cord(object, names));
   std::vector<config::Object> strikes = root.objects("strikes");
   if (strikes.size() > kMostStrikes) {
     root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMostStrikes));

@@ -29,6 +29,9 @@ inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm3
 /// The names of the key "radiation", in the order of radiation::GainKind.
 inline const std::vector<std::string> kGainKindNames{"osg02", "sphere"};
 
+/// The names of the key "kind" of a joint, in the order of joints::Kind.
+inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "universal", "ball"};
+
 /// What carillon-render can play, and what it plays where nobody plans.
 inline constexpr synth::EffectSet kPlayableEffects = synth::kCompiledEffects;
 inline constexpr synth::EffectSet kDefaultEffects = synth::kUsualEffects;
@@ -104,6 +107,7 @@ struct Quality {
   std::optional<double> silence_pa{};   // below which a body sleeps; nothing: as the planner says
   std::optional<std::int64_t> modes{};  // of all bodies that may ring at once; nothing: all
   double contact_step_s = contact::WorldOptions{}.contact_step_s;
+  double joint_tolerance = contact::WorldOptions{}.joint_tolerance;
   bool modes_in_impacts = true;  // impacts are solved with the modes of what rings
   synth::Isa instructions = synth::Isa::kBest;
 };
@@ -116,6 +120,8 @@ struct Scene {
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
   std::optional<contact::GroundSpec> ground;
   std::vector<SceneBody> bodies;
+  std::vector<contact::JointSpec> joints;
+  std::vector<contact::CordSpec> cords;
   std::vector<SceneStrike> strikes;  // in the order of the file
   Listener listener;
   std::vector<Vec3> microphones_m;  // places in the world, a channel each, instead of the listener's ears

@@ -122,7 +122,9 @@ void Impact::place_body(Body body) {
   if (body.q_dot.empty()) body.q_dot.assign(modes, 0.0);
   check(body.q.size() == modes && body.q_dot.size() == modes, "a modal state has another size than the modes");
   body.moved_m = body.turned_rad = {};
-  inverse_inertia_.push_back(body.mass_kg > 0.0 ? invert_inertia(body.inertia_kg_m2) : Mat3{});
+  body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
+  body.work_j = 0.0;
+  inverse_inertia_.push_back(body.mass_kg > 0.0 && !body.on_joints ? invert_inertia(body.inertia_kg_m2) : Mat3{});
   if (modes > 0) {
     Group group;
     group.body = static_cast<int>(bodies_.size());
@@ -167,6 +169,8 @@ void Impact::check_body(const Body& body) {
             is_finite(body.spin_acceleration_rad_s2) && is_finite(body.inertia_kg_m2[0]) && is_finite(body.inertia_kg_m2[1]) &&
             is_finite(body.inertia_kg_m2[2]),
         "a body's motion is not finite");
+  for (const auto& row : body.mobility)
+    for (const double w : row) check(std::isfinite(w), "a mobility is not finite");
 }
 
 void Impact::add_contact(const Contact& contact) {
@@ -202,6 +206,17 @@ void Impact::place_contact(const Contact& contact, int index, int row) {
       one.body[side] = body;
       if (!(bodies_[b].mass_kg > 0.0)) continue;
       one.linear[side] = (side == 0 ? 1.0 : -1.0) * axes[k];
+      if (bodies_[b].on_joints) {
+        one.angular[side] = cross(contact.where_m - bodies_[b].centre_m, one.linear[side]);
+        const Vec3 &f = one.linear[side], &m = one.angular[side];
+        const auto gain = [&](std::size_t row) {
+          const auto& w = bodies_[b].mobility[row];
+          return w[0] * f[0] + w[1] * f[1] + w[2] * f[2] + w[3] * m[0] + w[4] * m[1] + w[5] * m[2];
+        };
+        one.to_velocity[side] = {gain(0), gain(1), gain(2)};
+        one.to_spin[side] = {gain(3), gain(4), gain(5)};
+        continue;
+      }
       one.to_velocity[side] = 1.0 / bodies_[b].mass_kg * one.linear[side];
       one.angular[side] = cross(contact.where_m - bodies_[b].centre_m, one.linear[side]);
       one.to_spin[side] = inverse_inertia_[b] * one.angular[side];
@@ -410,18 +425,31 @@ void Impact::step() {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     Body& body = bodies_[b];
     if (!(body.mass_kg > 0.0)) continue;
-    Vec3 linear = body.acceleration_m_s2, angular = body.spin_acceleration_rad_s2;
+    Vec3 linear = body.acceleration_m_s2, angular = body.spin_acceleration_rad_s2, force{}, couple{};
     for (std::size_t r = 0; r < n && pushed; ++r)
       for (std::size_t side = 0; side < 2; ++side)
         if (rows_[r].body[side] == static_cast<int>(b)) {
           linear = linear + force_[r] * rows_[r].to_velocity[side];
           angular = angular + force_[r] * rows_[r].to_spin[side];
+          if (!body.on_joints) continue;
+          force = force + force_[r] * rows_[r].linear[side];
+          couple = couple + force_[r] * rows_[r].angular[side];
         }
     const Vec3 moved = h_ * body.velocity_m_s + half * linear, turned = h_ * body.spin_rad_s + half * angular;
     body.velocity_m_s = body.velocity_m_s + h_ * linear;
     body.spin_rad_s = body.spin_rad_s + h_ * angular;
     body.moved_m = body.moved_m + moved;
     body.turned_rad = body.turned_rad + turned;
+    if (body.on_joints) {
+      const double work = dot(force, moved) + dot(couple, turned);
+      on_joints_j_ += work;
+      body.work_j += work;
+      body.shift_n_s2 = body.shift_n_s2 + h_ * body.impulse_n_s + half * force;
+      body.turning_n_m_s2 = body.turning_n_m_s2 + h_ * body.couple_n_m_s + half * couple;
+      body.impulse_n_s = body.impulse_n_s + h_ * force;
+      body.couple_n_m_s = body.couple_n_m_s + h_ * couple;
+      continue;
+    }
     books_.given += body.mass_kg * dot(body.acceleration_m_s2, moved) + dot(body.inertia_kg_m2 * body.spin_acceleration_rad_s2, turned);
   }
   for (Group& group : groups_) {
@@ -476,6 +504,7 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     check_body(bodies[b]);
     check((bodies[b].mass_kg > 0.0) == (bodies_[b].mass_kg > 0.0), "an update frees or fixes a body");
+    check(bodies[b].on_joints == bodies_[b].on_joints, "an update puts a body on joints or takes it off them");
   }
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     check_contact(contacts[c]);
@@ -491,6 +520,14 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
     body.acceleration_m_s2 = bodies[b].acceleration_m_s2;
     body.spin_acceleration_rad_s2 = bodies[b].spin_acceleration_rad_s2;
     body.moved_m = body.turned_rad = {};
+    if (body.on_joints) {
+      body.mobility = bodies[b].mobility;
+      body.velocity_m_s = bodies[b].velocity_m_s;
+      body.spin_rad_s = bodies[b].spin_rad_s;
+      body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
+      body.work_j = 0.0;
+      continue;
+    }
     inverse_inertia_[b] = body.mass_kg > 0.0 ? invert_inertia(body.inertia_kg_m2) : Mat3{};
   }
   books_.given += calc_rigid_energy() - before;
@@ -524,9 +561,10 @@ Vec3 Impact::get_force(int contact) const {
 }
 
 double Impact::calc_rigid_energy() const {
-  double sum = 0.0;
+  double sum = on_joints_j_;
   for (const Body& body : bodies_)
-    sum += 0.5 * (body.mass_kg * dot(body.velocity_m_s, body.velocity_m_s) + dot(body.spin_rad_s, body.inertia_kg_m2 * body.spin_rad_s));
+    if (!body.on_joints)
+      sum += 0.5 * (body.mass_kg * dot(body.velocity_m_s, body.velocity_m_s) + dot(body.spin_rad_s, body.inertia_kg_m2 * body.spin_rad_s));
   return sum;
 }
 

@@ -25,6 +25,9 @@
 
 namespace carillon::impact {
 
+/// Velocity and spin (rows) per impulse and couple at the centre (columns) of a body on joints, world axes.
+using Mobility = std::array<std::array<double, 6>, 6>;
+
 /// A body at the instant of the first touch; world axes. A mallet is one without modes, a clamped plate one without mass.
 struct Body {
   double mass_kg = 0.0;  // 0: does not move as a whole
@@ -35,6 +38,13 @@ struct Body {
   const Modes* modes = nullptr;     // kept by the caller as long as the Impact lives
   std::vector<double> q, q_dot;     // modal state (n each) [m sqrt(kg)], [m sqrt(kg)/s]; empty: at rest
   Vec3 moved_m{}, turned_rad{};     // out: since the beginning or the last update() (the turn as a small vector)
+  // On joints: the mobility stands for mass and inertia, and the work of the accelerations is the joints' affair. The books have the work
+  // that the contacts do on it as `rigid`.
+  bool on_joints = false;
+  Mobility mobility{};
+  Vec3 impulse_n_s{}, couple_n_m_s{};   // out: what the contacts gave it since the beginning or the last update(), and ...
+  Vec3 shift_n_s2{}, turning_n_m_s2{};  // ... how far that moves it: its integral over time
+  double work_j = 0.0;                  // out: that the contacts did on it meanwhile
 };
 
 /// A point where two of the bodies touch. Frame and mobilities are constant until update().
@@ -90,7 +100,8 @@ class Impact {
   void join(const Contact& contact);
   /// The same bodies and contacts, where they are now: takes centres, inertias and accelerations of `bodies` and places, normals and
   /// shape values of `contacts` (all others are ignored). Compressions, anchors, modal states and the step stay; moved_m and turned_rad
-  /// begin anew; what a turned inertia does to the energy of an unchanged spin is booked as given. Throws as the constructor does.
+  /// begin anew, and velocities of bodies on joints are taken; what a turned inertia does to the energy of an unchanged spin is booked as
+  /// given. Throws as the constructor does.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
 
   /// Changes the motion of a body at once, as other contacts do; what that does to the energy is booked as given. Throws where it is not
@@ -164,6 +175,7 @@ class Impact {
   bool above_band_ = true, ended_ = false;
   int step_index_ = 0, steps_ = 0, quiet_ = 0, misses_ = 0;
   double h_ = 0.0, part_s_ = 0.0, fastest_ = 0.0;
+  double on_joints_j_ = 0.0;  // work done on bodies on joints
   Books books_;
   std::vector<Pulse> pulses_;
   std::vector<int> silent_;  // steps without a force that a pulse has not been given yet

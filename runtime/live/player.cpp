@@ -49,6 +49,7 @@ class Course {
     try {
       world_ =
           std::make_unique<contact::World>(host::make_world(scene), contact::WorldOptions{.contact_step_s = scene.quality.contact_step_s,
+                                                                                          .joint_tolerance = scene.quality.joint_tolerance,
                                                                                           .end_s = scene.duration_s,
                                                                                           .modes = scene.quality.modes_in_impacts,
                                                                                           .lasting_contacts = planner.needs_contacts()});

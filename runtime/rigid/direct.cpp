@@ -105,6 +105,7 @@ class System {
 }  // namespace
 
 bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses) {
+  if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   prepare(movers, points);
   const int bodies = static_cast<int>(movers.size());
   const std::vector<Mover> free = movers;

@@ -3,10 +3,12 @@
 
 namespace carillon::rigid {
 
-inline constexpr double kSlowest = 1e-3;   // m/s; a touch slower than this is no impact (a fall from 0.05 um)
-inline constexpr double kTogether = 1e-4;  // s; touches nearer in time than this are one impact
-inline constexpr double kTouch = 1e-7;     // m; nearer than this is in touch
-inline constexpr double kDeep = 2e-6;      // m; what is deeper comes up
-inline constexpr double kSharpest = 5e-4;  // m; the least radius of a contact
+inline constexpr double kSlowest = 1e-3;     // m/s; a touch slower than this is no impact (a fall from 0.05 um)
+inline constexpr double kTogether = 1e-4;    // s; touches nearer in time than this are one impact
+inline constexpr double kTouch = 1e-7;       // m; nearer than this is in touch
+inline constexpr double kDeep = 2e-6;        // m; what is deeper comes up
+inline constexpr double kFarTooDeep = 5e-5;  // m; from here on it comes up at any price
+inline constexpr double kBalanced = 1e-4;    // of gravity: what a solution with zero velocity may leave
+inline constexpr double kSharpest = 5e-4;    // m; the least radius of a contact
 
 }  // namespace carillon::rigid

@@ -6,6 +6,7 @@
 // Deviations: none.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "runtime/impact/predict.hpp"
 #include "runtime/rigid/limits.hpp"
@@ -30,6 +31,8 @@ std::vector<double> project(const std::vector<double>& shape, const Vec3& along)
 }  // namespace
 
 Space::Ringing* Space::find_ringing(int body) {
+  if (const Linked* linked = find_linked(body); linked != nullptr && linked->ringing >= 0)
+    body = linked->bodies[static_cast<std::size_t>(linked->ringing)];
   if (body < 0 || !in_ringing_[static_cast<std::size_t>(body)]) return nullptr;
   for (Ringing& ringing : ringings_)
     if (std::find(ringing.bodies.begin(), ringing.bodies.end(), body) != ringing.bodies.end()) return &ringing;
@@ -100,11 +103,11 @@ bool Space::predict_hits(const std::vector<Ref>& taken, std::vector<Hit>& hits, 
     Hit& hit = hits[n];
     const Contact& c = taken[n].get();
     if (!(hit.approach_m_s > kSlowest) || (c.touching && c.touch.gap_m <= kTouch)) continue;
-    if (Ringing* own = find_own_ringing(hit); own != nullptr) {
+    if (Ringing* own = hit.is_cord ? nullptr : find_own_ringing(hit); own != nullptr) {
       integrate = true;
       continue;
     }
-    if (!rings(hit.a) && !rings(hit.b)) continue;
+    if (hit.is_cord || (!rings(hit.a) && !rings(hit.b))) continue;
     if (!(hit.restitution > 0.0)) continue;  // it stays: weight keeps the surfaces together (strike())
     const double inverse_mass = dot(hit.touch.normal, calc_mobility(movers_, points[n]) * hit.touch.normal);
     const impact::Spring spring = make_spring(hit.touch, hit.a, hit.b);
@@ -131,6 +134,21 @@ bool Space::predict_hits(const std::vector<Ref>& taken, std::vector<Hit>& hits, 
   return integrate;
 }
 
+/// What a body on joints does in an impact.
+void Space::put_on_joints(int body, impact::Body& b) const {
+  const Linked* linked = find_linked(body);
+  if (linked == nullptr) return;
+  const int member = get_member(body);
+  std::vector<joints::Spatial> rates;
+  linked->mechanism->find_accelerations(linked->now, rates);
+  b.on_joints = true;
+  b.mobility = calc_own_mobility(*linked, member);
+  b.velocity_m_s = states_[static_cast<std::size_t>(body)].velocity;
+  b.spin_rad_s = placed_[static_cast<std::size_t>(body)].spin;
+  b.acceleration_m_s2 = rates[static_cast<std::size_t>(member)].linear;
+  b.spin_acceleration_rad_s2 = rates[static_cast<std::size_t>(member)].angular;
+}
+
 impact::Body Space::make_struck(int body, double time_s) {
   const auto i = static_cast<std::size_t>(body);
   impact::Body b;
@@ -142,6 +160,7 @@ impact::Body Space::make_struck(int body, double time_s) {
     b.spin_rad_s = placed_[i].spin;
     b.acceleration_m_s2 = gravity_;
     b.spin_acceleration_rad_s2 = placed_[i].inverse_inertia * cross(states_[i].momentum, placed_[i].spin);
+    put_on_joints(body, b);
   }
   if (rings(body)) {
     const Ring& ring = ring_until(body, std::max(time_s, rings_[i].time_s));
@@ -170,16 +189,25 @@ std::vector<double> Space::find_shape(int body, const std::vector<double>& shape
 bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s) {
   std::vector<std::size_t> order;
   for (std::size_t n = 0; n < hits.size(); ++n)
-    if (hits[n].approach_m_s > kSlowest) order.push_back(n);
+    if (hits[n].approach_m_s > kSlowest && !hits[n].is_cord) order.push_back(n);
   if (order.empty()) return false;
   // What leans on something else is struck as a rigid body, with what stands behind it.
   for (const Ref& ref : taken) {
     const Contact& c = ref.get();
-    if (!c.touching || c.presses || c.touch.gap_m > kTouch) continue;
+    if (!c.touching || c.presses || c.cord >= 0 || c.touch.gap_m > kTouch) continue;
     for (const std::size_t n : order)
       for (const int body : {hits[n].a, hits[n].b})
-        if (moves(body) && (body == c.a || body == c.b) && !in_ringing_[static_cast<std::size_t>(body)]) return false;
+        if (moves(body) && (hang_together(body, c.a) || hang_together(body, c.b)) && !has_impact(body)) return false;
   }
+  // Of bodies on the same joints one takes part.
+  std::map<const Linked*, int> struck;
+  for (const std::size_t n : order)
+    for (const int body : {hits[n].a, hits[n].b}) {
+      const Linked* linked = moves(body) ? find_linked(body) : nullptr;
+      if (linked == nullptr) continue;
+      const int first = linked->ringing >= 0 ? linked->bodies[static_cast<std::size_t>(linked->ringing)] : body;
+      if (struck.emplace(linked, first).first->second != body) return false;
+    }
   Ringing* joined = nullptr;
   // A hit on a shelf that an impact of another group has stays out of this one.
   std::erase_if(order, [&](std::size_t n) {
@@ -220,6 +248,7 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
     if (at != ringing.bodies.end()) return static_cast<int>(at - ringing.bodies.begin());
     ringing.bodies.push_back(body);
     in_ringing_[static_cast<std::size_t>(body)] = 1;
+    if (Linked* linked = moves(body) ? find_linked(body) : nullptr; linked != nullptr) linked->ringing = get_member(body);
     const impact::Body struck = make_struck(body, time_s);
     if (is_new) {
       bodies.push_back(struck);
@@ -295,7 +324,7 @@ void Space::release_what_rests(const Island& island) {
   if (ringings_.empty()) return;
   for (const Pair* pair : island.pairs)
     for (const Contact& c : pair->contacts) {
-      if (c.presses || c.touch.gap_m > kTouch) continue;
+      if (c.presses || c.cord >= 0 || c.touch.gap_m > kTouch) continue;
       for (const int body : {pair->a, pair->b}) {
         Ringing* ringing = moves(body) ? find_ringing(body) : nullptr;
         if (ringing != nullptr && std::abs(calc_approach(c)) <= kSlowest) end_ringing(*ringing, time_s_);
@@ -322,6 +351,7 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
       release(ringing, to_s);  // its bodies stay where they are for this part
       continue;
     }
+    std::vector<joints::Spatial> pulls(bodies.size());
     for (std::size_t k = 0; k < bodies.size(); ++k) {
       const int body = ringing.bodies[k];
       if (!moves(body)) continue;
@@ -332,11 +362,13 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
       b.inertia_kg_m2 = placed_[i].rotation * (solids_[i].inertia_kg_m2 * transpose(placed_[i].rotation));
       b.acceleration_m_s2 = gravity_;
       b.spin_acceleration_rad_s2 = placed_[i].inverse_inertia * cross(states_[i].momentum, placed_[i].spin);
-      // What other contacts do comes at once: the impact's own steps may be longer than this part.
-      const double part = part_s / step_s;
-      const Vec3 pushed = part * (mover.velocity - states_[i].velocity - step_s * gravity_);
-      const Vec3 spun = part * (mover.spin - free_spin_[static_cast<std::size_t>(index_[i])]);
-      if (pushed != Vec3{} || spun != Vec3{}) ringing.impact->push(static_cast<int>(k), pushed, spun);
+      put_on_joints(body, b);
+      // What cords and other contacts do acts as long as the impact goes on in this part, whose own steps may be longer.
+      const Vec3 free = b.on_joints ? free_velocity_[static_cast<std::size_t>(index_[i])] : states_[i].velocity + step_s * gravity_;
+      pulls[k] = {(1.0 / step_s) * (mover.velocity - free),
+                  (1.0 / step_s) * (mover.spin - free_spin_[static_cast<std::size_t>(index_[i])])};
+      b.acceleration_m_s2 = b.acceleration_m_s2 + pulls[k].linear;
+      b.spin_acceleration_rad_s2 = b.spin_acceleration_rad_s2 + pulls[k].angular;
     }
     std::vector<impact::Contact> contacts;
     std::list<std::vector<double>> shapes;
@@ -368,11 +400,16 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
     }
     ringing.impact->update(bodies, contacts);
     const double from_s = ringing.start_s;
+    const double begun_s = ringing.impact->get_time();
     const bool ended = ringing.impact->advance(to_s - from_s);
     bodies = ringing.impact->get_bodies();
     for (std::size_t k = 0; k < bodies.size(); ++k) {
       const int body = ringing.bodies[k];
       if (!moves(body)) continue;
+      if (Linked* linked = find_linked(body); linked != nullptr) {
+        advance_linked_ringing(*linked, bodies[k], ringing.impact->get_time() - begun_s, step_s);
+        continue;
+      }
       State& s = states_[static_cast<std::size_t>(body)];
       s.velocity = bodies[k].velocity_m_s;
       s.centre = s.centre + bodies[k].moved_m;
@@ -384,9 +421,33 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
     // Once a window: pieces of a small step each would be many.
     if (to_s >= window_end_s_ - 1e-9)
       for (Press& press : ringing.presses) hand_out_forces(press);
-    if (ended || to_s - from_s > kLongest) release(ringing, to_s);
+    if (!ended && to_s - from_s <= kLongest) continue;
+    // It has gone beyond the end of the part, and so did the pulls.
+    const double beyond_s = from_s + ringing.impact->get_time() - to_s;
+    const std::vector<int> ringing_bodies = ringing.bodies;
+    release(ringing, to_s);
+    for (std::size_t k = 0; k < bodies.size(); ++k)
+      if (beyond_s > 0.0 && moves(ringing_bodies[k])) take_pull_back(ringing_bodies[k], pulls[k], beyond_s, step_s);
   }
   ringings_.remove_if([](const Ringing& r) { return r.impact == nullptr; });
+}
+
+/// Undoes what cords did to a body in the last moments of a step.
+void Space::take_pull_back(int body, const joints::Spatial& pull, double time_s, double step_s) {
+  if (pull.linear == Vec3{} && pull.angular == Vec3{}) return;
+  if (Linked* linked = find_linked(body); linked != nullptr) {
+    if (!linked->push.empty())
+      linked->now = linked->mechanism->move(linked->now, linked->push, -time_s / step_s, 0.5 * time_s * time_s / step_s);
+    place_linked(*linked);
+    return;
+  }
+  const auto i = static_cast<std::size_t>(body);
+  State& s = states_[i];
+  s.velocity = s.velocity - time_s * pull.linear;
+  s.centre = s.centre + (0.5 * time_s * time_s) * pull.linear;
+  const Mat3 inertia = placed_[i].rotation * (solids_[i].inertia_kg_m2 * transpose(placed_[i].rotation));
+  s.momentum = s.momentum - time_s * (inertia * pull.angular);
+  place_body(body);
 }
 
 /// Takes the forces of an impact since the last time into the frames of its bodies, as they are now.
@@ -432,6 +493,12 @@ void Space::release(Ringing& ringing, double time_s) {
     const auto i = static_cast<std::size_t>(body);
     in_ringing_[i] = 0;
     if (rings(body)) rings_[i] = {bodies[k].q, bodies[k].q_dot, reached_s};
+    if (Linked* linked = find_linked(body); linked != nullptr && moves(body)) {
+      linked->ringing = -1;
+      if (reached_s > time_s) linked->now = fly_linked(*linked, linked->now, time_s - reached_s);
+      place_linked(*linked);
+      continue;
+    }
     if (moves(body) && reached_s > time_s) states_[i] = fly(solids_[i], states_[i], gravity_, time_s - reached_s);
     place_body(body);
   }
@@ -452,6 +519,7 @@ void Space::end_ringing(Ringing& ringing, double time_s) {
 
 Books Space::calc_books() const {
   Books books;
+  for (const Linked& linked : linked_) books.lost_j += linked.now.lost_j;
   for (std::size_t i = 0; i < solids_.size(); ++i) {
     books.motion_j += rigid::calc_energy(solids_[i], states_[i], gravity_);
     if (!solids_[i].modes || rings_[i].q.empty() || in_ringing_[i]) continue;

@@ -5,9 +5,11 @@
 // Source: J. J. Moreau, "Some numerical methods in multibody dynamics" (1999); M. Jean, "The non-smooth contact dynamics method" (1999);
 //   M. Silcowitz-Hansen, S. Niebe, K. Erleben, "A nonsmooth nonlinear conjugate gradient method for interactive contact force problems"
 //   (2010).
-// Deviations: couples against rolling and twisting, bounded by the normal impulse, in the same sweeps.
+// Deviations: couples against rolling and twisting, bounded by the normal impulse, in the same sweeps. An impulse on a body on joints moves
+//   all that hangs together; ways that joints do not allow are left out of a block.
 #include "runtime/rigid/solver.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -21,6 +23,8 @@ using impact::calc_inverse;
 using impact::cross;
 using impact::dot;
 using impact::norm;
+
+constexpr double kLocked = 1e-9;  // of the largest mobility at a point: what is less is a way that joints do not allow
 
 void add_mobility(Mat3& k, const Mover& m, const Vec3& arm) {
   // 1/m I - [r] I^-1 [r]
@@ -36,29 +40,94 @@ void add_mobility(Mat3& k, const Mover& m, const Vec3& arm) {
   }
 }
 
+/// An impulse and a couple at the centre of a body on joints move all that hangs together.
+void give(std::vector<Mover>& movers, const Mover& on, const Vec3& impulse, const Vec3& couple) {
+  const double by[6] = {impulse[0], impulse[1], impulse[2], couple[0], couple[1], couple[2]};
+  const Linkage& linkage = *on.linkage;
+  const double* rows = linkage.get_mobility(on.member).data();
+  for (const int index : linkage.movers) {
+    Mover& m = movers[static_cast<std::size_t>(index)];
+    for (std::size_t k = 0; k < 6; ++k, rows += 6) {
+      double gained = 0.0;
+      for (std::size_t c = 0; c < 6; ++c) gained += rows[c] * by[c];
+      (k < 3 ? m.velocity[k] : m.spin[k - 3]) += gained;
+    }
+  }
+}
+
+/// Adds `sign` times the velocity of `of` at an arm per impulse on `by` at another, both on the same joints.
+void add_linked_mobility(Mat3& k, const Mover& of, const Vec3& arm_of, const Mover& by, const Vec3& arm_by, double sign) {
+  const double* block = of.linkage->get_block(of.member, by.member);
+  for (std::size_t j = 0; j < 3; ++j) {
+    Vec3 impulse{};
+    impulse[j] = 1.0;
+    const Vec3 couple = cross(arm_by, impulse);
+    double gained[6];
+    for (std::size_t r = 0; r < 6; ++r)
+      gained[r] = block[6 * r + j] + block[6 * r + 3] * couple[0] + block[6 * r + 4] * couple[1] + block[6 * r + 5] * couple[2];
+    const Vec3 u = Vec3{gained[0], gained[1], gained[2]} + cross(Vec3{gained[3], gained[4], gained[5]}, arm_of);
+    for (std::size_t i = 0; i < 3; ++i) k[i][j] += sign * u[i];
+  }
+}
+
+/// The inverse of a symmetric matrix where it is more than `least`, and the projector on where that is.
+Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double least) {
+  Eigen::Matrix3d k;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) k(static_cast<int>(i), static_cast<int>(j)) = 0.5 * (m[i][j] + m[j][i]);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> found(k);
+  Mat3 inverse{};
+  range = {};
+  for (int n = 0; n < 3; ++n) {
+    if (!(found.eigenvalues()[n] > least)) continue;
+    const Eigen::Vector3d axis = found.eigenvectors().col(n);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const double both = axis[i] * axis[j];
+        range[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] += both;
+        inverse[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] += both / found.eigenvalues()[n];
+      }
+  }
+  return inverse;
+}
+
 }  // namespace
 
 void apply(std::vector<Mover>& movers, const Point& p, const Vec3& impulse) {
   if (p.a >= 0) {
     Mover& m = movers[static_cast<std::size_t>(p.a)];
-    m.velocity = m.velocity + m.inverse_mass * impulse;
-    m.spin = m.spin + m.inverse_inertia * cross(p.arm_a, impulse);
+    if (m.linkage == nullptr) {
+      m.velocity = m.velocity + m.inverse_mass * impulse;
+      m.spin = m.spin + m.inverse_inertia * cross(p.arm_a, impulse);
+    } else {
+      give(movers, m, impulse, cross(p.arm_a, impulse));
+    }
   }
   if (p.b >= 0) {
     Mover& m = movers[static_cast<std::size_t>(p.b)];
-    m.velocity = m.velocity - m.inverse_mass * impulse;
-    m.spin = m.spin - m.inverse_inertia * cross(p.arm_b, impulse);
+    if (m.linkage == nullptr) {
+      m.velocity = m.velocity - m.inverse_mass * impulse;
+      m.spin = m.spin - m.inverse_inertia * cross(p.arm_b, impulse);
+    } else {
+      give(movers, m, -1.0 * impulse, cross(p.arm_b, -1.0 * impulse));
+    }
   }
 }
 
 void turn(std::vector<Mover>& movers, const Point& p, const Vec3& couple) {
   if (p.a >= 0) {
     Mover& m = movers[static_cast<std::size_t>(p.a)];
-    m.spin = m.spin + m.inverse_inertia * couple;
+    if (m.linkage == nullptr)
+      m.spin = m.spin + m.inverse_inertia * couple;
+    else
+      give(movers, m, {}, couple);
   }
   if (p.b >= 0) {
     Mover& m = movers[static_cast<std::size_t>(p.b)];
-    m.spin = m.spin - m.inverse_inertia * couple;
+    if (m.linkage == nullptr)
+      m.spin = m.spin - m.inverse_inertia * couple;
+    else
+      give(movers, m, {}, -1.0 * couple);
   }
 }
 
@@ -84,8 +153,20 @@ Vec3 calc_relative_velocity(const std::vector<Mover>& movers, const Point& p) {
 
 Mat3 calc_mobility(const std::vector<Mover>& movers, const Point& p) {
   Mat3 k{};
-  if (p.a >= 0) add_mobility(k, movers[static_cast<std::size_t>(p.a)], p.arm_a);
-  if (p.b >= 0) add_mobility(k, movers[static_cast<std::size_t>(p.b)], p.arm_b);
+  const auto add = [&](const Mover& m, const Vec3& arm) {
+    if (m.linkage == nullptr)
+      add_mobility(k, m, arm);
+    else
+      add_linked_mobility(k, m, arm, m, arm, 1.0);
+  };
+  if (p.a >= 0) add(movers[static_cast<std::size_t>(p.a)], p.arm_a);
+  if (p.b >= 0) add(movers[static_cast<std::size_t>(p.b)], p.arm_b);
+  if (p.a < 0 || p.b < 0) return k;
+  const Mover &a = movers[static_cast<std::size_t>(p.a)], &b = movers[static_cast<std::size_t>(p.b)];
+  if (a.linkage != nullptr && a.linkage == b.linkage) {
+    add_linked_mobility(k, a, p.arm_a, b, p.arm_b, -1.0);
+    add_linked_mobility(k, b, p.arm_b, a, p.arm_a, -1.0);
+  }
   return k;
 }
 
@@ -95,16 +176,31 @@ void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>&
     const Point& p = points[i];
     Row& row = rows_[i];
     const Mat3 k = calc_mobility(movers, p);
-    row.inverse = calc_inverse(k);
+    const auto is_linked = [&](int body) { return body >= 0 && movers[static_cast<std::size_t>(body)].linkage != nullptr; };
+    row.locked = is_linked(p.a) || is_linked(p.b);
+    row.inverse = row.locked ? calc_pseudo_inverse(k, row.range, kLocked * (k[0][0] + k[1][1] + k[2][2])) : calc_inverse(k);
     const double kn = dot(p.normal, k * p.normal), trace = k[0][0] + k[1][1] + k[2][2];
     row.normal_mass = 1.0 / kn;
     row.tangent_mass = 1.0 / (trace - kn);  // the sum of both eigenvalues across the normal
+    if (row.locked) {
+      row.normal_mass = kn > kLocked * trace ? 1.0 / kn : 0.0;
+      // Across, as far as joints leave it free once the motion along the normal is given.
+      row.by_push = k * p.normal - kn * p.normal;
+      Mat3 left = k, unused{};
+      for (std::size_t r = 0; r < 3; ++r)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double n = p.normal[r], m = p.normal[c];
+          left[r][c] -= n * (row.by_push[c] + kn * m) + row.by_push[r] * m + row.normal_mass * row.by_push[r] * row.by_push[c];
+        }
+      row.across = calc_pseudo_inverse(left, unused, kLocked * trace);
+    }
     if (p.rolling_m > 0.0 || p.twisting_m > 0.0) {
       double most = 0.0;
       for (const int body : {p.a, p.b})
         if (body >= 0) {
-          const Mat3& j = movers[static_cast<std::size_t>(body)].inverse_inertia;
-          most += j[0][0] + j[1][1] + j[2][2];
+          const Mover& m = movers[static_cast<std::size_t>(body)];
+          const Mat3& j = m.inverse_inertia;
+          most += j[0][0] + j[1][1] + j[2][2];  // on joints a body turns more slowly
         }
       row.turning_mass = 1.0 / most;
     }
@@ -114,7 +210,13 @@ void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>&
 /// The impulse that the point ought to have, seeing the velocities as they are, a part of the way to it.
 Vec3 Solver::calc_impulse(const std::vector<Mover>& movers, const Point& p, const Row& row, double part) const {
   const Vec3 short_of = p.wanted - calc_relative_velocity(movers, p);
-  if (part == 1.0) {
+  // What joints do not allow no impulse brings about.
+  bool may_stick = part == 1.0;
+  if (row.locked && may_stick) {
+    const Vec3 beyond = short_of - row.range * short_of;
+    may_stick = dot(beyond, beyond) <= 1e-12 * dot(short_of, short_of);
+  }
+  if (may_stick) {
     const Vec3 stuck = p.impulse + row.inverse * short_of;
     const double push = dot(stuck, p.normal);
     const Vec3 across = stuck - push * p.normal;
@@ -122,7 +224,11 @@ Vec3 Solver::calc_impulse(const std::vector<Mover>& movers, const Point& p, cons
   }
   const double old = dot(p.impulse, p.normal), missing = dot(short_of, p.normal);
   const double push = std::max(0.0, old + part * row.normal_mass * missing);
-  Vec3 across = p.impulse - old * p.normal + (part * row.tangent_mass) * (short_of - missing * p.normal);
+  Vec3 across = p.impulse - old * p.normal;
+  if (row.locked)
+    across = across + part * (row.across * (short_of - missing * p.normal - (push - old) * row.by_push));
+  else
+    across = across + (part * row.tangent_mass) * (short_of - missing * p.normal);
   const double size = norm(across), limit = p.friction * push;
   if (size > limit) across = (size > 0.0 ? limit / size : 0.0) * across;
   return push * p.normal + across;
@@ -167,7 +273,7 @@ double Solver::sweep(std::vector<Mover>& movers, std::vector<Point>& points, boo
     const Row& row = rows_[i];
     const Vec3 wanted = calc_impulse(movers, p, row, 1.0), change = wanted - p.impulse;
     if (change[0] != 0.0 || change[1] != 0.0 || change[2] != 0.0) {
-      largest = std::max(largest, norm(change) / row.normal_mass);
+      if (row.normal_mass > 0.0) largest = std::max(largest, norm(change) / row.normal_mass);
       apply(movers, p, change);
       p.impulse = wanted;
     }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "runtime/impact/vector.hpp"
+#include "runtime/rigid/linkage.hpp"
 
 namespace carillon::rigid {
 
@@ -12,9 +13,11 @@ using impact::Vec3;
 
 /// A body in a step, world axes: what impulses do to it. Fixed ones and the ground have none of their own; their index is -1.
 struct Mover {
-  double inverse_mass = 0.0;  // 1/kg
-  Mat3 inverse_inertia{};     // 1/(kg m^2)
-  Vec3 velocity{}, spin{};    // m/s of the centre, rad/s; in: at the end of the step without contacts; out: with them
+  double inverse_mass = 0.0;         // 1/kg
+  Mat3 inverse_inertia{};            // 1/(kg m^2)
+  Vec3 velocity{}, spin{};           // m/s of the centre, rad/s; in: at the end of the step without contacts; out: with them
+  const Linkage* linkage = nullptr;  // on joints: what impulses do is in there
+  int member = 0;                    // of it
 };
 
 /// One point in touch. u is the velocity of a less that of b there.
@@ -42,7 +45,7 @@ class Solver {
   double solve_on(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int most_sweeps);
   /// The same problem by factorisation, for what sweeps take too long for (towers, unequal masses): guesses which points carry and stick,
   /// solves, corrects the guess from the answer, in at most `most_guesses`. Redundant points share their load evenly. True where the guess
-  /// was confirmed; the impulses obey all bounds in any case.
+  /// was confirmed; the impulses obey all bounds in any case. False where bodies are on joints.
   bool solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses);
   int get_sweeps() const { return sweeps_; }
 
@@ -52,6 +55,10 @@ class Solver {
     double normal_mass = 0.0;   // 1 / (n . K n)
     double tangent_mass = 0.0;  // 1 / the largest eigenvalue of K across n, or less
     double turning_mass = 0.0;  // of the couple
+    bool locked = false;        // joints do not allow all ways
+    Mat3 range{};               // projects on those that they allow
+    Mat3 across{};              // impulse per velocity across the normal, the motion along it given
+    Vec3 by_push{};             // velocity across the normal per impulse along it
   };
   void prepare(const std::vector<Mover>& movers, const std::vector<Point>& points);
   Vec3 calc_impulse(const std::vector<Mover>& movers, const Point& point, const Row& row, double part) const;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "runtime/config/error.hpp"
 #include "runtime/rigid/groups.hpp"
@@ -25,7 +26,7 @@ constexpr double kMostSteps = 1000;  // of a window
 }  // namespace
 
 Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
-             const Options& options)
+             const Options& options, const Links& links)
     : solids_(std::move(solids)), states_(std::move(states)), ground_(ground), gravity_(gravity), options_(options) {
   placed_.resize(solids_.size());
   asleep_.assign(solids_.size(), 0);
@@ -40,6 +41,15 @@ Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional
   index_.assign(solids_.size(), -1);
   rings_.resize(solids_.size());
   for (std::size_t i = 0; i < solids_.size(); ++i) place_body(static_cast<int>(i));
+  link(links);
+  cords_ = links.cords;
+  cord_pairs_.resize(cords_.size());
+  for (std::size_t n = 0; n < cords_.size(); ++n) {
+    cord_pairs_[n].a = cords_[n].a;
+    cord_pairs_[n].b = cords_[n].b;
+    cord_pairs_[n].cord = static_cast<int>(n);
+    stretch(cord_pairs_[n]);
+  }
 }
 
 void Space::place_body(int body) {
@@ -56,7 +66,7 @@ bool Space::is_all_asleep() const {
 void Space::list_contacts(std::vector<const Contact*>& out) const {
   out.clear();
   for (const Pair* pair : near_)
-    if (moves(pair->a) || moves(pair->b))
+    if (pair->cord < 0 && (moves(pair->a) || moves(pair->b)))
       for (const Contact& c : pair->contacts) out.push_back(&c);
 }
 
@@ -106,6 +116,7 @@ shape::Box Space::calc_box(int body, double grown_m) const {
 
 void Space::add_pair(int a, int b) {
   if (b >= 0 && a > b) std::swap(a, b);
+  if (!joined_.empty() && is_joined(a, b)) return;
   Pair& pair = pairs_[{a, b}];
   pair.a = a;
   pair.b = b;
@@ -117,7 +128,8 @@ void Space::add_pair(int a, int b) {
 
 void Space::sort_near() {
   if (near_is_sorted_) return;
-  std::sort(near_.begin(), near_.end(), [](const Pair* x, const Pair* y) { return std::pair(x->a, x->b) < std::pair(y->a, y->b); });
+  std::sort(near_.begin(), near_.end(),
+            [](const Pair* x, const Pair* y) { return std::tuple(x->a, x->b, x->cord) < std::tuple(y->a, y->b, y->cord); });
   near_is_sorted_ = true;
 }
 
@@ -136,6 +148,7 @@ void Space::open_window(double end_s) {
     const auto n = static_cast<std::size_t>(i);
     flying_[n] = 0;
     reach_m_s_[n] = moves(i) ? norm(states_[n].velocity) + norm(placed_[n].spin) * solids_[n].radius_m + g * length : 0.0;
+    if (const Linked* linked = find_linked(i); linked != nullptr && moves(i)) reach_m_s_[n] += calc_linked_pull(*linked) * length;
     boxes[n] = calc_box(i, moves(i) ? reach_m_s_[n] * length + 1e-4 : 0.0);
     order.push_back(i);
   }
@@ -151,12 +164,15 @@ void Space::open_window(double end_s) {
       if (y.low[0] > x.high[0]) break;
       if (y.low[1] > x.high[1] || x.low[1] > y.high[1] || y.low[2] > x.high[2] || x.low[2] > y.high[2]) continue;
       if (!moves(i) && !moves(j)) continue;
+      if (!joined_.empty() && is_joined(i, j)) continue;
       add_pair(i, j);
       active[static_cast<std::size_t>(i)] = active[static_cast<std::size_t>(j)] = 1;
     }
   }
+  open_cords(active, length);
   for (const Ringing& ringing : ringings_)
     for (const int body : ringing.bodies) active[static_cast<std::size_t>(body)] = 1;
+  activate_linked(active);
   sort_near();
   // What has gone apart is forgotten; what sleeps keeps its contacts.
   std::erase_if(pairs_, [&](const auto& entry) {
@@ -173,6 +189,7 @@ void Space::open_window(double end_s) {
       any_active_ = true;
       continue;
     }
+    if (find_linked(i) != nullptr) continue;
     flying_[n] = 1;
     flew_from_[n] = states_[n];
     states_[n] = fly(solids_[n], states_[n], gravity_, length);
@@ -181,6 +198,7 @@ void Space::open_window(double end_s) {
     slow_s_[n] = 0.0;
     ++costs_.body_steps;
   }
+  fly_windows_of_linked(active, length);
   // What is fast for its size must not pass through another between two looks.
   double steps = length / options_.step_s;
   for (const Pair* pair : near_)
@@ -215,6 +233,7 @@ void Space::check_finite(int body) const {
 }
 
 void Space::search(Pair& pair, double step_s) {
+  if (pair.cord >= 0) return stretch(pair);
   ++costs_.searches;
   const double speed = calc_pair_speed(pair.a, pair.b) + norm(gravity_) * step_s;
   pair.margin_m = std::min(std::max(2e-4, 4.0 * step_s * speed), kReach * calc_pair_size(pair.a, pair.b));
@@ -245,6 +264,7 @@ void Space::search(Pair& pair, double step_s) {
 }
 
 void Space::refresh(Pair& pair) {
+  if (pair.cord >= 0) return stretch(pair);
   const shape::Frame& a = placed_[static_cast<std::size_t>(pair.a)].frame;
   const shape::Frame b = pair.b >= 0 ? placed_[static_cast<std::size_t>(pair.b)].frame : shape::Frame{};
   for (Contact& c : pair.contacts) shape::refresh(c.touch, *solid(pair.a).shape, a, get_shape(pair.b), b, pair.memory);
@@ -252,6 +272,7 @@ void Space::refresh(Pair& pair) {
 
 /// The touches of a pair as of now, good for a step.
 void Space::update(Pair& pair, double step_s) {
+  if (pair.cord >= 0) return stretch(pair);
   const double way = (calc_pair_speed(pair.a, pair.b) + norm(gravity_) * step_s) * step_s;
   if (!pair.searched || pair.travelled_m + way > pair.margin_m)
     search(pair, step_s);
@@ -277,7 +298,29 @@ void Space::wake(int body) {
       const bool touching = std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.touching; });
       if (touching && other >= 0 && asleep_[static_cast<std::size_t>(other)]) woken.push_back(other);
     }
+    for (Pair& pair : cord_pairs_) {
+      if (pair.a != i && pair.b != i) continue;
+      add_cord(pair);
+      const int other = pair.a == i ? pair.b : pair.a;
+      if (pair.contacts.front().touching && other >= 0) woken.push_back(other);
+    }
+    if (const Linked* linked = find_linked(i); linked != nullptr) woken.insert(woken.end(), linked->bodies.begin(), linked->bodies.end());
   }
+}
+
+/// What flew to the end of the window, to where it is now.
+void Space::call_back(int body) {
+  if (body < 0 || !flying_[static_cast<std::size_t>(body)]) return;
+  if (Linked* linked = find_linked(body); linked != nullptr) {
+    linked->now = fly_linked(*linked, linked->flew_from, time_s_ - window_start_s_);
+    place_linked(*linked);
+    for (const int other : linked->bodies) flying_[static_cast<std::size_t>(other)] = 0;
+    return;
+  }
+  const auto m = static_cast<std::size_t>(body);
+  flying_[m] = 0;
+  states_[m] = fly(solids_[m], flew_from_[m], gravity_, time_s_ - window_start_s_);
+  place_body(body);
 }
 
 /// A body that an impact made faster than its window was planned for: what it may meet now.
@@ -296,14 +339,16 @@ void Space::reach_out(int body) {
     bool apart = false;
     for (std::size_t k = 0; k < 3; ++k) apart = apart || other.low[k] > box.high[k] || box.low[k] > other.high[k];
     if (apart) continue;
-    if (flying_[m]) {
-      // Back from the end of the window to where it is now.
-      flying_[m] = 0;
-      states_[m] = fly(solids_[m], flew_from_[m], gravity_, time_s_ - window_start_s_);
-      place_body(j);
-    }
+    if (!joined_.empty() && is_joined(body, j)) continue;
+    call_back(j);
     add_pair(body, j);
   }
+  for (Pair& pair : cord_pairs_)
+    if (pair.a == body || pair.b == body) {
+      call_back(pair.a);
+      call_back(pair.b);
+      add_cord(pair);
+    }
 }
 
 std::vector<Space::Island> Space::make_islands() {
@@ -318,6 +363,9 @@ std::vector<Space::Island> Space::make_islands() {
       groups.join(first, body);
     }
   }
+  for (const Linked& linked : linked_)
+    if (moves(linked.bodies.front()))
+      for (const int body : linked.bodies) groups.join(linked.bodies.front(), body);
   if (!options_.islands)
     for (int i = 0; i < static_cast<int>(solids_.size()); ++i)
       if (moves(i)) groups.join(0, i);

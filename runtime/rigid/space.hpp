@@ -5,21 +5,41 @@
 // at the impulses of the step before; places follow from the mean of both velocities, so that what neither slides nor strikes keeps its
 // energy. A touch that comes fast is no part of that: its instant is found, the step ends there, and the impact is solved by itself.
 // A group that a solution with zero velocity balances is put to sleep.
+//
+// Bodies on joints move in the coordinates that their joints leave (runtime/joints): flights, places and what impulses do come from there,
+// all else is as for others. A cord is a contact that pulls.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <list>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
 #include "runtime/impact/impact.hpp"
+#include "runtime/joints/mechanism.hpp"
 #include "runtime/rigid/body.hpp"
 #include "runtime/rigid/solver.hpp"
 
 namespace carillon::rigid {
+
+/// A string without mass and stretch between two places, each in the axes of its body's mesh from the centre of mass, or in the world.
+struct Cord {
+  int a = 0, b = -1;  // bodies; b may be -1: the world
+  Vec3 at_a{}, at_b{};
+  double length_m = 0.0;
+  double restitution = 0.0;  // when it comes taut
+};
+
+/// What holds bodies together. Of a joint, `body` and `to` are bodies of the space, -1 or a fixed one: the world.
+struct Links {
+  std::vector<joints::Joint> joints;
+  std::vector<Cord> cords;
+};
 
 /// The half space z <= height_m.
 struct Ground {
@@ -32,16 +52,18 @@ struct Options {
   double step_s = 2.5e-4;   // the longest small step; windows are cut into equal ones
   double tolerance = 1e-5;  // of gravity times the step: when the sweeps over the contacts end
   int most_sweeps = 30;
-  int most_direct = 3;               // bodies of a group whose problem is factorised in every step
-  bool islands = true;               // false: all bodies in one problem, for comparison
-  int most_settling = 200;           // the same of a group that is about to rest
-  double rolling_resistance = 1e-3;  // c: couple c R F against rolling, of hard on hard
+  int most_direct = 3;                          // bodies of a group whose problem is factorised in every step
+  bool islands = true;                          // false: all bodies in one problem, for comparison
+  int most_settling = 200;                      // the same of a group that is about to rest
+  double rolling_resistance = 1e-3;             // c: couple c R F against rolling, of hard on hard
+  double joint_tolerance = joints::kTolerance;  // of a step of a mechanism's free motion [rad, m]
 };
 
 /// A touch that is followed.
 struct Contact {
   shape::Touch touch;
   int a = 0, b = -1;  // bodies; -1: the ground
+  int cord = -1;      // it is one: the gap is what it lacks to be taut, the normal points from a to b
   bool touching = false;
   bool presses = false;      // in an impact that is on its way
   Vec3 impulse{}, couple{};  // of the last step, on a [N s, N m s]
@@ -54,7 +76,9 @@ struct Hit {
   int a = 0, b = -1;
   shape::Touch touch;
   double approach_m_s = 0.0, restitution = 0.0;
-  Vec3 impulse{};  // on a [N s]
+  Vec3 impulse{};               // on a [N s]
+  bool is_cord = false;         // comes taut
+  double linked_mass_kg = 0.0;  // that meets there, where bodies are on joints
 };
 
 /// An instant of impact: its points, and the bodies that it moved, before and after.
@@ -88,13 +112,16 @@ struct Costs {
   std::int64_t steps = 0;       // small steps, and windows in which bodies only flew
   std::int64_t body_steps = 0;  // of each, the bodies that moved
   std::int64_t solves = 0, sweeps = 0, searches = 0, impacts = 0;
+  std::int64_t flights = 0;  // of mechanisms: integrations of their free motion
 };
 
 class Space {
  public:
   static constexpr double kWindow = 2e-3;  // s
 
-  Space(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity, const Options& options);
+  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are brought to what the joints allow.
+  Space(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity, const Options& options,
+        const Links& links = {});
 
   /// One small step of all that is not asleep, to at most `until_s`. At the start of a window all bodies are at its time; within it those
   /// that fly are at its end. Throws SolveError where a state is not finite.
@@ -120,6 +147,11 @@ class Space {
   Books calc_books() const;
   /// How long a contact lasts (calc_hertz_duration) in which so much mass meets at that speed.
   double calc_contact_time(const Hit& hit, double mass_kg, double speed_m_s) const;
+  int count_mechanisms() const { return static_cast<int>(linked_.size()); }
+  /// How far the velocity asked for at the start is from what the joints of a body allow [m/s]; 0 without.
+  double get_start_error(int body) const;
+  /// Does a joint hold the two together, so that they do not collide?
+  bool is_joined(int a, int b) const { return joined_.contains(std::minmax(a, b)); }
   /// Groups of moving bodies that may touch each other in the present window.
   int count_islands() const { return islands_; }
   const Costs& get_costs() const { return costs_; }
@@ -134,6 +166,19 @@ class Space {
     double margin_m = 0.0, travelled_m = 0.0;  // since the last search
     bool searched = false;
     std::int64_t window = -1;  // in which it was last near
+    int cord = -1;             // it is one
+  };
+  /// Bodies on joints. What of it is of a step stands below the line.
+  struct Linked {
+    std::unique_ptr<joints::Mechanism> mechanism;
+    std::vector<int> bodies;  // its members
+    bool hangs = false;       // from something that does not move
+    joints::Coordinates now, flew_from;
+    int ringing = -1;  // member that an impact with modes moves
+    // ------------
+    joints::Coordinates free;  // at the end of the step without contacts
+    std::vector<double> push;  // change of its velocities by the contacts; empty: none
+    Linkage linkage;
   };
   struct Island {
     std::vector<int> bodies;
@@ -184,6 +229,7 @@ class Space {
   void check_finite(int body) const;
   void wake(int body);
   void reach_out(int body);
+  void call_back(int body);
   double calc_pair_friction(int a, int b) const;
   double calc_pair_restitution(int a, int b) const;
   double calc_pair_speed(int a, int b) const;
@@ -192,6 +238,47 @@ class Space {
   double calc_approach(const Contact& contact) const;
   shape::Box calc_box(int body, double grown_m) const;
 
+  // linked.cpp: bodies on joints
+  void link(const Links& links);
+  Linked* find_linked(int body) {
+    return body >= 0 && !linked_.empty() && linked_of_[static_cast<std::size_t>(body)] >= 0
+               ? &linked_[static_cast<std::size_t>(linked_of_[static_cast<std::size_t>(body)])]
+               : nullptr;
+  }
+  /// Are they one body, or on the same joints?
+  bool hang_together(int a, int b) const {
+    return a == b || (a >= 0 && b >= 0 && find_linked(a) != nullptr && find_linked(a) == find_linked(b));
+  }
+  const Linked* find_linked(int body) const { return const_cast<Space*>(this)->find_linked(body); }
+  int get_member(int body) const { return member_[static_cast<std::size_t>(body)]; }
+  joints::Coordinates fly_linked(const Linked& linked, const joints::Coordinates& from, double time_s) const;
+  void place_linked(const Linked& linked);
+  static State make_state(const Solid& solid, const joints::Motion& motion);
+  void activate_linked(std::vector<char>& active) const;
+  void fly_windows_of_linked(const std::vector<char>& active, double length_s);
+  double calc_linked_pull(const Linked& linked) const;
+  bool is_in_balance(const Linked& linked) const;
+  void predict_linked(Linked& linked, double h, bool at_rest);
+  void push_linked(const Island& island);
+  joints::Coordinates calc_linked_moved(const Linked& linked, double part_s, double step_s) const;
+  void give_linked(Linked& linked, const std::vector<joints::Spatial>& impulses);
+  void stop_linked(const Island& island);
+  void advance_linked_ringing(Linked& linked, const impact::Body& struck, double time_s, double step_s);
+  impact::Mobility calc_own_mobility(const Linked& linked, int member) const;
+  template <typename Do>
+  void for_linked(const Island& island, Do&& act) {
+    if (linked_.empty()) return;
+    for (const int body : island.bodies)
+      if (Linked* linked = find_linked(body); linked != nullptr && linked->bodies.front() == body) act(*linked);
+  }
+
+  // cords.cpp: cords as contacts that only pull
+  Vec3 calc_anchor(const Cord& cord, bool is_a, const State& state) const;
+  void stretch(Pair& pair) const;
+  double calc_cord_gap(const Cord& cord, const State& a, const State& b) const;
+  void add_cord(Pair& pair);
+  void open_cords(std::vector<char>& active, double length_s);
+
   // step.cpp: one group through one small step
   void step_island(Island& island, double start_s, double step_s);
   void note_crowd(const Island& island, double time_s);
@@ -199,6 +286,8 @@ class Space {
   void predict(const Island& island, double h, bool at_rest);
   Point make_point(const Contact& contact) const;
   void make_points(Island& island, double h, bool leaves_impacts);
+  Point make_lasting_point(const Contact& contact, double h) const;
+  Point make_cord_point(const Contact& contact, double h) const;
   void solve(double tolerance_m_s);
   void sum_turned();
   State calc_moved(std::size_t n, double part_s, double step_s) const;
@@ -228,12 +317,14 @@ class Space {
   bool begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s);
   void release_what_rests(const Island& island);
   void advance_ringings(const Island& island, double to_s, double part_s, double step_s);
+  void take_pull_back(int body, const joints::Spatial& pull, double time_s, double step_s);
   void keep_pulses(Ringing& ringing);
   void hand_out_forces(Press& press);
   void release(Ringing& ringing, double time_s);
   void end_ringing(Ringing& ringing, double time_s);
   Ring& ring_until(int body, double time_s);
   impact::Body make_struck(int body, double time_s);
+  void put_on_joints(int body, impact::Body& b) const;
   impact::Spring make_spring(const shape::Touch& touch, int a, int b) const;
   shape::Place find_place(int body, const shape::Touch& touch, bool is_a) const;
   std::vector<double> find_shape(int body, const std::vector<double>& shape) const;
@@ -241,8 +332,12 @@ class Space {
   Ringing* find_own_ringing(const Hit& hit);
   bool is_pressed(const Pair& pair, const Vec3& where) const;
 
-  /// Does an impact with modes move this body at present?
-  bool has_impact(int body) const { return moves(body) && in_ringing_[static_cast<std::size_t>(body)] != 0; }
+  /// Does an impact with modes move this body at present, or one on the same joints?
+  bool has_impact(int body) const {
+    if (!moves(body)) return false;
+    const Linked* linked = find_linked(body);
+    return linked != nullptr ? linked->ringing >= 0 : in_ringing_[static_cast<std::size_t>(body)] != 0;
+  }
   bool rings(int body) const { return body >= 0 && solids_[static_cast<std::size_t>(body)].modes != nullptr; }
   /// -1 is the ground: fixed.
   bool is_fixed(int body) const { return body < 0 || solids_[static_cast<std::size_t>(body)].fixed; }
@@ -259,6 +354,11 @@ class Space {
 
   std::vector<Solid> solids_;
   std::vector<State> states_;
+  std::vector<Linked> linked_;
+  std::vector<int> linked_of_, member_;   // of each body; empty without joints
+  std::set<std::pair<int, int>> joined_;  // pairs that do not collide
+  std::vector<Cord> cords_;
+  std::vector<Pair> cord_pairs_;  // one a cord
   std::vector<Placed> placed_;
   std::vector<char> asleep_, flying_, in_ringing_;
   std::vector<double> slow_s_, reach_m_s_, crowded_until_s_, next_proof_s_, next_guess_s_;
@@ -286,6 +386,7 @@ class Space {
   std::vector<Mover> movers_;
   std::vector<Vec3> free_spin_;
   std::vector<Placed> free_;
+  std::vector<Vec3> free_centre_, free_velocity_;  // of those on joints
   std::vector<Point> points_;
   std::vector<Vec3> turned_;  // angular impulses on them
   std::vector<Ref> rows_;     // of points_

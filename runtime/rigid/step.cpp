@@ -18,22 +18,20 @@ namespace {
 using impact::cross;
 using impact::dot;
 
-constexpr double kShortest = 1e-9;    // s; what is left of a step and shorter than this is not made
-constexpr double kFarTooDeep = 5e-5;  // m; from here on it comes up at any price
-constexpr double kSettling = 0.02;    // m/s; a group that is slower is about to rest
-constexpr double kAtRest = 1e-6;      // m/s
-constexpr double kSlow = 5e-3;        // m/s; of what may be about to rest
-constexpr double kPatience = 0.02;    // s; for so long
-constexpr double kBalanced = 1e-4;    // of gravity: what a solution with zero velocity may leave
-constexpr double kLong = 0.3;         // s; what was slow for so long is no faster than kSlow: less balance is enough
-constexpr int kMostAtOnce = 12;       // bodies that are about to rest and are factorised without sweeps before
-constexpr double kLoose = 100.0;      // times the tolerance
-constexpr int kGuesses = 6;           // of a factorised problem in a step
-constexpr int kMostGuesses = 12;      // where rest is to be proven
-constexpr double kRetry = 4e-3;       // s; a group whose guesses failed goes by sweeps for so long
-constexpr int kMostMissed = 30;       // in a step: instants at which nothing struck after all
-constexpr int kMostImpacts = 3;       // of a group in a step, each at its instant; a group with more is crowded
-constexpr double kCrowded = 2e-3;     // s; for so long after
+constexpr double kShortest = 1e-9;  // s; what is left of a step and shorter than this is not made
+constexpr double kSettling = 0.02;  // m/s; a group that is slower is about to rest
+constexpr double kAtRest = 1e-6;    // m/s
+constexpr double kSlow = 5e-3;      // m/s; of what may be about to rest
+constexpr double kPatience = 0.02;  // s; for so long
+constexpr double kLong = 0.3;       // s; what was slow for so long is no faster than kSlow: less balance is enough
+constexpr int kMostAtOnce = 12;     // bodies that are about to rest and are factorised without sweeps before
+constexpr double kLoose = 100.0;    // times the tolerance
+constexpr int kGuesses = 6;         // of a factorised problem in a step
+constexpr int kMostGuesses = 12;    // where rest is to be proven
+constexpr double kRetry = 4e-3;     // s; a group whose guesses failed goes by sweeps for so long
+constexpr int kMostMissed = 30;     // in a step: instants at which nothing struck after all
+constexpr int kMostImpacts = 3;     // of a group in a step, each at its instant; a group with more is crowded
+constexpr double kCrowded = 2e-3;   // s; for so long after
 
 }  // namespace
 
@@ -61,6 +59,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
     const double energy_before = calc_energy(island);
     solve(tolerance);
     sum_turned();
+    push_linked(island);
     double at = h;
     std::vector<Ref> first;
     together_s_ = kTogether;
@@ -110,8 +109,12 @@ void Space::predict(const Island& island, double h, bool at_rest) {
   movers_.resize(island.bodies.size());
   free_spin_.resize(island.bodies.size());
   free_.resize(island.bodies.size());
+  free_centre_.resize(island.bodies.size());
+  free_velocity_.resize(island.bodies.size());
+  for_linked(island, [&](Linked& linked) { predict_linked(linked, h, at_rest); });
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const auto i = static_cast<std::size_t>(island.bodies[n]);
+    if (find_linked(island.bodies[n]) != nullptr) continue;
     State from = states_[i];
     if (at_rest) from.velocity = from.momentum = {};
     const State to = fly(solids_[i], from, gravity_, h);
@@ -130,7 +133,70 @@ Point Space::make_point(const Contact& c) const {
   p.normal = c.touch.normal;
   if (p.a >= 0) p.arm_a = c.touch.where_m - states_[static_cast<std::size_t>(c.a)].centre;
   if (p.b >= 0) p.arm_b = c.touch.where_m - states_[static_cast<std::size_t>(c.b)].centre;
-  p.friction = calc_pair_friction(c.a, c.b);
+  p.friction = c.cord >= 0 ? 0.0 : calc_pair_friction(c.a, c.b);
+  return p;
+}
+
+/// A touch that lasts, as a row of the step.
+Point Space::make_lasting_point(const Contact& c, double h) const {
+  const shape::Touch& t = c.touch;
+  const double approach = calc_approach(c);
+  Point p = make_point(c);
+  // Where the impulse acts: half a step on, the same point for both bodies.
+  struct Side {
+    Vec3 middle{}, first{}, last{};  // centre half a step on; arms at both ends
+    Vec3 centre{};                   // from which the impulse has its arm
+    bool linked = false;
+  };
+  const auto make_side = [&](int body, int index) {
+    const auto i = static_cast<std::size_t>(body), n = static_cast<std::size_t>(index);
+    Side side;
+    side.middle = states_[i].centre + (0.5 * h) * states_[i].velocity;
+    side.centre = side.middle;
+    side.linked = movers_[n].linkage != nullptr;
+    if (side.linked) {
+      side.middle = 0.5 * (states_[i].centre + free_centre_[n]);
+      side.centre = free_centre_[n];
+    }
+    side.first = t.where_m - states_[i].centre;
+    side.last = t.smooth ? side.first : free_[n].rotation * (transpose(placed_[i].rotation) * side.first);
+    return side;
+  };
+  Vec3 where{};
+  Side sa, sb;
+  if (p.a >= 0) sa = make_side(c.a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
+  if (p.b >= 0) {
+    sb = make_side(c.b, p.b);
+    const Vec3 other = sb.middle + 0.5 * (sb.first + sb.last);
+    where = p.a >= 0 ? 0.5 * (where + other) : other;
+  }
+  // What the arms turn beyond that point until the end of the step belongs to the velocity there.
+  Vec3 beyond{};
+  if (p.a >= 0) {
+    p.arm_a = where - sa.centre;
+    beyond = beyond + cross(free_spin_[static_cast<std::size_t>(p.a)], sa.linked ? sa.last - p.arm_a : 0.5 * (sa.last - sa.first));
+  }
+  if (p.b >= 0) {
+    p.arm_b = where - sb.centre;
+    beyond = beyond - cross(free_spin_[static_cast<std::size_t>(p.b)], sb.linked ? sb.last - p.arm_b : 0.5 * (sb.last - sb.first));
+  }
+  // What touches and is at rest stays so exactly: a picometre is no gap, and would be a force.
+  const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
+  double least = rests ? 0.0 : std::min(0.0, approach - 2.0 * t.gap_m / h);
+  // What is too deep comes up, at half the power that the contact loses, so that no energy comes of it.
+  if (t.gap_m < -kDeep) {
+    const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
+    const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep ? 0.005 : paid);
+    if (approach > -up) least = up;
+  }
+  p.wanted = least * t.normal - beyond;
+  const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
+  if (t.smooth && curvature > 0.0) {
+    p.rolling_m = options_.rolling_resistance / curvature;
+    p.twisting_m = 1e-2 * p.friction / curvature;
+  }
+  p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
+  p.couple = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.couple;
   return p;
 }
 
@@ -145,56 +211,9 @@ void Space::make_points(Island& island, double h, bool leaves_impacts) {
       const double approach = calc_approach(c);
       if (c.presses || (leaves_impacts && is_fast(c, h))) continue;
       // The impact has these bodies; what stands still and rings goes on carrying others.
-      if (has_impact(pair->a) || has_impact(pair->b)) continue;
+      if (c.cord < 0 && (has_impact(pair->a) || has_impact(pair->b))) continue;
       if (t.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(gravity_) * h * h && !c.touching) continue;
-      Point p = make_point(c);
-      // Where the impulse acts: half a step on, the same point for both bodies.
-      struct Side {
-        Vec3 middle{}, first{}, last{};  // centre half a step on; arms at both ends
-      };
-      const auto make_side = [&](int body, int index) {
-        const auto i = static_cast<std::size_t>(body), n = static_cast<std::size_t>(index);
-        Side side;
-        side.middle = states_[i].centre + (0.5 * h) * states_[i].velocity;
-        side.first = t.where_m - states_[i].centre;
-        side.last = t.smooth ? side.first : free_[n].rotation * (transpose(placed_[i].rotation) * side.first);
-        return side;
-      };
-      Vec3 where{};
-      Side sa, sb;
-      if (p.a >= 0) sa = make_side(pair->a, p.a), where = sa.middle + 0.5 * (sa.first + sa.last);
-      if (p.b >= 0) {
-        sb = make_side(pair->b, p.b);
-        const Vec3 other = sb.middle + 0.5 * (sb.first + sb.last);
-        where = p.a >= 0 ? 0.5 * (where + other) : other;
-      }
-      // What the arms turn beyond that point until the end of the step belongs to the velocity there.
-      Vec3 beyond{};
-      if (p.a >= 0) {
-        p.arm_a = where - sa.middle;
-        beyond = beyond + cross(free_spin_[static_cast<std::size_t>(p.a)], 0.5 * (sa.last - sa.first));
-      }
-      if (p.b >= 0) {
-        p.arm_b = where - sb.middle;
-        beyond = beyond - cross(free_spin_[static_cast<std::size_t>(p.b)], 0.5 * (sb.last - sb.first));
-      }
-      // What touches and is at rest stays so exactly: a picometre is no gap, and would be a force.
-      const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
-      double least = rests ? 0.0 : std::min(0.0, approach - 2.0 * t.gap_m / h);
-      // What is too deep comes up, at half the power that the contact loses, so that no energy comes of it.
-      if (t.gap_m < -kDeep) {
-        const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
-        const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep ? 0.005 : paid);
-        if (approach > -up) least = up;
-      }
-      p.wanted = least * t.normal - beyond;
-      const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
-      if (t.smooth && curvature > 0.0) {
-        p.rolling_m = options_.rolling_resistance / curvature;
-        p.twisting_m = 1e-2 * p.friction / curvature;
-      }
-      p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
-      p.couple = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.couple;
+      const Point p = c.cord >= 0 ? make_cord_point(c, h) : make_lasting_point(c, h);
       points_.push_back(p);
       rows_.push_back({pair, k});
     }
@@ -283,6 +302,11 @@ void Space::sum_turned() {
 /// The nth body of the group, a part of the step on: what the contacts gave it acts all along.
 State Space::calc_moved(std::size_t n, double part_s, double step_s) const {
   const auto i = static_cast<std::size_t>((*stepped_)[n]);
+  if (const Linked* linked = find_linked((*stepped_)[n]); linked != nullptr) {
+    std::vector<joints::Motion> motions;
+    linked->mechanism->find_motions(calc_linked_moved(*linked, part_s, step_s), motions);
+    return make_state(solids_[i], motions[static_cast<std::size_t>(movers_[n].member)]);
+  }
   State to = fly(solids_[i], states_[i], gravity_, part_s);
   const Vec3 gained = (1.0 / step_s) * (movers_[n].velocity - (states_[i].velocity + step_s * gravity_));
   to.velocity = to.velocity + part_s * gained;
@@ -299,6 +323,11 @@ double Space::calc_loss(const Point& p, double part) const {
   const auto add = [&](int index, const Vec3& arm, double sign) {
     if (index < 0) return;
     const auto i = static_cast<std::size_t>((*stepped_)[static_cast<std::size_t>(index)]);
+    if (movers_[static_cast<std::size_t>(index)].linkage != nullptr) {
+      // The arm is from where the centre is at the end.
+      const Vec3 moved = 0.5 * (free_centre_[static_cast<std::size_t>(index)] - states_[i].centre);
+      u = u + ((2.0 - part) * sign) * cross(placed_[i].spin, moved);
+    }
     u = u + ((2.0 - part) * sign) * (states_[i].velocity + cross(placed_[i].spin, arm));
     w = w + ((2.0 - part) * sign) * placed_[i].spin;
   };
@@ -326,13 +355,22 @@ void Space::move_bodies(const Island& island, double to_s, double part_s, double
   std::vector<State> moved;
   std::vector<char> is_ringing;  // one that ends in this part has been moved by it, too
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-    is_ringing.push_back(in_ringing_[static_cast<std::size_t>(island.bodies[n])]);
+    is_ringing.push_back(has_impact(island.bodies[n]) ? 1 : 0);
     rings = rings || is_ringing.back() != 0;
-    moved.push_back(calc_moved(n, part_s, h));
+    moved.push_back(movers_[n].linkage == nullptr ? calc_moved(n, part_s, h) : State{});
   }
+  std::vector<Linked*> flown;
+  for_linked(island, [&](Linked& linked) {
+    if (linked.ringing < 0) flown.push_back(&linked);
+  });
   if (rings) advance_ringings(island, to_s, part_s, h);
+  for (Linked* linked : flown) {
+    linked->now = calc_linked_moved(*linked, part_s, h);
+    place_linked(*linked);
+  }
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const int body = island.bodies[n];
+    if (movers_[n].linkage != nullptr) continue;
     if (!is_ringing[n]) states_[static_cast<std::size_t>(body)] = moved[n];
     check_finite(body);
     place_body(body);
@@ -363,7 +401,12 @@ void Space::take_gain(const Island& island, double before_j) {
   }
   lost_j_ += std::min(gained, kinetic);
   const double part = kinetic > gained ? std::sqrt(1.0 - gained / kinetic) : 0.0;
+  for_linked(island, [&](Linked& linked) {
+    for (double& u : linked.now.u) u *= part;
+    place_linked(linked);
+  });
   for (const int body : island.bodies) {
+    if (find_linked(body) != nullptr) continue;
     State& s = states_[static_cast<std::size_t>(body)];
     s.velocity = part * s.velocity;
     s.momentum = part * s.momentum;
@@ -377,7 +420,7 @@ bool Space::may_rest(const Island& island, double h) {
   for (const int body : island.bodies) {
     const auto i = static_cast<std::size_t>(body);
     const double speed = norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m;
-    slow_s_[i] = speed < kSlow && !in_ringing_[i] ? slow_s_[i] + h : 0.0;
+    slow_s_[i] = speed < kSlow && !has_impact(body) ? slow_s_[i] + h : 0.0;
     all = all && slow_s_[i] > kPatience && time_s_ >= next_proof_s_[i];
   }
   return all;
@@ -390,8 +433,14 @@ bool Space::rests(Island& island, double h) {
   double slow_s = std::numeric_limits<double>::infinity();
   for (const Pair* pair : island.pairs)
     touches = touches || std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
+  for_linked(island, [&](const Linked& linked) { touches = touches || linked.hangs; });
   if (!touches) return false;
   std::vector<State> kept;
+  std::vector<joints::Coordinates> kept_linked;
+  for_linked(island, [&](Linked& linked) {
+    kept_linked.push_back(linked.now);
+    std::fill(linked.now.u.begin(), linked.now.u.end(), 0.0);
+  });
   for (const int body : island.bodies) {
     State& s = states_[static_cast<std::size_t>(body)];
     kept.push_back(s);
@@ -414,6 +463,12 @@ bool Space::rests(Island& island, double h) {
     for (const Point& p : points_)
       for (const int n : {p.a, p.b})
         if (n >= 0 && dot(p.impulse, p.normal) > 0.0) carried[static_cast<std::size_t>(n)] = 1;
+    for_linked(island, [&](const Linked& linked) {
+      const std::vector<int>& members = linked.linkage.movers;
+      const bool any =
+          linked.hangs || std::any_of(members.begin(), members.end(), [&](int n) { return carried[static_cast<std::size_t>(n)] != 0; });
+      for (const int n : members) carried[static_cast<std::size_t>(n)] = any ? 1 : 0;
+    });
     for (std::size_t n = 0; n < island.bodies.size(); ++n) {
       const double radius = solid(island.bodies[n]).radius_m;
       if (!carried[n] || norm(movers_[n].velocity) + norm(movers_[n].spin) * radius > bound * g * h) return false;
@@ -438,6 +493,13 @@ bool Space::rests(Island& island, double h) {
       next_proof_s_[i] = time_s_ + std::min(0.5 * slow_s, kLong);
       place_body(island.bodies[n]);
     }
+  }
+  if (!balanced) {
+    std::size_t k = 0;
+    for_linked(island, [&](Linked& linked) {
+      linked.now = kept_linked[k++];
+      place_linked(linked);
+    });
   }
   for (std::size_t n = 0; balanced && n < points_.size(); ++n) {
     Contact& c = rows_[n].get();

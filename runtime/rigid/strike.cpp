@@ -93,6 +93,12 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
       if (!moves(body)) return placed_[static_cast<std::size_t>(body)].frame;
       return place(solid(body), calc_moved(static_cast<std::size_t>(find_index(body)), s, h)).frame;
     };
+    if (pair.cord >= 0) {
+      const auto get_state = [&](int body) {
+        return moves(body) ? calc_moved(static_cast<std::size_t>(find_index(body)), s, h) : body >= 0 ? state(body) : State{};
+      };
+      return calc_cord_gap(cords_[static_cast<std::size_t>(pair.cord)], get_state(pair.a), get_state(pair.b));
+    }
     shape::Touch touch = now;
     shape::refresh(touch, *solid(pair.a).shape, get_frame(pair.a), get_shape(pair.b), get_frame(pair.b), pair.memory);
     return touch.gap_m;
@@ -165,7 +171,7 @@ std::vector<Space::Ref> Space::gather_points(const Island& island, const std::ve
     bodies = next;
   }
   std::sort(taken.begin(), taken.end(), [](const Ref& x, const Ref& y) {
-    return std::tuple(x.pair->a, x.pair->b, x.contact) < std::tuple(y.pair->a, y.pair->b, y.contact);
+    return std::tuple(x.pair->a, x.pair->b, x.pair->cord, x.contact) < std::tuple(y.pair->a, y.pair->b, y.pair->cord, y.contact);
   });
   return taken;
 }
@@ -174,8 +180,15 @@ std::vector<Space::Ref> Space::gather_points(const Island& island, const std::ve
 Hit Space::make_hit(const Contact& c, Point& p) const {
   Hit hit{.a = c.a, .b = c.b, .touch = c.touch};
   hit.approach_m_s = -dot(calc_relative_velocity(movers_, p), p.normal);
+  hit.is_cord = c.cord >= 0;
+  if (find_linked(c.a) != nullptr || find_linked(c.b) != nullptr) {
+    const double mobility = dot(p.normal, calc_mobility(movers_, p) * p.normal);
+    hit.linked_mass_kg = mobility > 0.0 ? 1.0 / mobility : 0.0;
+  }
   if (hit.approach_m_s <= kSlowest) return hit;
-  if (!(c.touching && c.touch.gap_m <= kTouch)) {
+  if (hit.is_cord) {
+    hit.restitution = c.touching ? 0.0 : cords_[static_cast<std::size_t>(c.cord)].restitution;
+  } else if (!(c.touching && c.touch.gap_m <= kTouch)) {
     // A rebound whose flight, 2 e v / g, is shorter than the contact itself is none: weight keeps the surfaces together.
     const double e = calc_pair_restitution(c.a, c.b), mass = 1.0 / dot(p.normal, calc_mobility(movers_, p) * p.normal);
     const double pull = std::abs(dot(gravity_, p.normal)), flight = 2.0 * e * hit.approach_m_s;
@@ -204,6 +217,12 @@ double Space::give_impulses(Strike& record, const std::vector<Point>& points) {
     if (points[n].a >= 0) moved.insert(record.hits[n].a);
     if (points[n].b >= 0) moved.insert(record.hits[n].b);
   }
+  std::vector<Linked*> pushed;
+  for (const int body : std::vector<int>(moved.begin(), moved.end()))
+    if (Linked* linked = find_linked(body); linked != nullptr && std::find(pushed.begin(), pushed.end(), linked) == pushed.end()) {
+      pushed.push_back(linked);
+      moved.insert(linked->bodies.begin(), linked->bodies.end());
+    }
   double before_j = 0.0, after_j = 0.0;
   for (const int body : moved) {
     record.bodies.push_back(body);
@@ -211,6 +230,7 @@ double Space::give_impulses(Strike& record, const std::vector<Point>& points) {
     before_j += calc_kinetic(solid(body), state(body));
   }
   const auto give = [&](int body, const Vec3& arm, const Vec3& impulse) {
+    if (find_linked(body) != nullptr) return;
     State& s = states_[static_cast<std::size_t>(body)];
     s.velocity = s.velocity + (1.0 / solid(body).mass_kg) * impulse;
     s.momentum = s.momentum + cross(arm, impulse);
@@ -219,6 +239,21 @@ double Space::give_impulses(Strike& record, const std::vector<Point>& points) {
     const Hit& hit = record.hits[n];
     if (points[n].a >= 0) give(hit.a, points[n].arm_a, hit.impulse);
     if (points[n].b >= 0) give(hit.b, points[n].arm_b, -1.0 * hit.impulse);
+  }
+  for (Linked* linked : pushed) {
+    std::vector<joints::Spatial> impulses(linked->bodies.size());
+    const auto add = [&](int body, const Vec3& arm, const Vec3& impulse) {
+      if (find_linked(body) != linked) return;
+      joints::Spatial& on = impulses[static_cast<std::size_t>(get_member(body))];
+      on.linear = on.linear + impulse;
+      on.angular = on.angular + cross(arm, impulse);
+    };
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const Hit& hit = record.hits[n];
+      if (points[n].a >= 0) add(hit.a, points[n].arm_a, hit.impulse);
+      if (points[n].b >= 0) add(hit.b, points[n].arm_b, -1.0 * hit.impulse);
+    }
+    give_linked(*linked, impulses);
   }
   for (const int body : moved) after_j += calc_kinetic(solid(body), state(body));
   return before_j - after_j;
@@ -233,7 +268,12 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const auto i = static_cast<std::size_t>(island.bodies[n]);
     movers_[n] = {1.0 / solids_[i].mass_kg, placed_[i].inverse_inertia, states_[i].velocity, placed_[i].spin};
+    if (Linked* linked = find_linked(island.bodies[n]); linked != nullptr) {
+      movers_[n].linkage = &linked->linkage;
+      movers_[n].member = get_member(island.bodies[n]);
+    }
   }
+  for_linked(island, [](Linked& linked) { linked.linkage.set(*linked.mechanism, linked.now); });
   std::vector<Point> points;
   double scale = kSlowest;
   for (const Ref& ref : taken) {
@@ -277,7 +317,7 @@ void Space::give_to_modes(Strike& record, double taken_j) {
   std::vector<Share> shares;
   double given = 0.0;
   for (const Hit& hit : record.hits) {
-    if (hit.impulse == Vec3{} || !(hit.approach_m_s > kSlowest)) continue;
+    if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kSlowest)) continue;
     for (const bool is_a : {true, false}) {
       const int body = is_a ? hit.a : hit.b;
       if (!rings(body) || in_ringing_[static_cast<std::size_t>(body)]) continue;

@@ -76,6 +76,33 @@ TEST(Scene, MalletsAreRead) {
   EXPECT_NE(dense.warnings[0].find("denser than osmium"), std::string::npos);
 }
 
+const std::string kTwo = R"("bodies": [{"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "b.h5"}])";
+std::string with_joint(const std::string& keys) { return "{\"duration_s\": 1, " + kTwo + ",\n\"joints\": [{" + keys + "}]}"; }
+std::string with_cord(const std::string& keys) { return "{\"duration_s\": 1, " + kTwo + ",\n\"cords\": [{" + keys + "}]}"; }
+
+TEST(Scene, JointsAndCordsAreRead) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kTwo + R"(, "joints": [
+    {"kind": "hinge", "body": "a", "to": "world", "at_m": [0, 0, 1], "axis": [0, 2, 0], "damping": 0.01},
+    {"kind": "universal", "body": "b", "to": "a", "at_m": [0, 0, 2], "axis": [1, 0, 0], "second_axis": [0, 3, 0]}],
+    "cords": [{"from": {"body": "b", "at_m": [0, 0, 1]}, "to": {"at_m": [0, 0, 3]}, "length_m": 2.5, "restitution": 0.2},
+              {"from": {"body": "b", "at_m": [0, 0, 1]}, "to": {"body": "a", "at_m": [0, 0, 3]}}]})");
+  ASSERT_EQ(scene.joints.size(), 2u);
+  EXPECT_EQ(scene.joints[0].kind, joints::Kind::kHinge);
+  EXPECT_EQ(scene.joints[0].body, 0);
+  EXPECT_EQ(scene.joints[0].to, -1);
+  EXPECT_EQ(scene.joints[0].axis, (Vec3{0, 1, 0}));
+  EXPECT_EQ(scene.joints[0].damping, 0.01);
+  EXPECT_EQ(scene.joints[0].place, "/somewhere/scene.json:2");
+  EXPECT_EQ(scene.joints[1].to, 0);
+  EXPECT_EQ(scene.joints[1].second_axis, (Vec3{0, 1, 0}));
+  ASSERT_EQ(scene.cords.size(), 2u);
+  EXPECT_EQ(scene.cords[0].to, -1);
+  EXPECT_EQ(scene.cords[0].length_m, 2.5);
+  EXPECT_EQ(scene.cords[0].restitution, 0.2);
+  EXPECT_EQ(scene.cords[1].to, 0);
+  EXPECT_FALSE(scene.cords[1].length_m.has_value());
+}
+
 TEST(Scene, ManyStrikesAreReadInOnePassOfTheText) {
   std::string text = "{\"duration_s\": 100,\n" + kBody + ", \"strikes\": [\n";
   constexpr int kStrikes = 20000;
@@ -251,6 +278,35 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"empty_bodies", "{\"duration_s\": 1, \"bodies\": []}", {"bodies", "at least one"}},
         BadScene{"misspelt_key", with_root("\"gravity_ms2\": [0, 0, 0]"), {":2:", "gravity_ms2", "gravity_m_s2"}},
         BadScene{"misspelt_body_key", with_body("\"positon_m\": [0, 0, 0]"), {":3:", "positon_m", "position_m"}},
+        BadScene{"joint_of_no_kind", with_joint(R"("kind": "glue", "body": "a", "to": "b", "at_m": [0, 0, 0])"), {":2:", "kind", "hinge"}},
+        BadScene{"joint_of_nobody",
+                 with_joint(R"("kind": "ball", "body": "c", "to": "b", "at_m": [0, 0, 0])"),
+                 {":2:", "no body is called \"c\""}},
+        BadScene{"joint_without_end", with_joint(R"("kind": "ball", "body": "a", "at_m": [0, 0, 0])"), {":2:", "to", "missing"}},
+        BadScene{"joint_nowhere", with_joint(R"("kind": "ball", "body": "a", "to": "b")"), {":2:", "at_m", "missing"}},
+        BadScene{
+            "hinge_without_axis", with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0])"), {":2:", "axis", "missing"}},
+        BadScene{"hinge_of_zero_axis",
+                 with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 0])"),
+                 {":2:", "axis", "no direction"}},
+        BadScene{"ball_with_axis",
+                 with_joint(R"("kind": "ball", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1])"),
+                 {":2:", "axis", "take it away"}},
+        BadScene{
+            "universal_with_parallel_axes",
+            with_joint(R"("kind": "universal", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "second_axis": [0, 0.1, 1])"),
+            {":2:", "second_axis", "right angles"}},
+        BadScene{"joint_that_drives",
+                 with_joint(R"("kind": "ball", "body": "a", "to": "b", "at_m": [0, 0, 0], "damping": -1)"),
+                 {":2:", "damping", "out of range"}},
+        BadScene{"cord_from_nobody",
+                 with_cord(R"("from": {"body": "c", "at_m": [0, 0, 0]}, "to": {"at_m": [0, 0, 1]})"),
+                 {":2:", "no body is called \"c\""}},
+        BadScene{
+            "cord_to_nowhere", with_cord(R"("from": {"body": "a", "at_m": [0, 0, 0]}, "to": {"body": "b"})"), {":2:", "at_m", "missing"}},
+        BadScene{"short_cord",
+                 with_cord(R"("from": {"body": "a", "at_m": [0, 0, 0]}, "to": {"at_m": [0, 0, 1]}, "length_m": 0.5)"),
+                 {":2:", "length_m", "at least"}},
         BadScene{"body_without_bank", "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\"}]}", {"bank", "missing"}},
         BadScene{"body_without_name", "{\"duration_s\": 1, \"bodies\": [{\"bank\": \"a.h5\"}]}", {"name", "missing"}},
         BadScene{"twice_the_name",
