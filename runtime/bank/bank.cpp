@@ -32,6 +32,17 @@ double calc_decay(const Damping& damping, const Material& material, double eigen
   return (material.alpha1_s * eigenvalue_rad2_s2 + material.alpha2_per_s) / 2.0;
 }
 
+std::vector<double> calc_shapes(const Bank& bank, std::int32_t triangle, const Vec3& barycentric) {
+  const std::size_t values = 3 * bank.mode_count();
+  std::vector<double> shapes(values, 0.0);
+  const auto& corners = bank.triangles[static_cast<std::size_t>(triangle)];
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::int16_t* row = bank.shape.data() + static_cast<std::size_t>(corners[c]) * values;
+    for (std::size_t i = 0; i < values; ++i) shapes[i] += barycentric[c] * bank.shape_scale[i / 3] * row[i];
+  }
+  return shapes;
+}
+
 double calc_shape_scale(double largest) {
   // A step too small for a normal double would not hold the error bound; no real shape comes near.
   return largest > 0.0 ? std::max(largest / 32767.0, std::numeric_limits<double>::min()) : 0.0;

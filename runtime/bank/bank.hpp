@@ -140,6 +140,9 @@ struct Bank {
   }
 };
 
+/// The shapes of all modes at a point of a triangle, (m, 3) [kg^-1/2]: linear between its corners.
+std::vector<double> calc_shapes(const Bank& bank, std::int32_t triangle, const Vec3& barycentric);
+
 /// One integer step of a mode whose largest absolute component is `largest`: largest / 32767, 0 for a mode at rest.
 double calc_shape_scale(double largest);
 

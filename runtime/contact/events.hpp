@@ -43,6 +43,7 @@ struct EnergyAudit {
   double motion_j = 0.0;      // kinetic and of gravity
   double modes_j = 0.0;       // in the modes
   double most_modes_j = 0.0;  // the largest there has been
+  double modes_share = 0.0;   // the largest there has been, of what the motion had lost by then; above 1 modes have more than was lost
   double lost_j = 0.0;        // by friction, in contacts, in the modes' damping
   double error_j = 0.0;       // the largest there has been
 };

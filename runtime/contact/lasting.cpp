@@ -183,11 +183,11 @@ void LastingContacts::update(const rigid::Space& space, std::vector<stream::Even
     Spot* nearest = nullptr;
     double least = 2.0 * calc_spot_radius(space, g.a, g.b);
     for (Spot& spot : spots_) {
+      if (spot.a != g.a || spot.b != g.b || spot.seen_s >= time_s) continue;
       const double distance = norm(spot.where - g.where);
-      if (spot.a == g.a && spot.b == g.b && spot.seen_s < time_s && distance < least) {
-        nearest = &spot;
-        least = distance;
-      }
+      if (distance >= least) continue;
+      nearest = &spot;
+      least = distance;
     }
     if (nearest == nullptr) {
       Spot spot;

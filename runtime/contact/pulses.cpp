@@ -18,8 +18,8 @@ using impact::operator*;
 using rigid::norm;
 using stream::Vec3;
 
-constexpr double kSlowest = 1e-3;   // m/s; of an impact
-constexpr double kTogether = 1e-4;  // s; touches nearer in time than this are one impact
+constexpr double kSlowest = 1e-3;  // m/s; of an impact
+constexpr double kMasked = 0.01;   // of the largest impulse of the same instant: 40 dB below it
 
 /// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
@@ -38,7 +38,7 @@ double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike,
 }
 
 void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std::vector<const rigid::Hit*>& hits, double touch_s,
-              LastingContacts& lasting, std::vector<stream::Event>& events) {
+              double most_push, LastingContacts& lasting, std::vector<stream::Event>& events) {
   const rigid::Hit& first = *hits.front();
   Vec3 impulse{}, where{}, normal{};
   double push = 0.0, approach = 0.0, curvature = 0.0;
@@ -55,7 +55,8 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   normal = (1.0 / norm(normal)) * normal;
   const double inverse_mass =
       first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : calc_inverse_mass(space, strike, first, where, normal);
-  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest) return;  // a resting spot that the impact elsewhere hardly moved
+  // A resting spot that the impact elsewhere hardly moved, or next to nothing of what sounds at the same instant.
+  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest || push < kMasked * most_push) return;
   const double speed = approach > kSlowest ? approach : push * inverse_mass;
   const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
   lasting.note_impact(space, first.a, first.b, where, strike.time_s);
@@ -90,11 +91,12 @@ void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingC
     if (!hit.is_cord && dot(hit.impulse, hit.touch.normal) > 0.0) order.push_back(&hit);
   std::stable_sort(order.begin(), order.end(),
                    [](const auto* x, const auto* y) { return dot(x->impulse, x->impulse) > dot(y->impulse, y->impulse); });
+  const double most_push = order.empty() ? 0.0 : norm(order.front()->impulse);
   std::vector<char> taken(order.size(), 0);
   for (std::size_t seed = 0; seed < order.size(); ++seed) {
     if (taken[seed]) continue;
     std::vector<const rigid::Hit*> spot;
-    double wait_s = kTogether;
+    double wait_s = strike.together_s;
     for (std::size_t i = seed; i < order.size(); ++i) {
       const rigid::Hit& hit = *order[i];
       if (taken[i] || hit.a != order[seed]->a || hit.b != order[seed]->b) continue;
@@ -103,7 +105,7 @@ void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingC
       spot.push_back(&hit);
       wait_s = std::min(wait_s, hit.approach_m_s > kSlowest ? hit.touch.gap_m / hit.approach_m_s : 0.0);
     }
-    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -kTogether, kTogether), lasting, events);
+    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -strike.together_s, strike.together_s), most_push, lasting, events);
   }
 }
 

@@ -13,6 +13,7 @@
 
 #include "runtime/config/error.hpp"
 #include "runtime/contact/lasting.hpp"
+#include "runtime/contact/mode_sets.hpp"
 #include "runtime/contact/pulses.hpp"
 #include "runtime/rigid/groups.hpp"
 #include "runtime/rigid/space.hpp"
@@ -78,13 +79,6 @@ void check_body(const BodySpec& b) {
 
 rigid::Mat3 to_matrix(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
 
-rigid::Mat3 calc_inverse(const rigid::Mat3& m) {
-  using impact::cross;
-  const Vec3 a = cross(m[1], m[2]), b = cross(m[2], m[0]), c = cross(m[0], m[1]);
-  const double s = 1.0 / impact::dot(m[0], a);
-  return {Vec3{s * a[0], s * b[0], s * c[0]}, Vec3{s * a[1], s * b[1], s * c[1]}, Vec3{s * a[2], s * b[2], s * c[2]}};
-}
-
 /// Bodies of one bank share their shape.
 using Shapes = std::map<const bank::Bank*, std::shared_ptr<const shape::Shape>>;
 
@@ -104,7 +98,7 @@ rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
   solid.centre_m = b.bank->rigid.centre_m;
   if (!b.fixed) {
     solid.inertia_kg_m2 = to_matrix(b.bank->rigid.inertia_kg_m2);
-    solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
+    solid.inverse_inertia = impact::calc_inverse(solid.inertia_kg_m2);
   }
   for (const Vec3& v : b.bank->vertices_m)
     solid.radius_m = std::max(solid.radius_m, std::hypot(v[0] - solid.centre_m[0], v[1] - solid.centre_m[1], v[2] - solid.centre_m[2]));
@@ -115,28 +109,10 @@ rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
   return solid;
 }
 
-/// Bodies of one bank share their modes.
-using ModeSets = std::map<const bank::Bank*, std::shared_ptr<const impact::Modes>>;
-
 void add_modes(rigid::Solid& solid, const bank::Bank& bank, ModeSets& sets) {
   if (bank.mode_count() == 0) return;
-  auto& shared = sets[&bank];
-  if (!shared) {
-    std::vector<double> omega;
-    for (const double lambda : bank.eigenvalue_rad2_s2) omega.push_back(std::sqrt(std::max(lambda, 0.0)));
-    shared = std::make_shared<const impact::Modes>(omega, bank.decay_per_s);
-  }
-  solid.modes = shared;
-  solid.find_shape = [&bank](const shape::Place& place) {
-    const std::size_t modes = bank.mode_count();
-    std::vector<double> shape(3 * modes, 0.0);
-    const auto& corners = bank.triangles[static_cast<std::size_t>(place.triangle)];
-    for (std::size_t c = 0; c < 3; ++c) {
-      const std::int16_t* row = bank.shape.data() + static_cast<std::size_t>(corners[c]) * 3 * modes;
-      for (std::size_t i = 0; i < 3 * modes; ++i) shape[i] += place.barycentric[c] * bank.shape_scale[i / 3] * row[i];
-    }
-    return shape;
-  };
+  solid.modes = sets.find(bank);
+  solid.find_shape = [&bank](const shape::Place& place) { return bank::calc_shapes(bank, place.triangle, place.barycentric); };
 }
 
 rigid::State make_state(const BodySpec& b, const rigid::Solid& solid) {
@@ -147,7 +123,7 @@ rigid::State make_state(const BodySpec& b, const rigid::Solid& solid) {
   const rigid::Mat3 rotation = rigid::make_rotation(state.rotation);
   state.centre = b.initial.position_m + rotation * solid.centre_m;
   state.velocity = b.velocity_m_s;
-  if (!b.fixed) state.momentum = rotation * (solid.inertia_kg_m2 * (rigid::transpose(rotation) * b.angular_velocity_rad_s));
+  if (!b.fixed) state.momentum = rotation * (solid.inertia_kg_m2 * (impact::transpose(rotation) * b.angular_velocity_rad_s));
   return state;
 }
 
@@ -312,17 +288,17 @@ class World::Course {
   Course(const WorldSpec& spec, const WorldOptions& options)
       : options_(options), space_(make_space(spec, options)), lasting_(list_matter(spec)) {
     check_overlaps(spec);
+    prepare_shapes(spec.ground.has_value());
     if (!options_.audits_energy) return;
     for (int i = 0; i < count(); ++i)
-      if (!space_.solid(i).fixed)
-        energy_.weight_n += space_.solid(i).mass_kg * std::sqrt(impact::dot(spec.gravity_m_s2, spec.gravity_m_s2));
+      if (!space_.solid(i).fixed) energy_.weight_n += space_.solid(i).mass_kg * impact::norm(spec.gravity_m_s2);
   }
 
   double advance(double until_s, double cpu_s, const Sink& sink) {
     const double started_s = get_cpu_s();
     while (!begun_ || (until_s - reached_s_ > kShortest && !is_over())) {
       step(sink);
-      if (get_cpu_s() - started_s >= cpu_s) break;
+      if (std::isfinite(cpu_s) && get_cpu_s() - started_s >= cpu_s) break;
     }
     seconds_cpu_ += get_cpu_s() - started_s;
     return reached_s_;
@@ -374,8 +350,10 @@ class World::Course {
     if (!space_.is_at_window()) return;
     if (!slept) audit();
     reached_s_ = space_.get_time();
-    for (int i = 0; i < count(); ++i)
-      if (is_over() || (!space_.is_still(i) && !slept) || just_slept(i)) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+    for (int i = 0; i < count(); ++i) {
+      const bool fell_asleep = just_slept(i);
+      if (is_over() || (!space_.is_still(i) && !slept) || fell_asleep) events_.push_back(make_motion(i, space_.state(i), reached_s_));
+    }
     emit(sink);
   }
 
@@ -428,6 +406,7 @@ class World::Course {
     energy_.motion_j = books.motion_j;
     energy_.modes_j = books.modes_j;
     energy_.most_modes_j = std::max(energy_.most_modes_j, books.modes_j);
+    if (books.modes_j > 0.0) energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j - books.motion_j));
     energy_.lost_j = books.lost_j;
     energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
     energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - least_j_);
@@ -446,7 +425,9 @@ class World::Course {
     sink(stream::Mark{mark_s});
   }
 
+  std::vector<std::vector<int>> find_near() const;
   void check_overlaps(const WorldSpec& spec) const;
+  void prepare_shapes(bool has_ground) const;
 
   WorldOptions options_;
   rigid::Space space_;
@@ -461,7 +442,45 @@ class World::Course {
   double least_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
 };
 
+/// Which bodies each body shares some of its box with; of a pair, only the later one, and none of two that are fixed. In order.
+std::vector<std::vector<int>> World::Course::find_near() const {
+  std::vector<shape::Box> boxes;
+  std::vector<int> order;
+  for (int i = 0; i < count(); ++i) {
+    boxes.push_back(space_.solid(i).shape->calc_box(rigid::place(space_.solid(i), space_.state(i)).frame));
+    order.push_back(i);
+  }
+  const auto box = [&](int body) -> const shape::Box& { return boxes[static_cast<std::size_t>(body)]; };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return box(a).low[0] < box(b).low[0]; });
+  std::vector<std::vector<int>> near(boxes.size());
+  for (auto a = order.begin(); a != order.end(); ++a) {
+    for (auto b = a + 1; b != order.end() && box(*b).low[0] <= box(*a).high[0]; ++b) {
+      if (space_.solid(*a).fixed && space_.solid(*b).fixed) continue;
+      const auto is_apart = [&](std::size_t k) { return box(*a).low[k] > box(*b).high[k] || box(*b).low[k] > box(*a).high[k]; };
+      if (!is_apart(1) && !is_apart(2)) near[static_cast<std::size_t>(std::min(*a, *b))].push_back(std::max(*a, *b));
+    }
+  }
+  for (std::vector<int>& bodies : near) std::sort(bodies.begin(), bodies.end());
+  return near;
+}
+
+/// What searches will need of the shapes is made now: a scene that is heard as it runs must not wait for it. Polyhedra need it against
+/// other bodies alone, and not against each other.
+void World::Course::prepare_shapes(bool has_ground) const {
+  for (int a = 0; a < count(); ++a) {
+    const rigid::Solid& solid = space_.solid(a);
+    const auto can_meet = [&](const rigid::Solid& other) {
+      return !(solid.fixed && other.fixed) && !(solid.shape->is_polyhedron() && other.shape->is_polyhedron());
+    };
+    bool meets_bodies = false;
+    for (int b = 0; b < count() && !meets_bodies; ++b) meets_bodies = b != a && can_meet(space_.solid(b));
+    const bool meets_ground = has_ground && !solid.fixed && !solid.shape->is_polyhedron();
+    if (meets_bodies || meets_ground) solid.shape->prepare(meets_bodies);
+  }
+}
+
 void World::Course::check_overlaps(const WorldSpec& spec) const {
+  const std::vector<std::vector<int>> near = find_near();
   const auto allowed_m = [&](int body) { return std::min(2e-4, 5e-3 * space_.solid(body).shape->get_size_m()); };
   for (int a = 0; a < count(); ++a) {
     const rigid::Placed at_a = rigid::place(space_.solid(a), space_.state(a));
@@ -475,8 +494,8 @@ void World::Course::check_overlaps(const WorldSpec& spec) const {
         throw InputError(fmt::format("body '{}' starts {:.2f} mm inside the ground (height {:g} m); raise it by that much",
                                      spec.bodies[static_cast<std::size_t>(a)].name, depth * 1e3, spec.ground->height_m));
     }
-    for (int b = a + 1; b < count(); ++b) {
-      if ((space_.solid(a).fixed && space_.solid(b).fixed) || space_.is_joined(a, b)) continue;
+    for (const int b : near[static_cast<std::size_t>(a)]) {
+      if (space_.is_joined(a, b)) continue;
       Vec3 where{};
       const double depth = shape::calc_overlap(*space_.solid(a).shape, at_a.frame, *space_.solid(b).shape,
                                                rigid::place(space_.solid(b), space_.state(b)).frame, where);
@@ -542,10 +561,7 @@ std::vector<std::string> ask_about_links(const WorldSpec& spec) {
 Pose calc_pose(const stream::Motion& motion, const Vec3& c) {
   const auto& q = motion.rotation;
   const Vec3 u{q[1], q[2], q[3]};
-  const auto cross = [](const Vec3& a, const Vec3& b) {
-    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  };
-  const Vec3 t = cross(u, c), s = cross(u, t);
+  const Vec3 t = impact::cross(u, c), s = impact::cross(u, t);
   Pose pose{motion.time_s, motion.position_m, q};
   for (std::size_t k = 0; k < 3; ++k) pose.position_m[k] -= c[k] + 2.0 * (q[0] * t[k] + s[k]);
   return pose;

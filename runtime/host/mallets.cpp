@@ -3,8 +3,8 @@
 //             bank's modes, and its mass and inertia unless it is fixed. Springs: Hertz of head and body, or the felt's power law. Forces
 //             go out as samples.
 // Source:     runtime/impact/impact.hpp; docs/equations.md E5a.
-// Deviations: the struck surface is taken as flat beside the head's radius. A body that moves is struck as if it did not: speeds are those
-//             against it.
+// Deviations: the struck surface is taken as flat within the head's contact. A body that moves is struck as if it did not: speeds are
+//             relative to it.
 #include "runtime/host/mallets.hpp"
 
 #include <fmt/format.h>
@@ -25,6 +25,7 @@ using impact::operator*;
 using impact::operator-;
 using impact::cross;
 using impact::dot;
+using impact::norm;
 
 constexpr double kLongestS = 1.0;      // of one blow, and of what overlaps with it
 constexpr double kLeastCosine = 0.05;  // of the way to the surface: flatter is past it
@@ -44,15 +45,10 @@ Spot find_spot(const bank::Bank& bank, std::int32_t triangle, const Vec3& baryce
   for (std::size_t c = 0; c < 3; ++c) at[c] = bank.vertices_m[static_cast<std::size_t>(corners[c])];
   Spot spot;
   const Vec3 across = cross(at[1] - at[0], at[2] - at[0]);
-  const double size = std::sqrt(dot(across, across));
-  if (size > 0.0) spot.normal = (1.0 / size) * across;
-  const std::size_t modes = bank.mode_count();
-  spot.shape.assign(3 * modes, 0.0);
-  for (std::size_t c = 0; c < 3; ++c) {
+  if (norm(across) > 0.0) spot.normal = impact::normalise(across);
+  for (std::size_t c = 0; c < 3; ++c)
     for (std::size_t k = 0; k < 3; ++k) spot.where_m[k] += barycentric[c] * at[c][k];
-    const std::int16_t* row = bank.shape.data() + static_cast<std::size_t>(corners[c]) * 3 * modes;
-    for (std::size_t i = 0; i < 3 * modes; ++i) spot.shape[i] += barycentric[c] * bank.shape_scale[i / 3] * row[i];
-  }
+  spot.shape = bank::calc_shapes(bank, triangle, barycentric);
   return spot;
 }
 
@@ -83,7 +79,7 @@ struct Head {
 Head make_head(const Mallets::Strike& strike, const bank::Bank& bank, int index) {
   const Mallet& mallet = *strike.from->mallet;
   Head head{.strike = &strike, .spot = find_spot(bank, strike.triangle, strike.barycentric)};
-  const double towards = -dot(head.spot.normal, strike.velocity_m_s), speed = std::sqrt(dot(strike.velocity_m_s, strike.velocity_m_s));
+  const double towards = -dot(head.spot.normal, strike.velocity_m_s), speed = norm(strike.velocity_m_s);
   if (!(towards > kLeastCosine * speed)) {
     throw InputError(
         fmt::format("{}: the mallet does not move towards the surface, whose normal there is [{:.4g}, {:.4g}, {:.4g}]; turn "
@@ -115,21 +111,10 @@ double calc_rigid_energy(const impact::Body& body) {
 
 }  // namespace
 
-const impact::Modes* Mallets::find_modes(const bank::Bank& bank) {
-  if (bank.mode_count() == 0) return nullptr;
-  auto& modes = modes_[&bank];
-  if (!modes) {
-    std::vector<double> omega;
-    for (const double lambda : bank.eigenvalue_rad2_s2) omega.push_back(std::sqrt(std::max(lambda, 0.0)));
-    modes = std::make_unique<impact::Modes>(omega, bank.decay_per_s);
-  }
-  return modes.get();
-}
-
 void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<Strike> strikes, std::vector<stream::Event>& events,
                    std::vector<Blow>& blows, std::vector<std::string>& warnings) {
   std::stable_sort(strikes.begin(), strikes.end(), [](const Strike& a, const Strike& b) { return a.from->time_s < b.from->time_s; });
-  const impact::Modes* modes = find_modes(bank);
+  const impact::Modes* modes = modes_.find(bank).get();
   std::vector<double> q, q_dot;  // how it rings, at `state_s`
   double state_s = 0.0;
   for (std::size_t next = 0; next < strikes.size();) {

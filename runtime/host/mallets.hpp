@@ -2,12 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/contact/mode_sets.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/impact/impact.hpp"
 #include "runtime/stream/events.hpp"
@@ -46,8 +45,7 @@ class Mallets {
             std::vector<Blow>& blows, std::vector<std::string>& warnings);
 
  private:
-  const impact::Modes* find_modes(const bank::Bank& bank);
-  std::map<const bank::Bank*, std::unique_ptr<const impact::Modes>> modes_;
+  contact::ModeSets modes_;
 };
 
 }  // namespace carillon::host

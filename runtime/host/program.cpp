@@ -182,7 +182,16 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
     const contact::EnergyAudit& bodies = figures.audit->bodies;
     fmt::print(notes, "energy of bodies   rises by {:.2g} J at most, and by {:.2g} J at a hit; the largest of motion is {:.3g} J\n",
                bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j);
+    fmt::print(notes, "books              {:.4g} J = motion {:.4g} + modes {:.4g} + lost {:.4g}, to {:.2g}; modes had {:.3g} J at most\n",
+               bodies.start_j, bodies.motion_j, bodies.modes_j, bodies.lost_j, bodies.error_j, bodies.most_modes_j);
     fmt::print(notes, "energy of modes    rises by a share of {:.2g} at most while nothing acts\n", figures.audit->modes_rise);
+    fmt::print(notes, "energy books       at the start {:.4g} J; at the end, of that:\n", bodies.start_j);
+    fmt::print(notes, "  motion           {:.4g} J, kinetic and of gravity\n", bodies.motion_j);
+    fmt::print(notes, "  modes            {:.4g} J, and {:.4g} J at most\n", bodies.modes_j, bodies.most_modes_j);
+    fmt::print(notes, "  lost             {:.4g} J, by friction, in contacts and by the damping of modes\n", bodies.lost_j);
+    fmt::print(notes, "  difference       {:.2g} J at most\n", bodies.error_j);
+    fmt::print(notes, "  radiated         {:.4g} J of what damping takes from modes, by their radiation gains\n",
+               figures.audit->radiated_j);
   }
   if (sound.peak_pa > 0.0) {
     fmt::print(notes, "peak               {:.4g} Pa at the {}\n", sound.peak_pa, scene.microphones_m.empty() ? "ears" : "microphones");
@@ -266,7 +275,7 @@ void run(const ProgramOptions& options) {
                                   .progress = Progress("sound", options.quiet)},
                                  store);
   figures.sound_s = get_seconds_since(started);
-  if (options.audit) figures.audit = EnergyBooks{course.energy, sound.energy_rise};
+  if (options.audit) figures.audit = EnergyBooks{course.energy, sound.energy_rise, sound.radiated_j};
   figures.real_time_factor = (figures.physics_s + figures.sound_s) / scene.duration_s;
   figures.modes = sound.modes;
   figures.gain = calc_gain(scene.output, sound.peak_pa);

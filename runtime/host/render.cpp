@@ -291,6 +291,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   for (std::size_t i = 0; i < fed.size(); ++i) {
     sound.body_peak_pa.push_back(synthesiser.get_peak_pa(static_cast<int>(i)));
     sound.energy_rise = std::max(sound.energy_rise, synthesiser.get_energy_rise(static_cast<int>(i)));
+    sound.radiated_j += synthesiser.get_radiated_j(static_cast<int>(i));
     sound.effect_counters.push_back(synthesiser.get_effect_counters(static_cast<int>(i)));
   }
   sound.seconds_cpu = get_cpu_seconds() - started;

@@ -51,6 +51,7 @@ struct Sound {
   std::vector<int> body_modes;                         // per body
   std::vector<double> body_peak_pa;                    // per body, at 1 m
   double energy_rise = 0.0;                            // Synthesiser::get_energy_rise, the most of any body; where it is audited
+  double radiated_j = 0.0;                             // Synthesiser::get_radiated_j, of all bodies; where it is audited
   std::int64_t strikes = 0;                            // impulses that were played
   std::int64_t refused = 0;                            // impulses that could not be (too many at once, not finite)
   std::int64_t resets = 0;                             // bodies cleared because their state was no number

@@ -210,8 +210,12 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
     const contact::EnergyAudit& bodies = f.audit->bodies;
     fmt::format_to(out,
                    " \"energy\": {{\"rise_j\": {:.6g}, \"hit_rise_j\": {:.6g}, \"largest_kinetic_j\": {:.6g}, \"weight_n\": {:.6g}, "
-                   "\"modes_rise\": {:.6g}}},\n",
-                   bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j, bodies.weight_n, f.audit->modes_rise);
+                   "\"modes_rise\": {:.6g},\n  \"start_j\": {:.9g}, \"motion_j\": {:.9g}, \"modes_j\": {:.6g}, \"most_modes_j\": {:.6g}, "
+                   "\"modes_share\": {:.6g}, "
+                   "\"lost_j\": {:.9g}, \"difference_j\": {:.6g}, \"radiated_j\": {:.6g}}},\n",
+                   bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j, bodies.weight_n, f.audit->modes_rise, bodies.start_j,
+                   bodies.motion_j, bodies.modes_j, bodies.most_modes_j, bodies.modes_share, bodies.lost_j, bodies.error_j,
+                   f.audit->radiated_j);
   }
   if (!f.blows.empty()) {
     json += " \"mallets\": [";

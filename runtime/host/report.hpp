@@ -17,10 +17,11 @@ namespace carillon::host {
 void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool,
                       const std::function<void(std::string_view)>& sink);
 
-/// Where energy came from nowhere, if anywhere.
+/// Where energy is and went, and whether any came from nowhere.
 struct EnergyBooks {
   contact::EnergyAudit bodies;  // of the physics; zeros where a contacts file took its place
   double modes_rise = 0.0;      // Sound::energy_rise
+  double radiated_j = 0.0;      // Sound::radiated_j
 };
 
 /// The figures of one rendering.

@@ -23,7 +23,7 @@ using impact::operator*;
 using impact::operator-;
 
 constexpr double kQuestionedNs = 1.0, kQuestionedJ = 20.0;  // of a strike without length
-constexpr double kFarthestShare = 0.25;                     // of the body's extent: how far beside the surface a point may lie
+constexpr double kFarthestShare = 0.25;                     // of the body's extent: how far from the surface a point may lie
 
 /// The nearest places of a bank's surface: by its tree when there are many strikes, which is then worth making.
 class Finder {

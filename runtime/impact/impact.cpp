@@ -19,8 +19,8 @@ constexpr double kSlowest = 1e-6;  // m/s: speed for which the step is chosen wh
 std::size_t pad(int n) { return static_cast<std::size_t>((n + kLanes - 1) / kLanes * kLanes); }
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
-/// Inverse of a symmetric positive definite matrix; zero for what is not.
-Mat3 calc_inverse(const Mat3& m) {
+/// Zero for what is not positive definite, such as a head without spin.
+Mat3 invert_inertia(const Mat3& m) {
   const Mat3 minors{cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
   const double determinant = dot(m[0], minors[0]);
   if (!(determinant > 0.0)) return {};
@@ -124,7 +124,7 @@ void Impact::place_body(Body body) {
   body.moved_m = body.turned_rad = {};
   body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
   body.work_j = 0.0;
-  inverse_inertia_.push_back(body.mass_kg > 0.0 && !body.on_joints ? calc_inverse(body.inertia_kg_m2) : Mat3{});
+  inverse_inertia_.push_back(body.mass_kg > 0.0 && !body.on_joints ? invert_inertia(body.inertia_kg_m2) : Mat3{});
   if (modes > 0) {
     Group group;
     group.body = static_cast<int>(bodies_.size());
@@ -528,7 +528,7 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
       body.work_j = 0.0;
       continue;
     }
-    inverse_inertia_[b] = body.mass_kg > 0.0 ? calc_inverse(body.inertia_kg_m2) : Mat3{};
+    inverse_inertia_[b] = body.mass_kg > 0.0 ? invert_inertia(body.inertia_kg_m2) : Mat3{};
   }
   books_.given += calc_rigid_energy() - before;
   for (std::size_t c = 0; c < contacts.size(); ++c) {

@@ -75,6 +75,24 @@ double time_voice(int modes, int strikes, double duration_s) {
   return time_ns(play) / kBlocks;
 }
 
+/// The same with a force of so many steps in each block.
+double time_force(int modes, int steps, double length_s) {
+  synth::Voice voice(make_model(modes), {.max_forces = 1024});
+  std::array<float, kBlock> block{};
+  std::int64_t sample = 0;
+  stream::Force force{.step_s = length_s / steps, .count = static_cast<std::int16_t>(steps)};
+  for (int k = 0; k < steps; ++k) force.impulse_n_s[static_cast<std::size_t>(k)] = {0.0F, 0.0F, 1e-3F / static_cast<float>(steps)};
+  const auto play = [&] {
+    for (int b = 0; b < kBlocks; ++b, sample += kBlock) {
+      force.time_s = static_cast<double>(sample + kBlock / 4) / kRateHz;
+      voice.push(force);
+      voice.process(block);
+    }
+  };
+  play();
+  return time_ns(play) / kBlocks;
+}
+
 double time_ear(bool moves, bool has_dipoles) {
   synth::Track track(64), listener(1);
   track.push({.position_m = {0, 2, 0}});
@@ -126,6 +144,8 @@ Costs measure_costs() {
   const double struck = time_voice(kMany, 1, 0.0), pushed = time_voice(kMany, 1, kLongS);
   costs.strike_mode_ns = share(struck - many, kMany);
   costs.pulse_mode_sample_ns = share(pushed - struck, kMany * kLongS * kRateHz);
+  constexpr int kOne = 1, kSteps = stream::kMostForceSteps;
+  costs.step_mode_ns = share(time_force(kMany, kSteps, kLongS) - time_force(kMany, kOne, kLongS), kMany * (kSteps - kOne));
   costs.ear_sample_ns = share(time_ear(false, false), kBlock);
   costs.moving_ear_sample_ns = std::max(costs.ear_sample_ns, share(time_ear(true, false), kBlock));
   costs.dipole_ear_sample_ns = share(time_ear(false, true) - costs.ear_sample_ns * kBlock, kBlock);

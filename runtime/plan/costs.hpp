@@ -10,6 +10,7 @@ struct Costs {
   double voice_sample_ns = 0.5;        // one awake body, one sample, besides its modes
   double strike_mode_ns = 1.5;         // one strike on one mode
   double pulse_mode_sample_ns = 0.5;   // one mode, one sample, while a pulse acts
+  double step_mode_ns = 0.4;           // one step, on one mode, of a force that is known step by step, besides
   double ear_sample_ns = 6.0;          // one body at one microphone, one sample, standing still
   double moving_ear_sample_ns = 12.0;  // the same with a delay that changes
   double dipole_ear_sample_ns = 9.0;   // besides, for the three histories of acceleration noise

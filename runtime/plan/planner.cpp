@@ -118,6 +118,7 @@ struct Planner::State {
   void look(Body& body, double time_s);
   void apply(const Pending& pending);
   void apply(const stream::Impulse& impulse);
+  void apply(const stream::Impulse& impulse, double strikes, double steps, double new_s);
   void apply(const stream::Force& force);
   void apply(const stream::Contact& contact);
   void damp(Body& body, double share, double time_s);
@@ -267,10 +268,13 @@ void Planner::State::apply(const stream::Force& force) {
     pulse->duration_s += force.calc_length_s();
   }
   pulse->time_s = end_s - 0.5 * pulse->duration_s;
-  apply(*pulse);
+  apply(*pulse, 1.0, force.count, force.calc_length_s());
 }
 
-void Planner::State::apply(const stream::Impulse& impulse) {
+void Planner::State::apply(const stream::Impulse& impulse) { apply(impulse, 1.0, 0.0, impulse.duration_s); }
+
+/// `strikes`, `steps`, `new_s`: what of it costs that has not been counted: events, steps of a force, time.
+void Planner::State::apply(const stream::Impulse& impulse, double strikes, double steps, double new_s) {
   Body& body = bodies[static_cast<std::size_t>(impulse.body)];
   const BodyFacts& of = facts.bodies[static_cast<std::size_t>(impulse.body)];
   if (!body.bank->calc_projections(impulse.triangle, impulse.barycentric, impulse.impulse_n_s, projection)) return;
@@ -308,7 +312,8 @@ void Planner::State::apply(const stream::Impulse& impulse) {
     }
     end_s = std::max(end_s, impulse.time_s + half_s);
     body.plan.effects[Effect::kModal].cost_us +=
-        1e-3 * (rung_s * facts.rate_hz * costs.mode_sample_ns + static_cast<double>(modes.size()) * costs.strike_mode_ns);
+        1e-3 * (rung_s * facts.rate_hz * costs.mode_sample_ns +
+                static_cast<double>(modes.size()) * (strikes * costs.strike_mode_ns + steps * costs.step_mode_ns));
     const double share = weigh(heard);
     const bool counts = share > facts.strictness.tellable_share || of.wish.off.has(Effect::kAccelerationNoise);
     call(body, Effect::kModal, counts ? 1.0 + heard : share, end_s + travel_s,
@@ -342,7 +347,7 @@ void Planner::State::apply(const stream::Impulse& impulse) {
        {.rule = Rule::kChange, .value = to_db(lost), .limit = to_db(facts.strictness.tellable_share)});
   if (lost > facts.strictness.tellable_share) {
     body.plan.effects[Effect::kHertzPulse].cost_us +=
-        1e-3 * costs.pulse_mode_sample_ns * static_cast<double>(amplitude_pa.size()) * impulse.duration_s * facts.rate_hz;
+        1e-3 * costs.pulse_mode_sample_ns * static_cast<double>(amplitude_pa.size()) * new_s * facts.rate_hz;
   }
   body.sounds_until_s = std::max(body.sounds_until_s, end_s);
   look(body, impulse.time_s);

@@ -14,20 +14,14 @@
 namespace carillon::rigid {
 
 using impact::Mat3;
+using impact::norm;
+using impact::transpose;
 using impact::Vec3;
 using impact::operator+;
 using impact::operator-;
 using impact::operator*;
 using Quaternion = std::array<double, 4>;  // w x y z, unit
 
-inline double norm(const Vec3& a) { return std::sqrt(impact::dot(a, a)); }
-inline Mat3 transpose(const Mat3& m) {
-  return {Vec3{m[0][0], m[1][0], m[2][0]}, Vec3{m[0][1], m[1][1], m[2][1]}, Vec3{m[0][2], m[1][2], m[2][2]}};
-}
-inline Mat3 operator*(const Mat3& a, const Mat3& b) {
-  const Mat3 t = transpose(b);
-  return {t * a[0], t * a[1], t * a[2]};
-}
 Mat3 make_rotation(const Quaternion& q);
 Quaternion multiply(const Quaternion& a, const Quaternion& b);
 /// Of a rotation vector [rad], in full.

@@ -18,6 +18,8 @@ namespace {
 
 using impact::cross;
 using impact::dot;
+using impact::find_across;
+using impact::norm;
 using impact::operator+;
 using impact::operator-;
 using impact::operator*;
@@ -25,22 +27,15 @@ using Block = Eigen::Matrix<double, 6, 6>;
 using Row6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kCompliance = 1e-5;  // of the mobility of a row
+constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
 constexpr int kDense = 12;            // bodies; more are factorised as a sparse matrix
 
 enum class Hold : char { kOpen, kSticks, kSlides };
-
-double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
 
 Row6 make_row(const Vec3& linear, const Vec3& angular) {
   Row6 r;
   r << linear[0], linear[1], linear[2], angular[0], angular[1], angular[2];
   return r;
-}
-
-/// A vector at right angles to n.
-Vec3 find_across(const Vec3& n) {
-  const Vec3 c = std::abs(n[0]) < 0.6 ? cross(n, Vec3{1, 0, 0}) : cross(n, Vec3{0, 1, 0});
-  return (1.0 / norm(c)) * c;
 }
 
 /// The system of one guess. Blocks by pairs of bodies.
@@ -113,14 +108,18 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   prepare(movers, points);
   const int bodies = static_cast<int>(movers.size());
-  std::vector<Hold> holds;
-  for (const Point& p : points) {
-    const double push = dot(p.impulse, p.normal);
-    holds.push_back(push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen);
-  }
   const std::vector<Mover> free = movers;
   std::vector<Vec3> sliding(points.size()), impulses(points.size()), couples(points.size());
   std::vector<char> rolls(points.size(), 0);  // its couple is at its bound
+  std::vector<Hold> holds;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point& p = points[i];
+    const double push = dot(p.impulse, p.normal);
+    const Vec3 across = p.impulse - push * p.normal;
+    const bool slides = push > 0.0 && norm(across) >= kAtCone * p.friction * push;
+    if (slides) sliding[i] = across;
+    holds.push_back(slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen);
+  }
   bool confirmed = false;
   std::vector<std::array<Vec3, 3>> axes;
   for (const Point& p : points) {

@@ -19,12 +19,12 @@ namespace {
 using impact::operator+;
 using impact::operator-;
 using impact::operator*;
+using impact::calc_inverse;
 using impact::cross;
 using impact::dot;
+using impact::norm;
 
 constexpr double kLocked = 1e-9;  // of the largest mobility at a point: what is less is a way that joints do not allow
-
-double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
 
 void add_mobility(Mat3& k, const Mover& m, const Vec3& arm) {
   // 1/m I - [r] I^-1 [r]
@@ -89,12 +89,6 @@ Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double least) {
       }
   }
   return inverse;
-}
-
-Mat3 calc_inverse(const Mat3& m) {
-  const Vec3 a = cross(m[1], m[2]), b = cross(m[2], m[0]), c = cross(m[0], m[1]);
-  const double s = 1.0 / dot(m[0], a);
-  return {Vec3{s * a[0], s * b[0], s * c[0]}, Vec3{s * a[1], s * b[1], s * c[1]}, Vec3{s * a[2], s * b[2], s * c[2]}};
 }
 
 }  // namespace

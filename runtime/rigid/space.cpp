@@ -33,6 +33,9 @@ Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional
   flying_.assign(solids_.size(), 0);
   in_ringing_.assign(solids_.size(), 0);
   slow_s_.assign(solids_.size(), 0.0);
+  crowded_until_s_.assign(solids_.size(), 0.0);
+  next_proof_s_.assign(solids_.size(), 0.0);
+  next_guess_s_.assign(solids_.size(), 0.0);
   reach_m_s_.assign(solids_.size(), 0.0);
   flew_from_ = states_;
   index_.assign(solids_.size(), -1);

@@ -52,7 +52,7 @@ struct Options {
   double step_s = 2.5e-4;   // the longest small step; windows are cut into equal ones
   double tolerance = 1e-5;  // of gravity times the step: when the sweeps over the contacts end
   int most_sweeps = 30;
-  int most_direct = 12;                         // bodies of a group whose problem is factorised in every step
+  int most_direct = 3;                          // bodies of a group whose problem is factorised in every step
   bool islands = true;                          // false: all bodies in one problem, for comparison
   int most_settling = 200;                      // the same of a group that is about to rest
   double rolling_resistance = 1e-3;             // c: couple c R F against rolling, of hard on hard
@@ -84,6 +84,7 @@ struct Hit {
 /// An instant of impact: its points, and the bodies that it moved, before and after.
 struct Strike {
   double time_s = 0.0;
+  double together_s = 0.0;  // its points close within so much of that
   std::vector<Hit> hits;
   std::vector<int> bodies;
   std::vector<State> before, after;
@@ -280,6 +281,8 @@ class Space {
 
   // step.cpp: one group through one small step
   void step_island(Island& island, double start_s, double step_s);
+  void note_crowd(const Island& island, double time_s);
+  void strike_at_once(Island& island, double start_s, double step_s);
   void predict(const Island& island, double h, bool at_rest);
   Point make_point(const Contact& contact) const;
   void make_points(Island& island, double h, bool leaves_impacts);
@@ -358,7 +361,7 @@ class Space {
   std::vector<Pair> cord_pairs_;  // one a cord
   std::vector<Placed> placed_;
   std::vector<char> asleep_, flying_, in_ringing_;
-  std::vector<double> slow_s_, reach_m_s_;
+  std::vector<double> slow_s_, reach_m_s_, crowded_until_s_, next_proof_s_, next_guess_s_;
   std::vector<State> flew_from_;
   std::optional<Ground> ground_;
   Vec3 gravity_{};
@@ -377,6 +380,7 @@ class Space {
   Costs costs_;
   Solver solver_;
   // Of the step that is being made:
+  double together_s_ = 0.0;                    // touches nearer in time than this are one impact
   std::vector<int> index_;                     // of a body in its island
   const std::vector<int>* stepped_ = nullptr;  // its bodies
   std::vector<Mover> movers_;

@@ -6,11 +6,12 @@
 // Deviations: fast touches end the step at their instant (strike.cpp).
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
-
 namespace carillon::rigid {
 namespace {
 
@@ -22,8 +23,15 @@ constexpr double kSettling = 0.02;  // m/s; a group that is slower is about to r
 constexpr double kAtRest = 1e-6;    // m/s
 constexpr double kSlow = 5e-3;      // m/s; of what may be about to rest
 constexpr double kPatience = 0.02;  // s; for so long
+constexpr double kLong = 0.3;       // s; what was slow for so long is no faster than kSlow: less balance is enough
+constexpr int kMostAtOnce = 12;     // bodies that are about to rest and are factorised without sweeps before
+constexpr double kLoose = 100.0;    // times the tolerance
+constexpr int kGuesses = 6;         // of a factorised problem in a step
+constexpr int kMostGuesses = 12;    // where rest is to be proven
+constexpr double kRetry = 4e-3;     // s; a group whose guesses failed goes by sweeps for so long
 constexpr int kMostMissed = 30;     // in a step: instants at which nothing struck after all
-constexpr int kMostImpacts = 8;     // of a group in a step
+constexpr int kMostImpacts = 3;     // of a group in a step, each at its instant; a group with more is crowded
+constexpr double kCrowded = 2e-3;   // s; for so long after
 
 }  // namespace
 
@@ -32,12 +40,18 @@ void Space::step_island(Island& island, double start_s, double step_s) {
   stepped_ = &island.bodies;
   double done = 0.0;
   int impacts = 0, missed = 0;
+  bool begun = false;
   const double g = norm(gravity_);
+  const bool is_crowded = std::any_of(island.bodies.begin(), island.bodies.end(),
+                                      [&](int body) { return crowded_until_s_[static_cast<std::size_t>(body)] > start_s; });
+  if (is_crowded) {
+    strike_at_once(island, start_s, step_s);
+    impacts = kMostImpacts;
+  }
   while (step_s - done > kShortest) {
     const double h = step_s - done;
     time_s_ = start_s + done;
-    const bool slow = impacts == 0 && done == 0.0 && may_rest(island, h);
-    if (slow && rests(island, h)) break;
+    if (!std::exchange(begun, true) && may_rest(island, h) && rests(island, h)) break;
     release_what_rests(island);
     predict(island, h, false);
     make_points(island, h, impacts < kMostImpacts);
@@ -48,6 +62,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
     push_linked(island);
     double at = h;
     std::vector<Ref> first;
+    together_s_ = kTogether;
     const bool struck = impacts < kMostImpacts && find_impact(island, h, at, first);
     keep_impulses(at, h);
     for (Pair* pair : island.pairs) pair->travelled_m += (calc_pair_speed(pair->a, pair->b) + g * h) * at + 1e-12;
@@ -60,7 +75,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
       if (confirm_impact(first, step_s - done, kDeep * (1 + missed))) {
         strike(island, first, time_s_);
         ++costs_.impacts;
-        ++impacts;
+        if (++impacts == kMostImpacts) note_crowd(island, start_s + step_s);
       } else if (++missed > kMostMissed) {
         impacts = kMostImpacts;
       }
@@ -69,6 +84,24 @@ void Space::step_island(Island& island, double start_s, double step_s) {
       for (Pair* pair : island.pairs) update(*pair, step_s - done);
   }
   for (const int body : island.bodies) index_[static_cast<std::size_t>(body)] = -1;
+}
+
+void Space::note_crowd(const Island& island, double time_s) {
+  for (const int body : island.bodies) crowded_until_s_[static_cast<std::size_t>(body)] = time_s + kCrowded;
+}
+
+/// The impacts of a crowded group: all touches that close within a step strike at its beginning.
+void Space::strike_at_once(Island& island, double start_s, double step_s) {
+  time_s_ = start_s;
+  together_s_ = step_s;
+  std::vector<Ref> first;
+  for (Pair* pair : island.pairs)
+    for (std::size_t k = 0; k < pair->contacts.size() && is_stepped(*pair); ++k)
+      if (is_fast(pair->contacts[k], step_s) && calc_approach(pair->contacts[k]) > 0.0) first.push_back({pair, k});
+  if (!confirm_impact(first, step_s, std::numeric_limits<double>::infinity())) return;
+  if (first.front().pair != first.back().pair) note_crowd(island, start_s + step_s);
+  strike(island, first, time_s_);
+  ++costs_.impacts;
 }
 
 /// What every body of the group does without contacts; `at_rest`: as if it had no velocity.
@@ -213,27 +246,48 @@ void Space::solve(double tolerance_m_s) {
     }
     return gained > 1e-9 * size;
   };
-  // What is about to rest is worth it: sweeps would let a pile tremble for long.
+  const auto factorise = [&] {
+    if (solver_.solve_directly(movers_, points_, kGuesses) && !gains()) return true;
+    for (const int body : *stepped_) next_guess_s_[static_cast<std::size_t>(body)] = time_s_ + kRetry;
+    return false;
+  };
   double fastest = 0.0;
   for (std::size_t n = 0; n < stepped_->size(); ++n) {
     const auto i = static_cast<std::size_t>((*stepped_)[n]);
     fastest = std::max(fastest, norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m);
   }
-  const int most_direct = fastest < kSettling ? options_.most_settling : options_.most_direct;
-  if (static_cast<int>(movers_.size()) <= most_direct) {
-    if (solver_.solve_directly(movers_, points_, 12) && !gains()) return;
+  const int count = static_cast<int>(movers_.size());
+  const bool settles = fastest < kSettling;
+  const auto sweep = [&](int most) {
+    const bool is_loose = !settles && count > options_.most_direct;  // what moves fast needs less than what is about to stand still
+    const double tolerance = (is_loose ? kLoose : 1.0) * tolerance_m_s, left = solver_.solve(movers_, points_, tolerance, most);
+    costs_.sweeps += solver_.get_sweeps();
+    return left <= tolerance && !gains();
+  };
+  const bool may_guess =
+      std::all_of(stepped_->begin(), stepped_->end(), [&](int body) { return time_s_ >= next_guess_s_[static_cast<std::size_t>(body)]; });
+  const bool at_once = count <= (settles ? kMostAtOnce : options_.most_direct);
+  if (at_once && may_guess) {
+    if (factorise()) return;
     movers_ = free;
     points_ = begun;
   }
-  solver_.solve(movers_, points_, tolerance_m_s, options_.most_sweeps);
-  costs_.sweeps += solver_.get_sweeps();
+  if (sweep(options_.most_sweeps)) return;
+  if (!at_once && may_guess && settles && count <= options_.most_settling) {
+    // From the guess that the sweeps have made; they would let a pile tremble for long.
+    const std::vector<Point> swept = points_;
+    movers_ = free;
+    if (factorise()) return;
+    movers_ = free;
+    points_ = swept;
+    sweep(2);
+  }
   if (!gains()) return;
   // Sweeps that begin at zero impulses never add any.
   movers_ = free;
   points_ = begun;
   for (Point& p : points_) p.impulse = p.couple = {};
-  solver_.solve(movers_, points_, tolerance_m_s, options_.most_sweeps);
-  costs_.sweeps += solver_.get_sweeps();
+  sweep(options_.most_sweeps);
 }
 
 /// The angular impulses of all points on each body.
@@ -360,21 +414,23 @@ void Space::take_gain(const Island& island, double before_j) {
   }
 }
 
-/// Counts how long the bodies of a group have been slow; true once all have been for long enough.
+/// Counts how long the bodies of a group have been slow; true where it is time to look whether it rests.
 bool Space::may_rest(const Island& island, double h) {
   bool all = true;
   for (const int body : island.bodies) {
     const auto i = static_cast<std::size_t>(body);
     const double speed = norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m;
     slow_s_[i] = speed < kSlow && !has_impact(body) ? slow_s_[i] + h : 0.0;
-    all = all && slow_s_[i] > kPatience;
+    all = all && slow_s_[i] > kPatience && time_s_ >= next_proof_s_[i];
   }
   return all;
 }
 
-/// Puts the group to sleep if contact forces exist that balance all of its bodies at rest.
+/// Puts the group to sleep if contact forces exist that balance all of its bodies at rest. What has been slower than kSlow for so long that
+/// its mean acceleration is below `bound` times gravity needs no better balance than that.
 bool Space::rests(Island& island, double h) {
   bool touches = false;
+  double slow_s = std::numeric_limits<double>::infinity();
   for (const Pair* pair : island.pairs)
     touches = touches || std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
   for_linked(island, [&](const Linked& linked) { touches = touches || linked.hangs; });
@@ -388,34 +444,44 @@ bool Space::rests(Island& island, double h) {
   for (const int body : island.bodies) {
     State& s = states_[static_cast<std::size_t>(body)];
     kept.push_back(s);
+    slow_s = std::min(slow_s, slow_s_[static_cast<std::size_t>(body)]);
     s.velocity = s.momentum = {};
     place_body(body);
   }
   predict(island, h, true);
   make_points(island, h, false);
-  const double g = std::max(norm(gravity_), 1e-9);
-  for (Point& p : points_) p.impulse = p.couple = {};
-  const bool found = solver_.solve_directly(movers_, points_, 12);
-  if (!found) {
-    predict(island, h, true);
-    solver_.solve(movers_, points_, 1e-2 * kBalanced * g * h, 4 * options_.most_sweeps);
-    costs_.sweeps += solver_.get_sweeps();
+  // A gap that roughness bridges is none: here all that is near is in touch.
+  for (std::size_t n = 0; n < points_.size(); ++n) {
+    if (rows_[n].get().touch.gap_m <= kDeep) points_[n].wanted = {};
+    points_[n].impulse = points_[n].couple = {};
   }
+  const double g = std::max(norm(gravity_), 1e-9);
+  const double bound = slow_s > kLong ? kSlow / (g * kLong) : kBalanced;
+  const std::vector<Mover> free = movers_;
+  const auto is_balanced = [&] {
+    std::vector<char> carried(island.bodies.size(), 0);  // what drifts where nothing pulls is at rest nowhere
+    for (const Point& p : points_)
+      for (const int n : {p.a, p.b})
+        if (n >= 0 && dot(p.impulse, p.normal) > 0.0) carried[static_cast<std::size_t>(n)] = 1;
+    for_linked(island, [&](const Linked& linked) {
+      const std::vector<int>& members = linked.linkage.movers;
+      const bool any =
+          linked.hangs || std::any_of(members.begin(), members.end(), [&](int n) { return carried[static_cast<std::size_t>(n)] != 0; });
+      for (const int n : members) carried[static_cast<std::size_t>(n)] = any ? 1 : 0;
+    });
+    for (std::size_t n = 0; n < island.bodies.size(); ++n) {
+      const double radius = solid(island.bodies[n]).radius_m;
+      if (!carried[n] || norm(movers_[n].velocity) + norm(movers_[n].spin) * radius > bound * g * h) return false;
+    }
+    return true;
+  };
   ++costs_.solves;
-  bool balanced = true;
-  std::vector<char> carried(island.bodies.size(), 0);  // what drifts where nothing pulls is at rest nowhere
-  for (const Point& p : points_)
-    for (const int n : {p.a, p.b})
-      if (n >= 0 && dot(p.impulse, p.normal) > 0.0) carried[static_cast<std::size_t>(n)] = 1;
-  for_linked(island, [&](const Linked& linked) {
-    const std::vector<int>& members = linked.linkage.movers;
-    const bool any =
-        linked.hangs || std::any_of(members.begin(), members.end(), [&](int n) { return carried[static_cast<std::size_t>(n)] != 0; });
-    for (const int n : members) carried[static_cast<std::size_t>(n)] = any ? 1 : 0;
-  });
-  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-    const auto i = static_cast<std::size_t>(island.bodies[n]);
-    balanced = balanced && carried[n] && norm(movers_[n].velocity) + norm(movers_[n].spin) * solids_[i].radius_m < kBalanced * g * h;
+  bool balanced = solver_.solve_directly(movers_, points_, kMostGuesses) && is_balanced();
+  if (!balanced) {
+    movers_ = free;
+    solver_.solve(movers_, points_, 1e-2 * bound * g * h, (slow_s > kLong ? 40 : 4) * options_.most_sweeps);
+    costs_.sweeps += solver_.get_sweeps();
+    balanced = is_balanced();
   }
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const auto i = static_cast<std::size_t>(island.bodies[n]);
@@ -424,7 +490,7 @@ bool Space::rests(Island& island, double h) {
       lost_j_ += rigid::calc_kinetic(solids_[i], kept[n]);
     } else {
       states_[i] = kept[n];
-      slow_s_[i] = 0.5 * kPatience;
+      next_proof_s_[i] = time_s_ + std::min(0.5 * slow_s, kLong);
       place_body(island.bodies[n]);
     }
   }
@@ -435,14 +501,13 @@ bool Space::rests(Island& island, double h) {
       place_linked(linked);
     });
   }
-  if (balanced)
-    for (std::size_t n = 0; n < points_.size(); ++n) {
-      Contact& c = rows_[n].get();
-      c.impulse = points_[n].impulse;
-      c.couple = points_[n].couple;
-      c.step_s = h;
-      c.touching = dot(c.impulse, c.touch.normal) > 0.0;
-    }
+  for (std::size_t n = 0; balanced && n < points_.size(); ++n) {
+    Contact& c = rows_[n].get();
+    c.impulse = points_[n].impulse;
+    c.couple = points_[n].couple;
+    c.step_s = h;
+    c.touching = dot(c.impulse, c.touch.normal) > 0.0;
+  }
   return balanced;
 }
 

@@ -18,7 +18,8 @@ namespace {
 using impact::cross;
 using impact::dot;
 
-constexpr double kInstant = 1e-9;  // m; how well an instant of impact is found
+constexpr double kInstant = 1e-9;      // m; how well an instant of impact is found
+constexpr std::size_t kFewPoints = 8;  // of an impact that is solved to rounding, its load shared evenly
 constexpr double kLongestHertz = 20e-3;
 
 }  // namespace
@@ -116,12 +117,12 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
   }
   at_s = at;
   for (const Candidate& c : candidates)
-    if (c.at <= earliest->at + kTogether) first.push_back(c.ref);
+    if (c.at <= earliest->at + together_s_) first.push_back(c.ref);
   return true;
 }
 
 /// Looks at the pairs of an impact again, as they are at its instant: an edge that passes another one close by was taken for a plane until
-/// now. Leaves what really strikes.
+/// now. Leaves what really strikes: what closes within together_s_ of the first, which is nearer than near_m (infinite: of now).
 bool Space::confirm_impact(std::vector<Ref>& first, double step_s, double near_m) {
   std::vector<Pair*> pairs;
   for (const Ref& ref : first)
@@ -135,7 +136,7 @@ bool Space::confirm_impact(std::vector<Ref>& first, double step_s, double near_m
       const Contact& c = pair->contacts[k];
       const double approach = calc_approach(c);
       if (c.presses || approach <= 0.5 * kSlowest || (c.touching && c.touch.gap_m <= kTouch) ||
-          c.touch.gap_m > std::max(approach * kTogether + kTouch, near_m))
+          c.touch.gap_m > std::max(approach * together_s_ + kTouch, std::isfinite(near_m) ? near_m : 0.0))
         continue;
       first.push_back({pair, k});
       any = any || c.touch.gap_m <= near_m;
@@ -158,7 +159,7 @@ std::vector<Space::Ref> Space::gather_points(const Island& island, const std::ve
       for (std::size_t k = 0; k < pair->contacts.size(); ++k) {
         const Contact& c = pair->contacts[k];
         if (c.presses) continue;
-        const bool soon = c.touch.gap_m - calc_approach(c) * kTogether <= kTouch;
+        const bool soon = c.touch.gap_m - calc_approach(c) * together_s_ <= kTouch;
         if (!soon && !(c.touching && c.touch.gap_m <= kDeep)) continue;
         const Ref ref{pair, k};
         if (std::find(taken.begin(), taken.end(), ref) == taken.end()) taken.push_back(ref);
@@ -262,6 +263,8 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
   const std::vector<Ref> taken = gather_points(island, first);
   Strike record;
   record.time_s = time_s;
+  record.together_s = together_s_;
+  movers_.resize(island.bodies.size());
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const auto i = static_cast<std::size_t>(island.bodies[n]);
     movers_[n] = {1.0 / solids_[i].mass_kg, placed_[i].inverse_inertia, states_[i].velocity, placed_[i].spin};
@@ -284,8 +287,9 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
     for (const int body : {hit.a, hit.b})
       if (has_impact(body)) end_ringing(*find_ringing(body), time_s);
   const std::vector<Mover> before = movers_;
-  solver_.share(movers_, points, static_cast<int>(std::min<std::size_t>(20 * points.size(), 400)));
-  solver_.solve_on(movers_, points, 1e-9 * scale, points.size() <= 16 ? 1000 : 60);
+  const bool is_few = points.size() <= kFewPoints;
+  solver_.share(movers_, points, is_few ? static_cast<int>(20 * points.size()) : 0);
+  solver_.solve_on(movers_, points, (is_few ? 1e-9 : 1e-4) * scale, is_few ? 1000 : 60);
   const double part = calc_conserving_part(before, points);
   for (std::size_t n = 0; n < points.size(); ++n) record.hits[n].impulse = part * points[n].impulse;
   give_to_modes(record, give_impulses(record, points));

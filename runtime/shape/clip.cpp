@@ -1,6 +1,6 @@
 // Method: separating axes: the facets of both, and the pairs of edges whose arcs cross on the Gauss map. Where a facet separates best, the
 //   facet opposite is clipped against its sides; where a pair of edges does, it is the touch. Bodies whose nearest features do not face
-//   each other (corner beside corner) are at the closest points of their edges and corners.
+//   each other (corner next to corner) are at the closest points of their edges and corners.
 // Source: D. Gregorius, "The separating axis test between convex polyhedra" (GDC 2013); I. Sutherland, G. Hodgman (1974); C. Ericson,
 //   "Real-Time Collision Detection" (2005), 5.1.9.
 // Deviations: facets are preferred to edges that are within a degree of them.

@@ -58,7 +58,7 @@ class Ground {
   /// Signed, good enough to compare neighbours; beyond `limit` a bound will do.
   double estimate(const Vec3& x, double limit) const {
     if (body_ != nullptr) {
-      int outside = 0;  // of how many facets: beside an edge or a corner, the facets do not tell how far
+      int outside = 0;  // of how many facets: next to an edge or a corner, the facets do not tell how far
       for (std::size_t i = 0; i < body_->normals.size() && outside < 2; ++i)
         outside += dot(body_->normals[i], x) > body_->offsets_m[i] ? 1 : 0;
       return outside < 2 ? find_outside(x) : std::sqrt(shape_.mesh().find_nearest(x, Box::kFar, -1).distance2);
@@ -182,7 +182,7 @@ class Pass {
         }
       }
     }
-    // Those beside one that has been settled lower would come to the same place.
+    // Those next to one that has been settled lower would come to the same place.
     std::sort(pits.begin(), pits.end());
     std::vector<std::pair<Vec3, double>> found;
     for (const auto& [d, i] : pits) {
@@ -280,7 +280,7 @@ class Pass {
   void add_smooth(const Sample& sample) {
     constexpr int kMost = 4;  // looks at what it faces
     const Mesh& mesh = theirs_.mesh();
-    const double reach = std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m), beside = kBrim * mine_.get_size_m();
+    const double reach = std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m), brim = kBrim * mine_.get_size_m();
     Spot spot = mine_.skin().locate(sample.point, sample.face);
     const Vec3 x = to_theirs(spot.point);
     Nearest at = ground_.find_nearest(x);
@@ -310,10 +310,10 @@ class Pass {
       if (settled && facing.side == Side::plane) settle(t, mine_, fm_, &theirs_, ft_, reach);
       if (facing.side == Side::plane || facing.side == Side::line) {
         const Nearest foot = mesh.find_nearest(t.station_b, Box::kFar, at.face);
-        if (foot.distance2 > beside * beside || (facing.side == Side::line && !is_between(t, foot))) {
-          // Beside the facet or the edge: what is there?
+        if (foot.distance2 > brim * brim || (facing.side == Side::line && !is_between(t, foot))) {
+          // Past the facet or the edge: what is there?
           at = foot;
-          if (facing.side == Side::line && foot.distance2 <= beside * beside) {
+          if (facing.side == Side::line && foot.distance2 <= brim * brim) {
             at = ground_.find_nearest(to_theirs(t.station_a));
             const Facing other = describe(mesh, theirs_.skin(), at);
             if (other.side == Side::line && std::abs(dot(other.axis, facing.axis)) > 0.99) return;

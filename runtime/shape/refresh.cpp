@@ -62,7 +62,7 @@ double step(Half& a, Half& b, Vec3& n, double reach) {
   const auto fix = [&](const Half& half, const double* p) {
     x[0] = p[0], x[1] = p[1];
     if (half.side == Side::point) return;
-    // Along the line: where the gap to the skin beside it is least.
+    // Along the line: where the gap to the skin next to it is least.
     const Half& skin = &half == &a ? b : a;
     const double* from = &half == &a ? pb : pa;
     const double* slope = &half == &a ? slope_b : slope_a;
@@ -150,10 +150,10 @@ bool settle_curved(Touch& touch, Half& a, Half& b, double reach, int most) {
   touch.normal = n;
   touch.gap_m = dot(n, a.point - b.point);
   touch.where_m = 0.5 * (a.point + b.point);
-  const Vec3 beside = (a.point - b.point) - touch.gap_m * n;
+  const Vec3 across = (a.point - b.point) - touch.gap_m * n;
   // The nearest place of a mesh is off that of the smooth body by the tilt of its facets.
   const bool left = std::min(norm(a.point - start_a), norm(b.point - start_b)) > 4.0 * reach;
-  return !left && norm(beside) < 5e-2 * reach;  // where patches meet with a kink, it goes to and fro
+  return !left && norm(across) < 5e-2 * reach;  // where patches meet with a kink, it goes to and fro
 }
 
 }  // namespace
@@ -199,7 +199,7 @@ bool settle(Touch& t, const Shape& a, const Frame& fa, const Shape* b, const Fra
         t.normal = n;
       }
     } else if (const Vec3 d = p - q; dot(d, t.normal) > 0.0) {
-      t.normal = normalise(d);  // two corners beside each other: how far, whatever way they go
+      t.normal = normalise(d);  // two corners next to each other: how far, whatever way they go
     }
     t.gap_m = dot(t.normal, p - q);
     t.where_m = 0.5 * (p + q);

@@ -62,9 +62,9 @@ Place Shape::find_place(const Vec3& point, const Vec3& outward) const {
   return {mesh_->given[best.face], best.weights, skin_->calc_mean_curvature(best.face, best.weights)};
 }
 
-void Shape::prepare() const {
+void Shape::prepare(bool meets_bodies) const {
   samples();
-  if (!polyhedron_) grid();
+  if (meets_bodies && !polyhedron_) grid();
 }
 
 const Samples& Shape::samples() const {

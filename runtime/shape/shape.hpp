@@ -45,8 +45,8 @@ class Shape {
   Box calc_box(const Frame& frame) const;
   /// The triangle of the fine mesh at a point of the surface whose normal is `outward`; mesh frame.
   Place find_place(const Vec3& point_m, const Vec3& outward) const;
-  /// Makes now what a search against another body will need, so that the first one is as quick as the next.
-  void prepare() const;
+  /// Makes now what a search against the ground will need, or against other bodies as well, so that the first one is as quick as the next.
+  void prepare(bool meets_bodies = true) const;
   bool is_polyhedron() const { return polyhedron_ != nullptr; }
   /// Curvature that stands for a sharp corner; a ridge has half of it.
   double get_corner_curvature_per_m() const { return 200.0 / size_m_; }

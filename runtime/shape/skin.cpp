@@ -1,7 +1,9 @@
 // Method: coplanar faces are joined to regions by a flood from a seed. An edge between regions is sharp above 40 degrees, or above 20 and
 //   three times the mean of the other edges about its two regions. Corners of faces joined over edges that are not sharp share a normal
 //   (weighted by angle) and a curvature tensor (least squares over the edges); a plane facet much larger than its curved neighbours keeps
-//   its own normal. The lowest place of a quadratic patch has a closed form; the search walks over edges as long as it gets lower.
+//   its own normal. At a tip (a vertex whose faces lean from their mean by as much as a sharp edge's, where no edge is sharp: the point of
+//   a cone) each face keeps its own; the edges there lie in both their faces, so that patches still meet. The lowest place of a quadratic
+//   patch has a closed form; the search walks over edges as long as it gets lower.
 // Source: T. Boubekeur, M. Alexa, "Phong tessellation" (2008); G. Thuermer, C. Wuethrich (1998) for the angle weights.
 // Deviations: alpha 1/2 in place of 3/4, which is exact for circles to second order.
 #include "runtime/shape/skin.hpp"
@@ -130,7 +132,7 @@ void Skin::make_fans() {
     int e = mesh_.any_half_edge[v];
     int first = 0;  // of the first fan: behind a sharp edge
     int sharp = 0;
-    bool curved = false;
+    bool curved = false, tip = false;
     std::array<Vec3, 2> ways{};
     do {
       around.push_back(e);
@@ -162,6 +164,16 @@ void Skin::make_fans() {
           ++planes;
         }
       }
+      if (sharp == 0 && is_tip(corners, normalise(sum))) {
+        tip = true;
+        for (const int c : corners) {
+          fan_[c] = static_cast<int>(fan_normals_.size());
+          fan_normals_.push_back(mesh_.normals[c / 3]);
+          fan_tensors_.push_back({});
+          fan_curved_.push_back(0);
+        }
+        break;
+      }
       fan_normals_.push_back(normalise(planes > 0 ? plane : sum));
       fan_tensors_.push_back({});
       fan_curved_.push_back(same ? 0 : 1);
@@ -173,7 +185,9 @@ void Skin::make_fans() {
       }
       corners.clear();
     }
-    if (sharp == 0) {
+    if (tip) {
+      kinds_[v] = VertexKind::corner;
+    } else if (sharp == 0) {
       kinds_[v] = curved ? VertexKind::smooth : VertexKind::none;
     } else if (sharp == 2) {
       const double bend = calc_angle(ways[0], -1.0 * ways[1]);
@@ -182,6 +196,15 @@ void Skin::make_fans() {
       kinds_[v] = VertexKind::corner;
     }
   }
+}
+
+bool Skin::is_tip(const std::vector<int>& corners, const Vec3& mean) const {
+  double most = 0.0, edges = 0.0;
+  for (const int c : corners) {
+    most = std::max(most, calc_angle(mesh_.normals[c / 3], mean));
+    edges += calc_angle(mesh_.normals[c / 3], mesh_.normals[mesh_.opposite[c] / 3]);
+  }
+  return most > kSharp || (most > kBlunt && most > kSharper * edges / static_cast<double>(corners.size()));
 }
 
 void Skin::fit_tensor(int v, const std::vector<int>& corners, int fan) {

@@ -68,6 +68,7 @@ class Skin {
   void find_sharp_edges();
   void make_fans();
   void make_groups();
+  bool is_tip(const std::vector<int>& corners, const Vec3& mean) const;  // of half-edges about a vertex that leave it
   void fit_tensor(int vertex, const std::vector<int>& corners, int fan);
   Spot find_lowest(const Vec3& up, int face, const Vec3& centre) const;
 

@@ -12,22 +12,17 @@ namespace carillon::shape {
 
 using impact::cross;
 using impact::dot;
+using impact::find_across;
 using impact::Mat3;
+using impact::norm;
+using impact::normalise;
+using impact::turn_back;
 using impact::Vec3;
 using impact::operator+;
 using impact::operator-;
 using impact::operator*;
 
 inline double norm2(const Vec3& a) { return dot(a, a); }
-inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
-inline Vec3 normalise(const Vec3& a) { return (1.0 / norm(a)) * a; }
-/// M^T a.
-inline Vec3 turn_back(const Mat3& m, const Vec3& a) { return a[0] * m[0] + a[1] * m[1] + a[2] * m[2]; }
-/// A unit vector at right angles to n.
-inline Vec3 find_across(const Vec3& n) {
-  const Vec3 axis = std::abs(n[0]) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-  return normalise(cross(n, axis));
-}
 
 /// Where a body is: x_world = R x + p, x in the frame of its mesh.
 struct Frame {

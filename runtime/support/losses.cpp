@@ -18,10 +18,13 @@
 
 #include "runtime/bank/nearest.hpp"
 #include "runtime/config/document.hpp"
+#include "runtime/impact/vector.hpp"
 
 namespace carillon::support {
 namespace {
 
+using impact::cross;
+using impact::dot;
 using Complex = std::complex<double>;
 constexpr Complex kI{0.0, 1.0};
 constexpr double kEuler = std::numbers::egamma;
@@ -111,9 +114,6 @@ Admittance calc_admittance(const config::Base& base, const Patch& patch, double 
   return {};
 }
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-
 /// Two unit vectors across a third one.
 std::array<Vec3, 2> find_across(const Vec3& n) {
   const std::size_t least = std::abs(n[0]) <= std::abs(n[1]) && std::abs(n[0]) <= std::abs(n[2]) ? 0
@@ -122,7 +122,7 @@ std::array<Vec3, 2> find_across(const Vec3& n) {
   Vec3 axis{};
   axis[least] = 1.0;
   Vec3 first = cross(n, axis);
-  const double size = std::sqrt(dot(first, first));
+  const double size = impact::norm(first);
   for (double& x : first) x /= size;
   return {first, cross(n, first)};
 }

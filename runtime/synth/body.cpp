@@ -337,6 +337,7 @@ void Body::make_sound(std::size_t count, BodyScratch& scratch, TickFunction tick
       const VoiceCounters& after = voice_->get_counters();
       work_.resets += after.resets - before.resets;
       work_.energy_rise = std::max(work_.energy_rise, after.energy_rise);
+      work_.radiated_j += after.radiated_j - before.radiated_j;
       work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
       if (touched) {
         const std::int64_t textured = contacts_->get_counters().samples - contact_samples;

@@ -129,6 +129,7 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   }
   published.peak_pa.store(0.0F, std::memory_order_relaxed);
   published.energy_rise.store(0.0, std::memory_order_relaxed);
+  published.radiated_j.store(0.0, std::memory_order_relaxed);
   Owned& owned = owned_[free];
   owned = Owned{.body = std::move(body),
                 .change = std::move(change),
@@ -478,6 +479,7 @@ void Synthesiser::publish(int number) noexcept {
   }
   published.peak_pa.store(work.peak_pa, std::memory_order_relaxed);
   published.energy_rise.store(work.energy_rise, std::memory_order_relaxed);
+  published.radiated_j.store(work.radiated_j, std::memory_order_relaxed);
 }
 
 EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
@@ -500,6 +502,11 @@ double Synthesiser::get_peak_pa(int body) const noexcept {
 double Synthesiser::get_energy_rise(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return 0.0;
   return published_bodies_[static_cast<std::size_t>(body)].energy_rise.load(std::memory_order_relaxed);
+}
+
+double Synthesiser::get_radiated_j(int body) const noexcept {
+  if (body < 0 || body >= options_.max_bodies) return 0.0;
+  return published_bodies_[static_cast<std::size_t>(body)].radiated_j.load(std::memory_order_relaxed);
 }
 
 void Synthesiser::publish_counters() noexcept {

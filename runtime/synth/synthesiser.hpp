@@ -57,7 +57,7 @@ struct BodySettings {
   int max_waypoints = 0;
   int max_forces = -1;  // as there; -1: what it says there
   Isa isa = Isa::kBest;
-  bool audits_energy = false;  // get_energy_rise()
+  bool audits_energy = false;  // get_energy_rise(), get_radiated_j()
 };
 
 /// What the effects of one body have done since it was added, and what they hold. An effect that is off keeps its units and holds nothing.
@@ -165,6 +165,8 @@ class Synthesiser {
   /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a period in which nothing acted on it.
   /// [any-thread]
   double get_energy_rise(int body) const noexcept;
+  /// Of a body that audits_energy: what its modes have radiated, VoiceCounters::radiated_j. [any-thread]
+  double get_radiated_j(int body) const noexcept;
 
  private:
   /// What the main thread asks of the audio thread, and what comes back: a body that goes, or a change that is over.
@@ -187,7 +189,7 @@ class Synthesiser {
   struct Published {
     PerEffect<std::atomic<std::int64_t>> units{}, ticks{}, bytes{};
     std::atomic<float> peak_pa{0.0F};
-    std::atomic<double> energy_rise{0.0};
+    std::atomic<double> energy_rise{0.0}, radiated_j{0.0};
   };
   template <typename T>
   class Pipe;

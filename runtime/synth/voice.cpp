@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "runtime/config/error.hpp"
@@ -33,6 +34,11 @@ constexpr double kParallel = 3e-7;
 
 }  // namespace
 
+double calc_radiated_share(double gain, double decay_per_s) noexcept {
+  const double radiation_per_s = 2.0 * std::numbers::pi * gain * gain / (bank::kAirDensityKgM3 * bank::kSoundSpeedMs);
+  return radiation_per_s < decay_per_s ? radiation_per_s / decay_per_s : 1.0;
+}
+
 Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
     : model_(std::move(model)), kernels_(&get_kernels(options.isa)), silence_pa_(options.silence_pa), audits_(options.audits_energy) {
   if (!(silence_pa_ > 0.0) || !std::isfinite(silence_pa_)) throw InputError("the pressure of silence must be a positive number of Pa");
@@ -45,6 +51,12 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
   damped_amplitude_.resize(model_->damped_.size());
   pulses_.reserve(static_cast<std::size_t>(std::max(1, options.max_strikes)));
   forces_.reserve(static_cast<std::size_t>(std::max(0, options.max_forces)));
+  if (!audits_) return;
+  radiation_.resize(static_cast<std::size_t>(model_->ringing_));
+  for (std::size_t m = 0; m < radiation_.size(); ++m) {
+    const Model::Mode& mode = model_->modes_[m];
+    radiation_[m].part = calc_radiated_share(mode.gain, mode.decay) * -std::expm1(-2.0 * mode.decay * kPeriod / model_->rate_hz_);
+  }
 }
 
 bool Voice::strike(const stream::Impulse& impulse) noexcept {
@@ -501,6 +513,11 @@ void Voice::audit() noexcept {
   const double before = std::exchange(energy_j_, calc_energy_j());
   if (undisturbed_ && before > kSmallest) counters_.energy_rise = std::max(counters_.energy_rise, energy_j_ / before - 1.0);
   undisturbed_ = true;
+  if (before == 0.0 && energy_j_ == 0.0) return;
+  for (std::size_t m = 0; m < radiation_.size(); ++m) {
+    Radiation& mode = radiation_[m];
+    counters_.radiated_j += mode.part * std::exchange(mode.energy_j, calc_ringing_energy_j(static_cast<int>(m)));
+  }
 }
 
 void Voice::reset() noexcept {
@@ -517,23 +534,25 @@ void Voice::reset() noexcept {
 std::size_t Voice::calc_bytes() const {
   return sizeof(Voice) + state_.capacity() * sizeof(ModeState) + starts_.capacity() * sizeof(Starts) +
          damped_.capacity() * sizeof(DampedState) + damped_amplitude_.capacity() * sizeof(double) + pulses_.capacity() * sizeof(Pulse) +
-         forces_.capacity() * sizeof(Steps) + bounds_.capacity() * sizeof(float);
+         forces_.capacity() * sizeof(Steps) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation);
 }
 
 int Voice::get_live_mode_count() const {
   return std::min(live_ * kGroup, model_->ringing_) + (damped_live_ ? static_cast<int>(damped_.size()) : 0);
 }
 
+double Voice::calc_ringing_energy_j(int m) const noexcept {
+  const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
+  const ModeState& state = state_[static_cast<std::size_t>(m / kGroup)];
+  const double omega = std::sqrt(mode.lambda);
+  const double q = state.im[m % kGroup] / std::sqrt((omega - mode.decay) * (omega + mode.decay));
+  const double v = state.re[m % kGroup] - mode.decay * q;
+  return 0.5 * (v * v + mode.lambda * q * q);
+}
+
 double Voice::calc_energy_j() const noexcept {
   double energy = 0.0;
-  for (int m = 0; m < std::min(live_ * kGroup, model_->ringing_); ++m) {
-    const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
-    const ModeState& state = state_[static_cast<std::size_t>(m / kGroup)];
-    const double omega = std::sqrt(mode.lambda);
-    const double q = state.im[m % kGroup] / std::sqrt((omega - mode.decay) * (omega + mode.decay));
-    const double v = state.re[m % kGroup] - mode.decay * q;
-    energy += 0.5 * (v * v + mode.lambda * q * q);
-  }
+  for (int m = 0; m < std::min(live_ * kGroup, model_->ringing_); ++m) energy += calc_ringing_energy_j(m);
   for (std::size_t i = 0; i < damped_.size(); ++i) {
     const double lambda = model_->modes_[static_cast<std::size_t>(model_->ringing_) + i].lambda;
     energy += 0.5 * (damped_[i].v * damped_[i].v + lambda * damped_[i].q * damped_[i].q);

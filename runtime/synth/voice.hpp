@@ -26,7 +26,7 @@ struct VoiceOptions {
   int max_forces = 256;       // stream::Forces that may; a pulse of an impact is a few, a long one some dozens
   double silence_pa = 1e-10;  // below this bound on its pressure at 1 m (-106 dB re 20 uPa) a body sleeps
   Isa isa = Isa::kBest;
-  bool audits_energy = false;  // VoiceCounters::energy_rise
+  bool audits_energy = false;  // VoiceCounters::energy_rise and radiated_j
 };
 
 struct VoiceCounters {
@@ -36,7 +36,13 @@ struct VoiceCounters {
   std::int64_t resets = 0;        // times that the state was not finite and was cleared
   std::int64_t mode_samples = 0;  // work done: modes x samples, whole groups
   double energy_rise = 0.0;       // the largest share by which the energy rose over a period in which nothing acted; 0 unless asked for
+  double radiated_j = 0.0;        // share of what damping took from what rang at the start of each period; 0 unless asked for
 };
+
+/// The share of a mode's damping that is sound. A far field whose amplitude at 1 m is g q', in the root mean square over all directions,
+/// carries away 4 pi (g q')^2 / (2 rho c) of the mode's q'^2 / 2: the decay d_r = 2 pi g^2 / (rho c). The bank's decay d counts as all
+/// there is, so that the share is d_r / d, and 1 where that is more.
+double calc_radiated_share(double gain, double decay_per_s) noexcept;
 
 /// A mode at or near critical damping: amplitude and velocity.
 struct DampedState {
@@ -173,6 +179,7 @@ class Voice {
   void fade_out(int groups) noexcept;
   void reset() noexcept;
   void audit() noexcept;
+  double calc_ringing_energy_j(int mode) const noexcept;
 
   std::shared_ptr<const Model> model_;
   const Kernels* kernels_ = nullptr;
@@ -192,6 +199,11 @@ class Voice {
   bool silent_ = true;        // block_ is all zero
   bool audits_ = false, undisturbed_ = false;
   double energy_j_ = 0.0;  // at the start of the period, where it is audited
+  struct Radiation {
+    double part = 0.0;      // of the energy at the start of a period: what is radiated in it
+    double energy_j = 0.0;  // at the start of the period
+  };
+  std::vector<Radiation> radiation_;  // of the ringing modes, where it is audited
   ContactForces* contacts_ = nullptr;
   VoiceCounters counters_;
 

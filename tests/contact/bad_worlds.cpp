@@ -1,6 +1,7 @@
 // Worlds that cannot be simulated, and the words that say so.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -118,6 +119,43 @@ TEST(BadWorld, IsRefusedWithTheNameOfTheBodyAndTheReason) {
 TEST(BadWorld, DurationMustBeANumber) {
   EXPECT_THROW(simulate({}, -1.0), InputError);
   EXPECT_THROW(simulate({}, kNan), InputError);
+}
+
+TEST(BadWorld, OverlapsAreFoundInWhateverOrderAndDirectionBodiesLie) {
+  // A lattice of balls 3 cm wide and 4 cm apart, some fixed; then two are taken out of it and put 2 cm apart.
+  const bank::Bank ball = make_ball(0.015, 2);
+  constexpr int kSide = 3, kCount = kSide * kSide * kSide;
+  WorldSpec lattice;
+  for (int i = 0; i < kCount; ++i) {
+    BodySpec body;
+    body.name = "ball " + std::to_string(i);
+    body.bank = &ball;
+    body.fixed = i % 4 == 0;
+    body.initial.position_m = {0.04 * (i % kSide), -0.04 * (i / kSide % kSide), 0.04 * (i / (kSide * kSide))};
+    lattice.bodies.push_back(body);
+  }
+  EXPECT_NO_THROW(World{lattice});
+  for (int i = 0; i < kCount; ++i) {
+    const auto moved = static_cast<std::size_t>((7 * i + 3) % kCount), still = static_cast<std::size_t>(i);
+    if (moved == still) continue;
+    WorldSpec spec = lattice;
+    BodySpec &a = spec.bodies[still], &b = spec.bodies[moved];
+    a.initial.position_m = {1.0, 2.0, 3.0};
+    b.initial.position_m = a.initial.position_m;
+    b.initial.position_m[still % 3] += i % 2 == 0 ? 0.02 : -0.02;
+    if (a.fixed && b.fixed) {
+      EXPECT_NO_THROW(World{spec}) << i;
+      continue;
+    }
+    const std::string first = spec.bodies[std::min(still, moved)].name, second = spec.bodies[std::max(still, moved)].name;
+    try {
+      World world(spec);
+      ADD_FAILURE() << first << " and " << second << " were not refused";
+    } catch (const InputError& e) {
+      EXPECT_NE(std::string(e.what()).find("bodies '" + first + "' and '" + second + "' start inside each other"), std::string::npos)
+          << e.what();
+    }
+  }
 }
 
 TEST(EmptyWorld, IsSilent) {

@@ -7,19 +7,18 @@
 #include <vector>
 
 #include "runtime/contact/world.hpp"
+#include "runtime/impact/vector.hpp"
 
 namespace carillon::contact::tests {
 
-inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Vec3 operator*(double s, const Vec3& a) { return {s * a[0], s * a[1], s * a[2]}; }
-inline double norm(const Vec3& a) { return std::hypot(a[0], a[1], a[2]); }
+using impact::norm;
+using impact::operator+;
+using impact::operator-;
+using impact::operator*;
 
 inline Vec3 rotate(const std::array<double, 4>& q, const Vec3& v) {
   const Vec3 u{q[1], q[2], q[3]};
-  const auto cross = [](const Vec3& a, const Vec3& b) {
-    return Vec3{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  };
+  using impact::cross;
   const Vec3 t = 2.0 * cross(u, v);
   return v + q[0] * t + cross(u, t);
 }

@@ -8,24 +8,13 @@
 #include <variant>
 #include <vector>
 
-#include "tests/contact/checks.hpp"
-#include "tests/contact/solids.hpp"
-#include "tests/shape/solids.hpp"
+#include "tests/contact/bodies.hpp"
 
 namespace carillon::contact::tests {
 namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kRollingResistance = 1e-3;  // docs/decisions/contact.md
-
-bank::Bank make_bank(const shape::tests::Solid& solid) {
-  bank::Bank bank;
-  bank.material = ceramic();
-  bank.vertices_m.assign(solid.vertices.begin(), solid.vertices.end());
-  bank.triangles.assign(solid.triangles.begin(), solid.triangles.end());
-  set_rigid_of_solid(bank);
-  return bank;
-}
 
 /// Facets on the sphere, mass and inertia of the true ball. 20 n^2 triangles.
 bank::Bank make_round(double radius_m, int n) {
@@ -35,12 +24,8 @@ bank::Bank make_round(double radius_m, int n) {
 }
 
 BodySpec make_body(const bank::Bank& bank, Vec3 position, double friction) {
-  BodySpec b;
-  b.name = "body";
-  b.bank = &bank;
-  b.initial.position_m = position;
+  BodySpec b = tests::make_body("body", bank, position, 0.0);
   b.friction = friction;
-  b.restitution = 0.0;
   return b;
 }
 

@@ -4,20 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/contact/checks.hpp"
-#include "tests/contact/solids.hpp"
+#include "tests/contact/bodies.hpp"
 
 namespace carillon::contact::tests {
 namespace {
-
-BodySpec make_body(const std::string& name, const bank::Bank& bank, Vec3 position) {
-  BodySpec b;
-  b.name = name;
-  b.bank = &bank;
-  b.initial.position_m = position;
-  b.restitution = 0.6;
-  return b;
-}
 
 struct Outcome {
   std::vector<stream::Force> forces;
@@ -51,7 +41,7 @@ TEST(Ringing, GivesBodiesEqualAndOppositeForcesAndTheirMomentum) {
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20);
   WorldSpec w;
   w.gravity_m_s2 = {0, 0, 0};
-  w.bodies = {make_body("ball", ball, {0, 0, 0}), make_body("box", box, {0.2, 0.01, 0.005})};
+  w.bodies = {make_body("ball", ball, {0, 0, 0}, 0.6), make_body("box", box, {0.2, 0.01, 0.005}, 0.6)};
   w.bodies[1].velocity_m_s = {-2, 0, 0};
   const Outcome r = run(w, 0.2);
   ASSERT_FALSE(r.forces.empty());
@@ -84,22 +74,23 @@ TEST_P(Books, OfMotionModesAndLossesStayWithinAHundredth) {
   w.ground = GroundSpec{};
   switch (GetParam()) {
     case 0:
-      w.bodies = {make_body("ball", ball, {0, 0, 0.5})};
+      w.bodies = {make_body("ball", ball, {0, 0, 0.5}, 0.6)};
       break;
     case 1:
-      w.bodies = {make_body("box", box, {0, 0, 0.3})};
+      w.bodies = {make_body("box", box, {0, 0, 0.3}, 0.6)};
       w.bodies[0].initial.rotation = {0.9, 0.3, -0.2, 0.4};
       break;
     case 2:
-      w.bodies = {make_body("plate", plate, {0, 0, 0.3})};
+      w.bodies = {make_body("plate", plate, {0, 0, 0.3}, 0.6)};
       w.bodies[0].initial.rotation = {0.95, 0.2, 0.1, 0.0};
       break;
     case 3:
-      w.bodies = {make_body("lump", lump, {0, 0, 0.3})};
+      w.bodies = {make_body("lump", lump, {0, 0, 0.3}, 0.6)};
       w.bodies[0].angular_velocity_rad_s = {5, -3, 2};
       break;
     default:
-      w.bodies = {make_body("shelf", plate, {0, 0, 0.3}), make_body("box", box, {0.02, 0, 0.5}), make_body("ball", ball, {0, 0.05, 0.8})};
+      w.bodies = {make_body("shelf", plate, {0, 0, 0.3}, 0.6), make_body("box", box, {0.02, 0, 0.5}, 0.6),
+                  make_body("ball", ball, {0, 0.05, 0.8}, 0.6)};
       w.bodies[0].fixed = true;
       w.bodies[0].initial.rotation = {std::cos(0.15), 0, std::sin(0.15), 0};
   }
@@ -117,8 +108,8 @@ TEST(Ringing, ShelfGoesOnCarryingWhatLiesOnIt) {
   const bank::Bank ball = add_modes(make_ball(0.03, 3), 20), box = add_modes(make_box({0.1, 0.08, 0.05}), 20),
                    plate = add_modes(make_box({0.6, 0.3, 0.01}), 20);
   WorldSpec w;
-  w.bodies = {make_body("shelf", plate, {0, 0, 0}), make_body("box", box, {-0.2, 0, 0.03}), make_body("ball", ball, {0.2, 0, 0.3}),
-              make_body("other", ball, {0.2, 0.1, 0.3003})};
+  w.bodies = {make_body("shelf", plate, {0, 0, 0}, 0.6), make_body("box", box, {-0.2, 0, 0.03}, 0.6),
+              make_body("ball", ball, {0.2, 0, 0.3}, 0.6), make_body("other", ball, {0.2, 0.1, 0.3003}, 0.6)};
   w.bodies[0].fixed = true;
   const Outcome r = run(w, 0.6);
   int on_shelf = 0;

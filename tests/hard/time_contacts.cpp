@@ -1,88 +1,13 @@
 // Hard cases of contact: thin, fast, unequal, many, wedged, and chained bodies. Whether they end where they must.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <memory>
 #include <string>
-#include <variant>
-#include <vector>
 
-#include "runtime/contact/world.hpp"
-#include "tests/contact/checks.hpp"
-#include "tests/contact/solids.hpp"
+#include "tests/hard/contact_course.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/shape/solids.hpp"
 
 namespace carillon::hard {
 namespace {
-
-using contact::BodySpec;
-using contact::GroundSpec;
-using contact::World;
-using contact::WorldSpec;
-using contact::tests::make_ball;
-using contact::tests::make_box;
-using contact::tests::norm;
-using contact::tests::operator-;
-using stream::Vec3;
-
-bank::Bank make_bank(const shape::tests::Solid& solid, double density) {
-  bank::Bank bank;
-  bank.material = {70e9, 0.3, density, 1e-6, 10.0};
-  bank.vertices_m.assign(solid.vertices.begin(), solid.vertices.end());
-  bank.triangles.assign(solid.triangles.begin(), solid.triangles.end());
-  contact::tests::set_rigid_of_solid(bank);
-  return bank;
-}
-
-bank::Bank make_dense_box(Vec3 size, double density) {
-  bank::Bank box = make_box(size);
-  box.material.density_kg_m3 = density;
-  contact::tests::set_rigid_of_solid(box);
-  return box;
-}
-
-BodySpec make_body(const bank::Bank& bank, Vec3 position, double restitution = 0.3) {
-  BodySpec body;
-  body.name = "body";
-  body.bank = &bank;
-  body.initial.position_m = position;
-  body.restitution = restitution;
-  return body;
-}
-
-struct Course {
-  std::vector<stream::Motion> middle, end;
-};
-
-Course run(const WorldSpec& spec, double middle_s, double end_s) {
-  World world(spec, {.end_s = end_s, .lasting_contacts = false});
-  Course course;
-  course.end.resize(spec.bodies.size());
-  const auto take = [&](const stream::Event& e) {
-    if (const auto* m = std::get_if<stream::Motion>(&e)) course.end[static_cast<std::size_t>(m->body)] = *m;
-  };
-  const double forever = std::numeric_limits<double>::infinity();
-  world.advance(middle_s, forever, take);
-  course.middle = course.end;
-  world.advance(end_s, forever, take);
-  return course;
-}
-
-double calc_drift(const Course& course) {
-  double drift = 0.0;
-  for (std::size_t i = 0; i < course.end.size(); ++i) drift = std::max(drift, norm(course.end[i].position_m - course.middle[i].position_m));
-  return drift;
-}
-
-/// How far the lowest corner of a body is below z = 0 [m]; its centre of mass is the origin of its mesh.
-double calc_depth(const bank::Bank& bank, const stream::Motion& motion) {
-  double depth = -1.0;
-  for (const auto& x : bank.vertices_m) depth = std::max(depth, -(motion.position_m[2] + contact::tests::rotate(motion.rotation, x)[2]));
-  return depth;
-}
 
 TEST(time, contact_needle) {
   const bank::Bank needle = make_dense_box({0.001, 0.001, 0.1}, 7800.0);
@@ -188,7 +113,7 @@ TEST(time, contact_crowd) {
     body.initial.rotation = {1.0, 0.2 * std::sin(i), 0.3 * std::cos(3 * i), 0.1};
     spec.bodies.push_back(body);
   }
-  const Course course = run(spec, 0.07, 0.14);
+  const Course course = run(spec, 0.07, 0.2);
   int outside = 0;
   double depth = 0.0;
   for (std::size_t i = 4; i < spec.bodies.size(); ++i) {
@@ -198,6 +123,7 @@ TEST(time, contact_crowd) {
   }
   hold("contact_crowd", outside, 0.0, "bodies outside");
   hold("contact_crowd", depth, 1e-4, "deepest in the ground [m]");
+  hold("contact_crowd", calc_rise(course), 1e-5, "energy gained as a height [m]");
 }
 
 TEST(time, contact_rings) {

@@ -210,7 +210,7 @@ TEST(time, one_step_contact) {
   voice.attach(&brake);
   strike(voice);
   const double begin = 4800 / kRate;
-  const synth::Surface other{};  // of no stiffness: no spring of the contact beside the impedance
+  const synth::Surface other{};  // of no stiffness: no spring of the contact next to the impedance
   ASSERT_TRUE(brake.take(make(begin, ContactState::kBegin), other) && brake.take(make(begin + step_s, ContactState::kEnd), other));
   brake.reach(1.0);
   play(voice, 128 * 25);

@@ -162,7 +162,7 @@ TEST_F(MalletsOnACube, AFreeBodyRecoils) {
   begin(make_bank(0), false);
   const Mallet mallet = make_hard();
   const Blow blow = make(mallet).blows.at(0);
-  // At (0.01, 0.02) beside the middle: 1/m = 1/m_head + 1/M + (x^2 + y^2)/I.
+  // At (0.01, 0.02) from the middle: 1/m = 1/m_head + 1/M + (x^2 + y^2)/I.
   const double inverse = 1.0 / 0.03 + 1.0 / 1.0 + (0.01 * 0.01 + 0.02 * 0.02) / (0.01 / 6.0);
   EXPECT_NEAR(blow.impulse_n_s, 2.0 * 1.5 / inverse, 1e-9);
   EXPECT_NEAR(blow.restitution, 1.0, 1e-9);

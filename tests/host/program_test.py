@@ -290,6 +290,40 @@ class RenderProgram(unittest.TestCase):
         self.assertEqual(path["bodies"][0]["poses"], [[0, 0, 0, 0, 1, 0, 0, 0]])
         self.assertEqual((path["impulses"][0]["other"], path["impulses"][0]["world_m"]), (-1, [-0.05, -0.05, -0.05]))
 
+    def test_books_of_energy_balance_and_are_printed(self):
+        scene = self.scene("books.json", duration_s=1.0)
+        self.assertEqual(render(scene, "-o", self.root / "books-without.wav", "-q").returncode, 0)
+        run = render(scene, "-o", self.root / "books.wav", "--report", self.root / "books-report.json", "--audit")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertEqual((self.root / "books.wav").read_bytes(), (self.root / "books-without.wav").read_bytes())
+        books = json.loads((self.root / "books-report.json").read_text())["energy"]
+        with h5py.File(self.root / "cube.h5") as bank:
+            mass_kg = float(bank["rigid/mass_kg"][()])
+        self.assertAlmostEqual(books["start_j"] / (mass_kg * 9.81 * 0.15), 1.0, delta=1e-6)  # it is let go at rest with its centre at that height
+        self.assertGreater(books["most_modes_j"], 1e-6 * books["start_j"])
+        self.assertGreater(books["lost_j"], 0.5 * books["start_j"])
+        self.assertLess(abs(books["motion_j"] + books["modes_j"] + books["lost_j"] - books["start_j"]), 0.01 * books["start_j"])
+        self.assertLess(books["difference_j"], 0.01 * books["start_j"])
+        self.assertTrue(0.0 < books["radiated_j"] < books["lost_j"], books)
+        for line in ("energy books       at the start ", "  motion           ", "  modes            ", "  lost             ", "  radiated         "):
+            self.assertIn("\n" + line, run.stdout)
+
+    def test_what_is_radiated_is_the_share_of_the_radiation_in_the_damping(self):
+        # An ideal impulse J at the corner (-, -, -) gives each of the five modes (1.1 J)^2 / 2. Of it 2 pi g^2 / (rho c d) is radiated, all where that is above 1.
+        strike = {"time_s": 0.1, "body": "cube", "point_m": [-0.05, -0.05, -0.05], "impulse_n_s": [0, 0, 2e-3]}
+        given_j, decay_per_s = 5 * (1.1 * 2e-3) ** 2 / 2, 12.0
+        missed = 1 - math.exp(-2 * decay_per_s * 128 / 48000)  # what went in the samples in which the impulse came is not counted
+        for gain in (0.3, 3.0, 300.0):
+            subprocess.run([BIN / "write_cube_bank", self.root / "radiates.h5", str(gain), str(decay_per_s)], check=True)
+            scene = self.scene("radiates.json", radiation="osg02", duration_s=1.0, bodies=[{"name": "cube", "bank": "radiates.h5", "fixed": True, "position_m": [0, 0, 0]}],
+                               strikes=[strike])
+            run = render(scene, "-o", self.root / "radiates.wav", "--report", self.root / "radiates-report.json", "--audit", "-q")
+            self.assertEqual(run.returncode, 0, run.stderr)
+            radiated_j = json.loads((self.root / "radiates-report.json").read_text())["energy"]["radiated_j"]
+            expected_j = given_j * min(1.0, 2 * math.pi * gain ** 2 / (1.21 * 343 * decay_per_s))
+            self.assertLessEqual(radiated_j, expected_j)
+            self.assertGreater(radiated_j, (1 - missed) * expected_j)
+
     def test_mallets_are_solved_reported_and_replayed_to_the_same_bytes(self):
         def strike(**mallet):
             return {"body": "cube", "point_m": [0.01, 0.02, 0.05], "mallet": {"mass_kg": 0.02, "speed_m_s": 1.5, **mallet}}

@@ -59,7 +59,7 @@ TEST_F(StrikesOfAScene, APointOfTheSurfaceIsStruckWhereItIs) {
   }
 }
 
-TEST_F(StrikesOfAScene, APointBesideTheSurfaceStrikesTheNearestPlace) {
+TEST_F(StrikesOfAScene, APointNextToTheSurfaceStrikesTheNearestPlace) {
   // Of a cube that is the point with every coordinate cut to its side, for all points outside.
   for (int i = 0; i < 1000; ++i) {
     const Vec3 point{0.09 * std::sin(1.0 + 1.7 * i), 0.09 * std::sin(2.0 + 2.9 * i), 0.09 * std::sin(3.0 + 4.3 * i)};

@@ -3,9 +3,12 @@
 
 usage: members_test.py BIN_DIR        does nothing but by root
 """
+import contextlib
+import errno
 import os
 import pathlib
 import shutil
+import signal
 import stat
 import subprocess
 import sys
@@ -18,6 +21,8 @@ from bench import BIN, Bench, make_job
 
 MEMBER = 65534  # user and group without privileges
 SWAPS = 1000  # of each folder that is swapped while root works
+PAUSE_S = 0.0005  # with the link in place, and with the folder
+RETRIES_S = 300  # a job is tried again after 10, 40 and 160 s
 DEAD = f"{os.uname().nodename},0-1:2,999999999,1,0123456789ab"  # as a folder in tmp/ of a process that is gone
 
 
@@ -39,6 +44,29 @@ def start_as_member(act):
             sys.stderr.flush()
             os._exit(code)
     return child
+
+
+def swap_once(path, aside, target):
+    """Sets a folder aside, puts a link in its place, and puts the folder back. Only the member makes links. Root may take any folder away or make it anew between two steps, and the folder
+    that is aside stays there then."""
+    root_was_here = (errno.ENOENT, errno.EEXIST, errno.ENOTEMPTY, errno.EISDIR)
+
+    def step(act, *arguments):
+        try:
+            act(*arguments)
+            return True
+        except OSError as error:
+            if error.errno not in root_was_here:
+                raise
+            return False
+
+    if not step(os.rename, path, aside):
+        return
+    if step(os.symlink, target, path):
+        time.sleep(PAUSE_S)
+        step(os.unlink, path)
+    step(os.rename, aside, path)
+    time.sleep(PAUSE_S)
 
 
 def look(folder):
@@ -191,34 +219,34 @@ class Members(Bench):
         targets = [self.victim, self.victim, self.victim / paths[2].parent.name / paths[2].name]
 
         def swap_on():
-            for _ in range(SWAPS):
+            for number in range(SWAPS):
                 for path, target in zip(paths, targets):
-                    try:
-                        os.rename(path, f"{path}.aside")
-                        os.symlink(target, path)
-                        time.sleep(0.0005)
-                        os.unlink(path)
-                        os.rename(f"{path}.aside", path)
-                        time.sleep(0.0005)
-                    except OSError:  # root was here
-                        if os.path.islink(path):
-                            os.unlink(path)
-                        if os.path.lexists(f"{path}.aside") and not os.path.lexists(path):
-                            os.rename(f"{path}.aside", path)
+                    swap_once(path, path.with_name(f"{path.name}.{number}.aside"), target)
 
-        child, rounds, is_over = start_as_member(swap_on), 0, False
-        while not is_over or rounds < 3:
+        child = start_as_member(swap_on)
+        ends = []  # exit codes of the member: one at most
+        self.addCleanup(lambda: ends or (os.kill(child, signal.SIGKILL), os.waitpid(child, 0)))  # before the folder goes
+        rounds = 0
+        while not ends or rounds < 3:
             rounds += 1
-            is_over = is_over or os.waitpid(child, os.WNOHANG)[0] != 0
-            (self.store / "tmp" / DEAD).mkdir(exist_ok=True) if not (self.store / "tmp").is_symlink() else None
+            if not ends and (waited := os.waitpid(child, os.WNOHANG))[0] != 0:
+                ends.append(os.waitstatus_to_exitcode(waited[1]))
+            with contextlib.suppress(FileNotFoundError, FileExistsError):  # tmp is aside, or a link to where there is one
+                (self.store / "tmp" / DEAD).mkdir()
             for words in (("gc", "--delete"), ("submit", self.open_job), ("run", "--quiet", "--no-pictures")):
-                done = self.run_it(*words, code=None, timeout=60)
-                self.assertIn(done.returncode, (0, 1, 2, 3, 4), done.stderr)
+                done = self.run_it(*words, code=None, timeout=RETRIES_S)
+                self.assertIn(done.returncode, (0, 1, 2, 3, 4), f"{words}: {done.stdout}{done.stderr}")
+                self.assertNotIn("internal", done.stderr)
                 self.assertEqual(look(self.victim), before, f"{words}: {done.stdout}{done.stderr}")
         print(f"{rounds} rounds of root's commands against {3 * SWAPS} swaps", file=sys.stderr)
-        for path in self.store.rglob("*.aside"):
-            shutil.rmtree(path)
-        self.run_it("submit", self.open_job)
+        self.assertEqual(ends, [0], "the member stopped early")
+        for path in paths:
+            self.assertFalse(path.is_symlink(), path)
+        for path in sorted(self.store.rglob("*.aside")):
+            if path.exists():  # it goes with the one that it lies in
+                shutil.rmtree(path)
+        self.run_it("submit", self.open_job, code=None)
+        self.run_it("retry", self.open_job, code=None)  # an attempt that met a link may have failed for good
         self.run_it("run", "--quiet", "--no-pictures")
         self.run_it("get", self.open_job)
         self.assertEqual(look(self.victim), before)

@@ -102,6 +102,27 @@ TEST(Planner, APulseInPiecesIsJudgedAsOne) {
   }
 }
 
+TEST(Planner, APulseInPiecesCostsWhatItsLengthAndItsStepsDo) {
+  // Sixteen steps an event: 125 events of one pulse of 2 ms. Each of them pays for itself alone.
+  constexpr double kLength = 2e-3;
+  constexpr int kSteps = 2000;
+  Stage stage;
+  const Costs costs{.mode_sample_ns = 0.0,
+                    .voice_sample_ns = 0.0,
+                    .strike_mode_ns = 0.0,
+                    .pulse_mode_sample_ns = 3.0,
+                    .step_mode_ns = 5.0,
+                    .ear_sample_ns = 0.0};
+  Planner planner(stage.facts, costs);
+  stream::split_force({.time_s = 1.0 - 0.5 * kLength, .step_s = kLength / kSteps, .triangle = 3},
+                      std::vector<stream::Vec3>(kSteps, {0, 0, 1.0 / kSteps}), [&](const stream::Force& piece) { planner.watch(piece); });
+  planner.advance(stage.facts.duration_s);
+  const double modes = static_cast<double>(stage.facts.bodies[0].bank->mode_count());
+  // Of the first pieces it is not known yet that the pulse will be long enough to be told from a blow.
+  EXPECT_NEAR(planner.get_plan(0)[Effect::kHertzPulse].cost_us, 1e-3 * modes * kLength * 48000.0 * 3.0, 5e-2 * modes * kLength * 144.0);
+  EXPECT_NEAR(planner.get_plan(0)[Effect::kModal].cost_us, 1e-3 * modes * kSteps * 5.0, 1e-4 * modes * kSteps);
+}
+
 TEST(Planner, ItIsOffWhenItHasDiedAwayAndTheSoundHasArrived) {
   Stage stage;
   const auto changes = play(stage.facts, {make_strike(1.0, 0.01)});

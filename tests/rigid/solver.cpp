@@ -11,11 +11,10 @@ namespace {
 
 using impact::cross;
 using impact::dot;
+using impact::norm;
 using impact::operator+;
 using impact::operator-;
 using impact::operator*;
-
-double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
 
 Mover make_block(double mass_kg, Vec3 size_m, Vec3 velocity) {
   Mover m{1.0 / mass_kg, {}, velocity, {}};

@@ -161,6 +161,24 @@ TEST(ground, tilted_coin_rolls_on_a_round_rim) {
   EXPECT_NEAR(low, 0.0, 2e-6 * r);
 }
 
+TEST(ground, leaning_cone_stands_on_its_tip) {
+  // However round its mantle is; further than its own angle, 16.7 degrees from the ground, its rim is lower.
+  for (const int around : {12, 64}) {
+    const auto cone = make_lathe({{0, 0}, {0.03, 0.1}, {0, 0.1}}, around, false).make();
+    const double side = std::atan(0.3);
+    for (const double lean : {0.0, 0.2, 0.7, 1.2, 1.27, 1.3, 1.35}) {
+      Frame frame;
+      frame.rotation = make_turn({0, 1, 0}, lean);
+      const auto touches = find(*cone, frame, 1e-4);
+      ASSERT_FALSE(touches.empty()) << lean;
+      double lowest = 1.0;
+      for (const Touch& t : touches) lowest = std::min(lowest, t.gap_m);
+      const double rim = std::hypot(0.1, 0.03) * std::sin(0.5 * std::numbers::pi - lean - side);
+      EXPECT_NEAR(lowest, std::min(0.0, rim), 1e-6) << around << " " << lean;
+    }
+  }
+}
+
 TEST(ground, needle_and_sheet_on_edge) {
   const auto needle = make_box({1e-4, 1e-4, 0.1}, 2).make();
   Frame frame;

@@ -8,13 +8,6 @@
 namespace carillon::shape::tests {
 namespace {
 
-std::vector<Touch> find(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double margin) {
-  PairMemory memory;
-  std::vector<Touch> out;
-  find_touches(a, fa, b, fb, margin, memory, out);
-  return out;
-}
-
 double find_least(const std::vector<Touch>& touches) {
   double least = 1e9;
   for (const Touch& t : touches) least = std::min(least, t.gap_m);
@@ -170,11 +163,11 @@ TEST(pairs, hollow_boxes_stand_flush_on_each_other) {
   hollow.add(inner, {});
   const auto box = hollow.make();
   ASSERT_FALSE(box->is_polyhedron());
-  for (const double beside : {0.0, 1e-9, 0.01}) {
+  for (const double shift_m : {0.0, 1e-9, 0.01}) {
     Frame fa, fb;
-    fa.position_m = {beside, 0, 0.04 - 1e-6};
+    fa.position_m = {shift_m, 0, 0.04 - 1e-6};
     const auto touches = find(*box, fa, *box, fb, 1e-4);
-    ASSERT_GE(touches.size(), 4U) << beside;
+    ASSERT_GE(touches.size(), 4U) << shift_m;
     double low = 1.0, high = -1.0;
     for (const Touch& t : touches) {
       EXPECT_NEAR(t.normal[2], 1.0, 1e-9);
@@ -182,7 +175,7 @@ TEST(pairs, hollow_boxes_stand_flush_on_each_other) {
       low = std::min(low, t.where_m[0]);
       high = std::max(high, t.where_m[0]);
     }
-    EXPECT_NEAR(high - low, 0.06 - beside, 2e-4);
+    EXPECT_NEAR(high - low, 0.06 - shift_m, 2e-4);
     expect_consistent(touches, fa, fb, 1e-4);
   }
 }

@@ -8,13 +8,6 @@
 namespace carillon::shape::tests {
 namespace {
 
-std::vector<Touch> find(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double margin) {
-  PairMemory memory;
-  std::vector<Touch> out;
-  find_touches(a, fa, b, fb, margin, memory, out);
-  return out;
-}
-
 TEST(polyhedra, flush_boxes_touch_at_the_corners_of_their_overlap) {
   const auto small = make_box({0.06, 0.05, 0.04}, 4).make(), large = make_box({0.1, 0.03, 0.04}, 1).make();
   Frame top, bottom;

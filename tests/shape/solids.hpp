@@ -187,4 +187,12 @@ class Dice {
   std::uint64_t state_;
 };
 
+/// The touches of two bodies, without a memory of earlier searches.
+inline std::vector<Touch> find(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double margin) {
+  PairMemory memory;
+  std::vector<Touch> out;
+  find_touches(a, fa, b, fb, margin, memory, out);
+  return out;
+}
+
 }  // namespace carillon::shape::tests

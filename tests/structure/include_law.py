@@ -35,7 +35,7 @@ LAW = {
     "runtime/config": ([], ["json", "fmt"]),
     "runtime/version": ([], ["fmt"]),
     "runtime/bank": (["runtime/config", "runtime/version"], ["json", "fmt", "hdf5", "openssl", "cli"]),
-    "runtime/support": (["runtime/config", "runtime/bank"], ["fmt"]),
+    "runtime/support": (["runtime/config", "runtime/bank", "runtime/impact"], ["fmt"]),
     "runtime/stream": (["runtime/config"], ["fmt"]),
     "runtime/radiation": (["runtime/config", "runtime/bank"], []),
     "runtime/synth": (["runtime/config", "runtime/bank", "runtime/stream"], []),

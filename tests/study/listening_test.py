@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon-study accuracy --only banks playing on a small bar: what it finds must follow from arithmetic that it does not use.
+"""carillon-study accuracy --only banks playing contact on a small bar: what it finds must follow from arithmetic that it does not use.
 
 usage: listening_test.py BIN_DIR"""
 import csv
@@ -23,7 +23,7 @@ class Listening(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
         cls.out = pathlib.Path(cls.folder.name) / "report"
-        done = subprocess.run([BIN / "carillon-study", "accuracy", "--quick", "--on", "bar", "--only", "banks", "playing", "--json", "-o", cls.out],
+        done = subprocess.run([BIN / "carillon-study", "accuracy", "--quick", "--on", "bar", "--only", "banks", "playing", "contact", "--json", "-o", cls.out],
                               capture_output=True, text=True, stdin=subprocess.DEVNULL)
         if done.returncode != 0:
             raise AssertionError(done.stderr[-2000:])
@@ -60,6 +60,15 @@ class Listening(unittest.TestCase):
         rows = {row["effects"]: row for row in read(self.out, "playing-effects")}
         self.assertIn("auto", rows)
         self.assertGreater(float(rows["without hertz_pulse"]["error_dba"]), -40.0)
+
+    def test_a_finer_step_is_dearer_and_nearer_to_the_closed_form(self):
+        rows = {float(row["contact_step_s"]): row for row in read(self.out, "contact-contact_step_s")}
+        errors = {step: float(row["error"]) for step, row in rows.items()}
+        self.assertLess(errors[2.5e-4], 1e-3)  # of the second order in the step: 64 times from 0.00025 to 0.002
+        self.assertGreater(errors[2e-3], 10 * errors[2.5e-4])
+        self.assertGreater(float(rows[1e-4]["cpu_ms_per_s"]), float(rows[2e-3]["cpu_ms_per_s"]))
+        self.assertLess(float(read(self.out, "contact-triangles")[-1]["error"]), 0.01)
+        self.assertTrue(any("`modes_in_impacts`" in text for text in self.findings["contact"]))
 
 
 if __name__ == "__main__":

@@ -343,7 +343,7 @@ TEST(Force, InPiecesWakesWhatItWakesInOne) {
   }
 }
 
-/// The body is exchanged for an equal one in the middle of a long force, with a click and a change of effects besides.
+/// The body is exchanged for an equal one in the middle of a long force, with a click and a change of effects.
 TEST(Force, GoesOnWhenTheBodyIsExchanged) {
   const bank::Bank bank = make_cube_bank(make_modes(20));
   const Course course = make_course(5e-3, 1e-5, 1300, true);

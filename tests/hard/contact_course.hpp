@@ -1,0 +1,97 @@
+// Worlds of the hard cases of contact: their bodies, how they go, and what is asked of them in the end.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <variant>
+#include <vector>
+
+#include "runtime/contact/world.hpp"
+#include "tests/contact/bodies.hpp"
+#include "tests/shape/solids.hpp"
+
+namespace carillon::hard {
+
+using contact::BodySpec;
+using contact::GroundSpec;
+using contact::World;
+using contact::WorldSpec;
+using contact::tests::make_ball;
+using contact::tests::make_box;
+using contact::tests::norm;
+using contact::tests::operator+;
+using contact::tests::operator-;
+using contact::tests::operator*;
+using stream::Vec3;
+
+inline constexpr double kGravity = 9.81;
+
+inline bank::Bank make_bank(const shape::tests::Solid& solid, double density) {
+  return contact::tests::make_bank(solid, {70e9, 0.3, density, 1e-6, 10.0});
+}
+
+inline bank::Bank make_dense_box(Vec3 size, double density) {
+  bank::Bank box = make_box(size);
+  box.material.density_kg_m3 = density;
+  contact::tests::set_rigid_of_solid(box);
+  return box;
+}
+
+/// A ball of 20 n^2 facets; mass and inertia are those of the true ball.
+inline bank::Bank make_round(double radius_m, int n) {
+  bank::Bank ball = make_bank(shape::tests::make_ball(radius_m, n), 2700.0);
+  ball.rigid = make_ball(radius_m, 1).rigid;
+  return ball;
+}
+
+inline BodySpec make_body(const bank::Bank& bank, Vec3 position, double restitution = 0.3) {
+  return contact::tests::make_body("body", bank, position, restitution);
+}
+
+/// What a world did until its end.
+struct Course {
+  std::vector<stream::Motion> middle, end;
+  contact::EnergyAudit energy;
+  int hits = 0;
+};
+
+/// Calls `look` (may be empty) with every motion.
+inline Course run(const WorldSpec& spec, double middle_s, double end_s, const std::function<void(const stream::Motion&)>& look = {}) {
+  World world(spec, {.end_s = end_s, .lasting_contacts = false, .audits_energy = true});
+  Course course;
+  course.end.resize(spec.bodies.size());
+  const auto take = [&](const stream::Event& e) {
+    if (std::holds_alternative<stream::Impulse>(e)) ++course.hits;
+    const auto* m = std::get_if<stream::Motion>(&e);
+    if (m == nullptr) return;
+    course.end[static_cast<std::size_t>(m->body)] = *m;
+    if (look) look(*m);
+  };
+  const double forever = std::numeric_limits<double>::infinity();
+  world.advance(middle_s, forever, take);
+  course.middle = course.end;
+  world.advance(end_s, forever, take);
+  course.energy = world.get_statistics().energy;
+  return course;
+}
+
+inline double calc_drift(const Course& course) {
+  double drift = 0.0;
+  for (std::size_t i = 0; i < course.end.size(); ++i) drift = std::max(drift, norm(course.end[i].position_m - course.middle[i].position_m));
+  return drift;
+}
+
+/// The most that the energy rose, in steps or by a hit, as a height of all that moves [m].
+inline double calc_rise(const Course& course) { return std::max(course.energy.rise_j, course.energy.hit_rise_j) / course.energy.weight_n; }
+
+/// How far the lowest corner of a body is below z = 0 [m].
+inline double calc_depth(const bank::Bank& bank, const stream::Motion& motion) {
+  double depth = -1.0;
+  for (const auto& x : bank.vertices_m)
+    depth = std::max(depth, -(motion.position_m[2] + contact::tests::rotate(motion.rotation, x - bank.rigid.centre_m)[2]));
+  return depth;
+}
+
+}  // namespace carillon::hard
