@@ -24,7 +24,7 @@ struct Pose {
 struct WorldOptions {
   double contact_step_s =
       2.5e-4;  // the longest step [s] of bodies that touch or may. Flight and the instant of an impact do not depend on it
-  double joint_tolerance = 1e-10;                          // of a step of a mechanism's free motion [rad, m]
+  double joint_tolerance = 1e-8;                           // of a step of a mechanism's free motion [rad, m]
   double end_s = std::numeric_limits<double>::infinity();  // the world stops there
   bool islands = true;                                     // false: all bodies in one problem, for comparison
   bool modes = true;                                       // false: impacts do not look at modes, as if banks had none

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <mutex>
 #include <stdexcept>
+#include <string_view>
 
 #include "runtime/joints/engine.hpp"
 
@@ -20,10 +21,10 @@ fs::path find_own_folder() {
   Dl_info info{};
   if (dladdr(reinterpret_cast<const void*>(&find_own_folder), &info) == 0 || info.dli_fname == nullptr) return ".";
   std::error_code error;
-  const fs::path own = fs::canonical(info.dli_fname, error);
-  if (!error) return own.parent_path();
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);  // a program started by a search along PATH
-  return error ? fs::path(".") : program.parent_path();
+  // Of a program that was found along PATH the name has no folder.
+  const bool has_folder = std::string_view(info.dli_fname).find('/') != std::string_view::npos;
+  const fs::path file = has_folder ? fs::canonical(info.dli_fname, error) : fs::read_symlink("/proc/self/exe", error);
+  return error ? fs::path(".") : file.parent_path();
 }
 
 MakeMechanism load_engine() {

@@ -61,7 +61,7 @@ struct Coordinates {
 };
 
 /// The error that a step of the integration may leave in a coordinate [rad, m].
-inline constexpr double kTolerance = 1e-10;
+inline constexpr double kTolerance = 1e-8;
 
 class Mechanism {
  public:

@@ -8,9 +8,12 @@ namespace carillon::plan {
 struct Costs {
   double mode_sample_ns = 0.035;       // one mode, one sample
   double voice_sample_ns = 0.5;        // one awake body, one sample, besides its modes
+  double event_ns = 1000.0;            // one strike, or one event of a force, whatever the modes
   double strike_mode_ns = 1.5;         // one strike on one mode
   double pulse_mode_sample_ns = 0.5;   // one mode, one sample, while a pulse acts
-  double step_mode_ns = 0.4;           // one step, on one mode, of a force that is known step by step, besides
+  double pulse_mode_ns = 10.0;         // one pulse, one mode, besides, however short
+  double force_mode_ns = 12.0;         // the same for one event of a force that is known step by step
+  double step_mode_ns = 0.4;           // and for one of its steps
   double ear_sample_ns = 6.0;          // one body at one microphone, one sample, standing still
   double moving_ear_sample_ns = 12.0;  // the same with a delay that changes
   double dipole_ear_sample_ns = 9.0;   // besides, for the three histories of acceleration noise

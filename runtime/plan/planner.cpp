@@ -28,6 +28,7 @@ namespace {
 using std::numbers::pi;
 using Rule = Reason::Rule;
 constexpr double kRingS = 0.05;
+constexpr double kRecordGapS = 0.01;     // a contact that moves has a record at least so often
 constexpr std::size_t kMostPulses = 16;  // that come in pieces and may go on
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kAlways = std::numeric_limits<double>::infinity();
@@ -55,6 +56,7 @@ struct Planner::State {
     Vec3 position_m{};
     double nearest_m = kAlways;             // to a microphone, so far
     double sounds_until_s = kNever;         // at the body
+    double driven_until_s = kNever;         // by contacts that slide or roll; others cost next to nothing
     double mean_hz = 0.0;                   // of what is heard of it
     double ring_pa2_s = 0.0, ring_s = 0.0;  // modal exposure of its strikes, falling by 60 dB a second since ring_s
     std::vector<double> quiet_s;            // per mode of the bank's levels: when it is not heard any more
@@ -118,7 +120,7 @@ struct Planner::State {
   void look(Body& body, double time_s);
   void apply(const Pending& pending);
   void apply(const stream::Impulse& impulse);
-  void apply(const stream::Impulse& impulse, double strikes, double steps, double new_s);
+  void apply(const stream::Impulse& impulse, double work_ns, double new_s);
   void apply(const stream::Force& force);
   void apply(const stream::Contact& contact);
   void damp(Body& body, double share, double time_s);
@@ -268,13 +270,13 @@ void Planner::State::apply(const stream::Force& force) {
     pulse->duration_s += force.calc_length_s();
   }
   pulse->time_s = end_s - 0.5 * pulse->duration_s;
-  apply(*pulse, 1.0, force.count, force.calc_length_s());
+  apply(*pulse, costs.force_mode_ns + force.count * costs.step_mode_ns, force.calc_length_s());
 }
 
-void Planner::State::apply(const stream::Impulse& impulse) { apply(impulse, 1.0, 0.0, impulse.duration_s); }
+void Planner::State::apply(const stream::Impulse& impulse) { apply(impulse, costs.strike_mode_ns, impulse.duration_s); }
 
-/// `strikes`, `steps`, `new_s`: what of it costs that has not been counted: events, steps of a force, time.
-void Planner::State::apply(const stream::Impulse& impulse, double strikes, double steps, double new_s) {
+/// What it costs that has not been counted: `work_ns` for each mode, and a pulse for the time `new_s`.
+void Planner::State::apply(const stream::Impulse& impulse, double work_ns, double new_s) {
   Body& body = bodies[static_cast<std::size_t>(impulse.body)];
   const BodyFacts& of = facts.bodies[static_cast<std::size_t>(impulse.body)];
   if (!body.bank->calc_projections(impulse.triangle, impulse.barycentric, impulse.impulse_n_s, projection)) return;
@@ -295,6 +297,9 @@ void Planner::State::apply(const stream::Impulse& impulse, double strikes, doubl
 
   const double modal_db = calc_level_db(heard), click_db = calc_level_db(clicked);
   double end_s = kNever;
+  // While it sounds, what is not heard of it is played too.
+  if (modal_db > limit_db || impulse.time_s <= body.sounds_until_s)
+    body.plan.effects[Effect::kModal].cost_us += 1e-3 * (costs.event_ns + static_cast<double>(body.bank->get_modes().size()) * work_ns);
   if (modal_db > limit_db) {
     // Each mode until its part of what is just not heard is all that is left of it.
     const double quiet_pa =
@@ -311,9 +316,7 @@ void Planner::State::apply(const stream::Impulse& impulse, double strikes, doubl
       body.quiet_s[m] = quiet_s;
     }
     end_s = std::max(end_s, impulse.time_s + half_s);
-    body.plan.effects[Effect::kModal].cost_us +=
-        1e-3 * (rung_s * facts.rate_hz * costs.mode_sample_ns +
-                static_cast<double>(modes.size()) * (strikes * costs.strike_mode_ns + steps * costs.step_mode_ns));
+    body.plan.effects[Effect::kModal].cost_us += 1e-3 * rung_s * facts.rate_hz * costs.mode_sample_ns;
     const double share = weigh(heard);
     const bool counts = share > facts.strictness.tellable_share || of.wish.off.has(Effect::kAccelerationNoise);
     call(body, Effect::kModal, counts ? 1.0 + heard : share, end_s + travel_s,
@@ -347,7 +350,8 @@ void Planner::State::apply(const stream::Impulse& impulse, double strikes, doubl
        {.rule = Rule::kChange, .value = to_db(lost), .limit = to_db(facts.strictness.tellable_share)});
   if (lost > facts.strictness.tellable_share) {
     body.plan.effects[Effect::kHertzPulse].cost_us +=
-        1e-3 * costs.pulse_mode_sample_ns * static_cast<double>(amplitude_pa.size()) * new_s * facts.rate_hz;
+        1e-3 * static_cast<double>(amplitude_pa.size()) *
+        (costs.pulse_mode_sample_ns * new_s * facts.rate_hz + (new_s < impulse.duration_s ? 0.0 : costs.pulse_mode_ns));
   }
   body.sounds_until_s = std::max(body.sounds_until_s, end_s);
   look(body, impulse.time_s);
@@ -455,6 +459,7 @@ bool Planner::State::offer(Body& body, const stream::Contact& contact, double ti
   if (slides || rolls) {
     call(body, Effect::kModal, 1.0, time_s, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
     body.sounds_until_s = std::max(body.sounds_until_s, time_s + kHoldS);
+    body.driven_until_s = time_s + kRecordGapS;
     if (body.mean_hz == 0.0) body.mean_hz = 4000.0;  // where a mean frequency is not known the ear is at its best
     look(body, time_s);
   }
@@ -551,7 +556,8 @@ void Planner::State::add_costs(Body& body) {
   // What modes cost that a contact drives is in the first of its effects, as it is where it is measured.
   double driven_ns = kDrivenModeSampleNs * static_cast<double>(body.bank->get_modes().size());
   for (const Effect effect : kContactEffects) {
-    add(effect, costs.force_sample_ns + kContactSampleNs + driven_ns);
+    if (time_s > body.driven_until_s) break;
+    add(effect, std::max(1.0, static_cast<double>(body.driving.size())) * (costs.force_sample_ns + kContactSampleNs + driven_ns));
     if (body.now.has(effect)) driven_ns = 0.0;
   }
 }

@@ -90,8 +90,7 @@ TEST(time, joints_unequal_masses) {
     const auto& energy = course.statistics.energy;
     const std::string part = is_taut ? "taut" : "folding";
     hold("joints_unequal_masses", energy.error_j / energy.kinetic_j, is_taut ? 1e-8 : 2e-3, part + ", energy unbooked, as a share");
-    hold("joints_unequal_masses", norm(course.end.back().position_m), 0.26 + 1e-9,
-         part + ", distance of the ball from the first joint [m]");
+    hold("joints_unequal_masses", std::max(0.0, norm(course.end.back().position_m) - 0.26), 1e-9, part + ", beyond its chain [m]");
   }
 }
 
@@ -102,7 +101,7 @@ TEST(time, joints_whip) {
   const Course course = run(spec, 0.2, 0.5);
   const auto& energy = course.statistics.energy;
   hold("joints_whip", energy.error_j / energy.kinetic_j, 1e-4, "energy unbooked, as a share");
-  hold("joints_whip", norm(course.end.back().position_m), 0.995 + 1e-9, "distance of the last link from the first joint [m]");
+  hold("joints_whip", std::max(0.0, norm(course.end.back().position_m) - 0.995), 1e-9, "last link beyond its chain [m]");
 }
 
 TEST(time, joints_both_rest) {

@@ -19,6 +19,7 @@ using impact::operator-;
 using impact::operator*;
 
 constexpr double kG = 9.81;
+constexpr double kFine = 1e-10;  // a tolerance for comparisons to many digits
 constexpr Vec3 kGravity{0, 0, -kG};
 
 double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
@@ -76,7 +77,7 @@ TEST(mechanism, pendulum_has_the_period_of_the_elliptic_integral) {
       double t = 0.0;
       while (t < period) {
         const double h = std::min(window, period - t);
-        now = m->fly(now, h, kTolerance);
+        now = m->fly(now, h, kFine);
         t += h;
       }
       EXPECT_NEAR(now.q[0], 0.0, 1e-7 * a) << a;
@@ -121,7 +122,7 @@ TEST(mechanism, double_pendulum_moves_by_its_lagrangian) {
   Coordinates now = m->get_start();
   std::vector<Motion> motions;
   for (int window = 0; window < 500; ++window) {
-    now = m->fly(now, 2e-3, kTolerance);
+    now = m->fly(now, 2e-3, kFine);
     for (int n = 0; n < 200; ++n) {
       const double h = 1e-5;
       const auto go = [&](double s, const X& k) {
@@ -166,7 +167,7 @@ TEST(mechanism, ball_joint_keeps_the_angular_momentum_about_the_vertical) {
   };
   Coordinates now = m->get_start();
   const auto before = look(now);
-  for (int n = 0; n < 5000; ++n) now = m->fly(now, 2e-3, kTolerance);
+  for (int n = 0; n < 5000; ++n) now = m->fly(now, 2e-3, kFine);
   const auto after = look(now);
   EXPECT_NEAR(after[0], before[0], 1e-7 * std::abs(before[0]));
   EXPECT_NEAR(after[1], before[1], 1e-7 * std::abs(before[1]));
@@ -223,7 +224,7 @@ TEST(mechanism, hanging_chain_does_not_drift) {
   }
   const auto m = make_mechanism(members, joints, kGravity);
   Coordinates now = m->get_start();
-  for (int n = 0; n < 1000; ++n) now = m->fly(now, 2e-3, kTolerance);
+  for (int n = 0; n < 1000; ++n) now = m->fly(now, 2e-3, kFine);
   std::vector<Motion> motions;
   m->find_motions(now, motions);
   for (std::size_t i = 0; i < motions.size(); ++i) EXPECT_LT(norm(motions[i].centre - members[i].start.centre), 1e-12);
@@ -241,7 +242,7 @@ TEST(mechanism, damped_hinge_loses_what_its_books_say) {
   m->find_motions(now, motions);
   const double before = calc_energy(members, motions);
   const double w0 = std::sqrt(0.5 * mass * kG * l / inertia), d = 0.5 * c / inertia, w = std::sqrt(w0 * w0 - d * d), t = 3.0;
-  for (int n = 0; n < 1500; ++n) now = m->fly(now, 2e-3, kTolerance);
+  for (int n = 0; n < 1500; ++n) now = m->fly(now, 2e-3, kFine);
   m->find_motions(now, motions);
   const double angle = std::atan2(motions[0].centre[0], -motions[0].centre[2]);
   EXPECT_NEAR(angle, a * std::exp(-d * t) * (std::cos(w * t) + d / w * std::sin(w * t)), 1e-5 * a);
@@ -253,7 +254,7 @@ TEST(mechanism, slider_falls_along_its_axis) {
   Member m = make_bar(0.4, 0.6, {}, 0.0);
   const Vec3 axis{0.6, 0.0, -0.8};
   const auto s = make_mechanism({m}, {{.kind = Kind::kSlider, .body = 0, .to = -1, .at = {1, 2, 3}, .axis = axis}}, kGravity);
-  const Coordinates now = s->fly(s->get_start(), 0.7, kTolerance);
+  const Coordinates now = s->fly(s->get_start(), 0.7, kFine);
   std::vector<Motion> motions;
   s->find_motions(now, motions);
   EXPECT_LT(norm(motions[0].centre - m.start.centre - (0.5 * 0.8 * kG * 0.49) * axis), 1e-9);
@@ -272,7 +273,7 @@ TEST(mechanism, universal_joint_does_not_twist) {
   std::vector<Motion> motions;
   m->find_motions(now, motions);
   const double before = calc_energy({bar}, motions);
-  for (int n = 0; n < 500; ++n) now = m->fly(now, 2e-3, kTolerance);
+  for (int n = 0; n < 500; ++n) now = m->fly(now, 2e-3, kFine);
   m->find_motions(now, motions);
   EXPECT_NEAR(calc_energy({bar}, motions), before, 1e-8);
   const auto& q = motions[0].rotation;
@@ -310,9 +311,9 @@ TEST(mechanism, same_bits_again) {
   const auto a = make_mechanism(members, {make_hinge(0, -1, {})}, kGravity), b = make_mechanism(members, {make_hinge(0, -1, {})}, kGravity);
   Coordinates x = a->get_start(), y = b->get_start();
   for (int n = 0; n < 100; ++n) {
-    x = a->fly(x, 2e-3, kTolerance);
-    (void)b->fly(y, 1e-3, kTolerance);
-    y = b->fly(y, 2e-3, kTolerance);
+    x = a->fly(x, 2e-3, kFine);
+    (void)b->fly(y, 1e-3, kFine);
+    y = b->fly(y, 2e-3, kFine);
     ASSERT_EQ(x.q, y.q);
     ASSERT_EQ(x.u, y.u);
   }

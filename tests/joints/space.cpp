@@ -133,7 +133,7 @@ TEST(joints, impulse_goes_through_a_chain) {
                             make_ball_solid(0.1, 0.01, 0.6, 0.3)};
   std::vector<State> states{at({0, 0, -0.1}), at({0, 0, 0.1}), at({0.05, 0.002, -0.18})};
   states[2].velocity = {-3, 0.2, 0};
-  Space space(std::move(solids), std::move(states), std::nullopt, {}, {},
+  Space space(std::move(solids), std::move(states), std::nullopt, {}, {.joint_tolerance = 1e-12},
               {.joints = {{.kind = joints::Kind::kBall, .body = 0, .to = 1, .at = {}}}, .cords = {}});
   const auto calc = [&] {
     Vec3 momentum{}, angular{};

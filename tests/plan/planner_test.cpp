@@ -109,8 +109,10 @@ TEST(Planner, APulseInPiecesCostsWhatItsLengthAndItsStepsDo) {
   Stage stage;
   const Costs costs{.mode_sample_ns = 0.0,
                     .voice_sample_ns = 0.0,
+                    .event_ns = 11.0,
                     .strike_mode_ns = 0.0,
                     .pulse_mode_sample_ns = 3.0,
+                    .force_mode_ns = 7.0,
                     .step_mode_ns = 5.0,
                     .ear_sample_ns = 0.0};
   Planner planner(stage.facts, costs);
@@ -120,7 +122,7 @@ TEST(Planner, APulseInPiecesCostsWhatItsLengthAndItsStepsDo) {
   const double modes = static_cast<double>(stage.facts.bodies[0].bank->mode_count());
   // Of the first pieces it is not known yet that the pulse will be long enough to be told from a blow.
   EXPECT_NEAR(planner.get_plan(0)[Effect::kHertzPulse].cost_us, 1e-3 * modes * kLength * 48000.0 * 3.0, 5e-2 * modes * kLength * 144.0);
-  EXPECT_NEAR(planner.get_plan(0)[Effect::kModal].cost_us, 1e-3 * modes * kSteps * 5.0, 1e-4 * modes * kSteps);
+  EXPECT_NEAR(planner.get_plan(0)[Effect::kModal].cost_us, 1e-3 * modes * kSteps * (5.0 + (11.0 + 7.0) / 16.0), 1e-4 * modes * kSteps);
 }
 
 TEST(Planner, ItIsOffWhenItHasDiedAwayAndTheSoundHasArrived) {
@@ -521,7 +523,7 @@ TEST(Planner, TheTableSaysWhatAndWhy) {
 TEST(Planner, PredictedCostIsUnitsTimesWhatTheyCost) {
   Stage stage;
   stage.facts.microphones_m = {{0, 0, 0}};
-  const Costs costs{.mode_sample_ns = 2.0, .voice_sample_ns = 0.0, .strike_mode_ns = 0.0, .ear_sample_ns = 3.0};
+  const Costs costs{.mode_sample_ns = 2.0, .voice_sample_ns = 0.0, .event_ns = 0.0, .strike_mode_ns = 0.0, .ear_sample_ns = 3.0};
   Planner planner(stage.facts, costs);
   planner.watch(make_strike(0.5, 0.01));
   planner.advance(10.0);

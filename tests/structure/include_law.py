@@ -27,6 +27,7 @@ LIBRARIES = {
     "cgal": ["CGAL/", "boost/"],
     "xml": ["pugixml.hpp"],
     "zlib": ["zlib.h"],
+    "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
@@ -42,9 +43,10 @@ LAW = {
     "runtime/abi": (["runtime/config", "runtime/bank", "runtime/support", "runtime/stream", "runtime/radiation", "runtime/synth"], []),
     "runtime/impact": ([], []),
     "runtime/shape": (["runtime/config", "runtime/bank", "runtime/impact"], []),
-    "runtime/rigid": (["runtime/config", "runtime/impact", "runtime/shape"], ["eigen", "fmt"]),
-    "runtime/contact": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/impact", "runtime/shape", "runtime/rigid"], ["fmt"]),
-    "runtime/host": (["runtime/config", "runtime/version", "runtime/bank", "runtime/support", "runtime/stream", "runtime/impact", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
+    "runtime/joints": (["runtime/config", "runtime/impact"], ["fmt", "simbody"]),
+    "runtime/rigid": (["runtime/config", "runtime/impact", "runtime/joints", "runtime/shape"], ["eigen", "fmt"]),
+    "runtime/contact": (["runtime/config", "runtime/bank", "runtime/stream", "runtime/impact", "runtime/joints", "runtime/shape", "runtime/rigid"], ["fmt"]),
+    "runtime/host": (["runtime/config", "runtime/version", "runtime/bank", "runtime/support", "runtime/stream", "runtime/impact", "runtime/joints", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact"], ["fmt", "cli", "eigen", "sndfile", "cairo"]),
     "runtime/live": (["runtime/config", "runtime/version", "runtime/bank", "runtime/stream", "runtime/radiation", "runtime/synth", "runtime/plan", "runtime/contact", "runtime/host"], ["fmt", "cli", "portaudio"]),
     "partition": (["runtime/config"], ["fmt", "metis"]),
     "jobs/spec": (["runtime/config"], ["fmt", "json"]),
