@@ -41,7 +41,7 @@ TEST(Standing, WhatFallsAsleepSaysSoByALastMotionAtRest) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   WorldSpec w;
   w.ground = GroundSpec{};
-  w.bodies = {make_body(box, {0, 0, 0.06})};
+  w.bodies = {make_body("body", box, {0, 0, 0.06})};
   w.bodies[0].initial.rotation = {1.0, 0.3, 0.2, 0.1};
   World world(w, {.end_s = 10.0});
   stream::Motion last;
