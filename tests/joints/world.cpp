@@ -6,21 +6,15 @@
 #include <string>
 
 #include "runtime/config/error.hpp"
-#include "tests/contact/checks.hpp"
-#include "tests/contact/solids.hpp"
+#include "tests/contact/bodies.hpp"
 
 namespace carillon::contact::tests {
 namespace {
 
 using joints::Kind;
 
-BodySpec make_body(const std::string& name, const bank::Bank& bank, Vec3 position) {
-  BodySpec b;
-  b.name = name;
-  b.bank = &bank;
-  b.initial.position_m = position;
-  b.restitution = 0.6;
-  return b;
+BodySpec make_springy(const std::string& name, const bank::Bank& bank, const Vec3& position) {
+  return make_body(name, bank, position, 0.6);
 }
 
 struct Outcome {
@@ -29,16 +23,15 @@ struct Outcome {
   EnergyAudit energy;
 };
 
-Outcome run(const WorldSpec& spec, double end_s, int slices = 1) {
+Outcome run(const WorldSpec& spec, double end_s) {
   World world(spec, {.end_s = end_s, .audits_energy = true});
   Outcome outcome;
-  for (int slice = 1; slice <= slices; ++slice)
-    world.advance(end_s * slice / slices, slices > 1 ? 1e-4 : std::numeric_limits<double>::infinity(), [&](const stream::Event& event) {
-      EXPECT_EQ(stream::find_fault(event), nullptr);
-      outcome.events.push_back(event);
-      if (std::holds_alternative<stream::Force>(event)) ++outcome.forces;
-      if (std::holds_alternative<stream::Impulse>(event)) ++outcome.impulses;
-    });
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const stream::Event& event) {
+    EXPECT_EQ(stream::find_fault(event), nullptr);
+    outcome.events.push_back(event);
+    if (std::holds_alternative<stream::Force>(event)) ++outcome.forces;
+    if (std::holds_alternative<stream::Impulse>(event)) ++outcome.impulses;
+  });
   outcome.energy = world.get_statistics().energy;
   return outcome;
 }
@@ -63,37 +56,37 @@ WorldSpec make_scene(const Things& t, int which) {
   WorldSpec w;
   switch (which) {
     case 0:  // a ringing ball on a ball joint against a fixed plate that rings
-      w.bodies = {make_body("ball", t.ball, {0, 0.3, 0}), make_body("plate", t.plate, {0, -0.036, -0.35})};
+      w.bodies = {make_springy("ball", t.ball, {0, 0.3, 0}), make_springy("plate", t.plate, {0, -0.036, -0.35})};
       w.bodies[1].fixed = true;
       w.joints = {{.kind = Kind::kBall, .body = 0, .to = -1, .at_m = {0, 0, 0}}};
       break;
     case 1:  // against a plate on a hinge
-      w.bodies = {make_body("ball", t.ball, {0, 0.3, 0}), make_body("plate", t.plate, {0, -0.036, -0.3})};
+      w.bodies = {make_springy("ball", t.ball, {0, 0.3, 0}), make_springy("plate", t.plate, {0, -0.036, -0.3})};
       w.joints = {{.kind = Kind::kBall, .body = 0, .to = -1, .at_m = {0, 0, 0}},
                   {.kind = Kind::kHinge, .body = 1, .to = -1, .at_m = {0, -0.036, -0.2}, .axis = {1, 0, 0}}};
       break;
     case 2:  // a free ball against a plate on a hinge, and the ground
-      w.bodies = {make_body("ball", t.ball, {0.05, 0.5, -0.3}), make_body("plate", t.plate, {0, 0, -0.3})};
+      w.bodies = {make_springy("ball", t.ball, {0.05, 0.5, -0.3}), make_springy("plate", t.plate, {0, 0, -0.3})};
       w.bodies[0].velocity_m_s = {0, -3, 1};
       w.joints = {{.kind = Kind::kHinge, .body = 1, .to = -1, .at_m = {0, 0, -0.2}, .axis = {1, 0, 0}}};
       w.ground = GroundSpec{.height_m = -0.8};
       break;
     case 3:  // a tube on two cords and a clapper on one
-      w.bodies = {make_body("tube", t.tube, {0, 0, -0.3}), make_body("clapper", t.clapper, {0.09, 0, -0.3})};
+      w.bodies = {make_springy("tube", t.tube, {0, 0, -0.3}), make_springy("clapper", t.clapper, {0.09, 0, -0.3})};
       w.bodies[1].velocity_m_s = {-1.2, 0.05, 0};
       w.cords = {{.body = 0, .to = -1, .from_m = {0.015, 0, -0.1}, .to_m = {0.015, 0, 0.1}},
                  {.body = 0, .to = -1, .from_m = {-0.015, 0, -0.1}, .to_m = {-0.015, 0, 0.1}},
                  {.body = 1, .to = -1, .from_m = {0.09, 0, -0.28}, .to_m = {0.09, 0, 0.1}}};
       break;
     default:  // a chain of three links with a ball at its end
-      w.bodies = {make_body("plate", t.plate, {0, -0.037, -0.3})};
+      w.bodies = {make_springy("plate", t.plate, {0, -0.037, -0.3})};
       w.bodies[0].fixed = true;
       for (int i = 0; i < 3; ++i) {
-        w.bodies.push_back(make_body("link" + std::to_string(i), t.link, {0, 0.03 + 0.06 * i, 0}));
+        w.bodies.push_back(make_springy("link" + std::to_string(i), t.link, {0, 0.03 + 0.06 * i, 0}));
         w.bodies.back().initial.rotation = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};
         w.joints.push_back({.kind = Kind::kBall, .body = i + 1, .to = i == 0 ? -1 : i, .at_m = {0, 0.06 * i, 0}});
       }
-      w.bodies.push_back(make_body("ball", t.ball, {0, 0.21, 0}));
+      w.bodies.push_back(make_springy("ball", t.ball, {0, 0.21, 0}));
       w.joints.push_back({.kind = Kind::kBall, .body = 4, .to = 3, .at_m = {0, 0.18, 0}});
       break;
   }
