@@ -84,7 +84,10 @@ void restart_with_fitting_kernels(char** argv) {
   if (getauxval(AT_BASE) == 0) return;  // Started by naming the dynamic linker: that is what would start again.
   setenv(kChosenByUser, fitting.c_str(), 1);
   setenv(kSeenBefore, kernels.c_str(), 1);
-  (void)execv("/proc/self/exe", argv);
+  // By its path, so that it keeps its name in lists of processes.
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (!error) (void)execv(self.c_str(), argv);
   unsetenv(kChosenByUser);  // Nothing has happened: on with what there is.
   unsetenv(kSeenBefore);
 }

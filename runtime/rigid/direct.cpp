@@ -104,7 +104,7 @@ class System {
 
 }  // namespace
 
-bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses) {
+bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses, bool are_swept) {
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   prepare(movers, points);
   const int bodies = static_cast<int>(movers.size());
@@ -116,7 +116,7 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
     const Point& p = points[i];
     const double push = dot(p.impulse, p.normal);
     const Vec3 across = p.impulse - push * p.normal;
-    const bool slides = push > 0.0 && norm(across) >= kAtCone * p.friction * push;
+    const bool slides = are_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
     if (slides) sliding[i] = across;
     holds.push_back(slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen);
   }

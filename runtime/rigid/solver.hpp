@@ -46,7 +46,9 @@ class Solver {
   /// The same problem by factorisation, for what sweeps take too long for (towers, unequal masses): guesses which points carry and stick,
   /// solves, corrects the guess from the answer, in at most `most_guesses`. Redundant points share their load evenly. True where the guess
   /// was confirmed; the impulses obey all bounds in any case. False where bodies are on joints.
-  bool solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses);
+  /// `are_swept`: the impulses given are an answer of sweeps, and points at their bound slide in the first guess; otherwise all that carry
+  /// stick in it.
+  bool solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses, bool are_swept = false);
   int get_sweeps() const { return sweeps_; }
 
  private:

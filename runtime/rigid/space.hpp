@@ -286,7 +286,9 @@ class Space {
   void predict(const Island& island, double h, bool at_rest);
   Point make_point(const Contact& contact) const;
   void make_points(Island& island, double h, bool leaves_impacts);
-  Point make_lasting_point(const Contact& contact, double h) const;
+  double calc_patch_radius(const Contact& contact) const;
+  Vec3 calc_travelled(Pair& pair, shape::Touch touch) const;
+  Point make_lasting_point(Pair& pair, const Contact& contact, double h) const;
   Point make_cord_point(const Contact& contact, double h) const;
   void solve(double tolerance_m_s);
   void sum_turned();

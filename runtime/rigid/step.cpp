@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -18,20 +19,21 @@ namespace {
 using impact::cross;
 using impact::dot;
 
-constexpr double kShortest = 1e-9;  // s; what is left of a step and shorter than this is not made
-constexpr double kSettling = 0.02;  // m/s; a group that is slower is about to rest
-constexpr double kAtRest = 1e-6;    // m/s
-constexpr double kSlow = 5e-3;      // m/s; of what may be about to rest
-constexpr double kPatience = 0.02;  // s; for so long
-constexpr double kLong = 0.3;       // s; what was slow for so long is no faster than kSlow: less balance is enough
-constexpr int kMostAtOnce = 12;     // bodies that are about to rest and are factorised without sweeps before
-constexpr double kLoose = 100.0;    // times the tolerance
-constexpr int kGuesses = 6;         // of a factorised problem in a step
-constexpr int kMostGuesses = 12;    // where rest is to be proven
-constexpr double kRetry = 4e-3;     // s; a group whose guesses failed goes by sweeps for so long
-constexpr int kMostMissed = 30;     // in a step: instants at which nothing struck after all
-constexpr int kMostImpacts = 3;     // of a group in a step, each at its instant; a group with more is crowded
-constexpr double kCrowded = 2e-3;   // s; for so long after
+constexpr double kShortest = 1e-9;                           // s; what is left of a step and shorter than this is not made
+constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
+constexpr double kSettling = 0.02;                           // m/s; a group that is slower is about to rest
+constexpr double kAtRest = 1e-6;                             // m/s
+constexpr double kSlow = 5e-3;                               // m/s; of what may be about to rest
+constexpr double kPatience = 0.02;                           // s; for so long
+constexpr double kLong = 0.3;                                // s; what was slow for so long is no faster than kSlow: less balance is enough
+constexpr int kMostAtOnce = 12;                              // bodies that are about to rest and are factorised without sweeps before
+constexpr double kLoose = 100.0;                             // times the tolerance
+constexpr int kGuesses = 6;                                  // of a factorised problem in a step
+constexpr int kMostGuesses = 12;                             // where rest is to be proven
+constexpr double kRetry = 4e-3;                              // s; a group whose guesses failed goes by sweeps for so long
+constexpr int kMostMissed = 30;                              // in a step: instants at which nothing struck after all
+constexpr int kMostImpacts = 8;                              // of a group in a step, each at its instant; a group with more is crowded
+constexpr double kCrowded = 2e-3;                            // s; for so long after
 
 }  // namespace
 
@@ -122,6 +124,7 @@ void Space::predict(const Island& island, double h, bool at_rest) {
     movers_[n] = {1.0 / solids_[i].mass_kg, there.inverse_inertia, to.velocity, there.spin};
     free_spin_[n] = there.spin;
     free_[n] = there;
+    free_centre_[n] = to.centre;
   }
 }
 
@@ -137,11 +140,34 @@ Point Space::make_point(const Contact& c) const {
   return p;
 }
 
+/// Of the Hertz contact under the load of the last step [m]; 0 without.
+double Space::calc_patch_radius(const Contact& c) const {
+  const double push = c.step_s > 0.0 ? dot(c.impulse, c.touch.normal) / c.step_s : 0.0;
+  if (!(push > 0.0)) return 0.0;
+  const Elasticity a = get_elasticity(c.a), b = get_elasticity(c.b);
+  const double compliance =
+      (1.0 - a.poisson_ratio * a.poisson_ratio) / a.young_modulus_pa + (1.0 - b.poisson_ratio * b.poisson_ratio) / b.young_modulus_pa;
+  return std::cbrt(0.75 * push * calc_contact_radius(c.touch, c.a, c.b) * compliance);
+}
+
+/// Where a smooth touch will be at the end of the step, contacts apart.
+Vec3 Space::calc_travelled(Pair& pair, shape::Touch touch) const {
+  const auto get_frame = [&](int body) {
+    if (body < 0) return shape::Frame{};
+    const int n = find_index(body);
+    return n >= 0 ? free_[static_cast<std::size_t>(n)].frame : placed_[static_cast<std::size_t>(body)].frame;
+  };
+  shape::refresh(touch, *solid(pair.a).shape, get_frame(pair.a), get_shape(pair.b), get_frame(pair.b), pair.memory);
+  return touch.where_m;
+}
+
 /// A touch that lasts, as a row of the step.
-Point Space::make_lasting_point(const Contact& c, double h) const {
+Point Space::make_lasting_point(Pair& pair, const Contact& c, double h) const {
   const shape::Touch& t = c.touch;
   const double approach = calc_approach(c);
   Point p = make_point(c);
+  // The touch of a curved surface travels over it: where it will be.
+  const Vec3 later = t.smooth ? calc_travelled(pair, t) : Vec3{};
   // Where the impulse acts: half a step on, the same point for both bodies.
   struct Side {
     Vec3 middle{}, first{}, last{};  // centre half a step on; arms at both ends
@@ -159,7 +185,7 @@ Point Space::make_lasting_point(const Contact& c, double h) const {
       side.centre = free_centre_[n];
     }
     side.first = t.where_m - states_[i].centre;
-    side.last = t.smooth ? side.first : free_[n].rotation * (transpose(placed_[i].rotation) * side.first);
+    side.last = t.smooth ? later - free_centre_[n] : free_[n].rotation * (transpose(placed_[i].rotation) * side.first);
     return side;
   };
   Vec3 where{};
@@ -193,7 +219,7 @@ Point Space::make_lasting_point(const Contact& c, double h) const {
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && curvature > 0.0) {
     p.rolling_m = options_.rolling_resistance / curvature;
-    p.twisting_m = 1e-2 * p.friction / curvature;
+    p.twisting_m = kDrilling * p.friction * calc_patch_radius(c);
   }
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   p.couple = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.couple;
@@ -213,7 +239,7 @@ void Space::make_points(Island& island, double h, bool leaves_impacts) {
       // The impact has these bodies; what stands still and rings goes on carrying others.
       if (c.cord < 0 && (has_impact(pair->a) || has_impact(pair->b))) continue;
       if (t.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(gravity_) * h * h && !c.touching) continue;
-      const Point p = c.cord >= 0 ? make_cord_point(c, h) : make_lasting_point(c, h);
+      const Point p = c.cord >= 0 ? make_cord_point(c, h) : make_lasting_point(*pair, c, h);
       points_.push_back(p);
       rows_.push_back({pair, k});
     }
@@ -246,11 +272,6 @@ void Space::solve(double tolerance_m_s) {
     }
     return gained > 1e-9 * size;
   };
-  const auto factorise = [&] {
-    if (solver_.solve_directly(movers_, points_, kGuesses) && !gains()) return true;
-    for (const int body : *stepped_) next_guess_s_[static_cast<std::size_t>(body)] = time_s_ + kRetry;
-    return false;
-  };
   double fastest = 0.0;
   for (std::size_t n = 0; n < stepped_->size(); ++n) {
     const auto i = static_cast<std::size_t>((*stepped_)[n]);
@@ -258,17 +279,24 @@ void Space::solve(double tolerance_m_s) {
   }
   const int count = static_cast<int>(movers_.size());
   const bool settles = fastest < kSettling;
+  const bool is_small = count <= options_.most_direct;
+  const auto factorise = [&](bool are_swept) {
+    if (solver_.solve_directly(movers_, points_, is_small ? kMostGuesses : kGuesses, are_swept) && !gains()) return true;
+    if (!is_small)
+      for (const int body : *stepped_) next_guess_s_[static_cast<std::size_t>(body)] = time_s_ + kRetry;
+    return false;
+  };
   const auto sweep = [&](int most) {
-    const bool is_loose = !settles && count > options_.most_direct;  // what moves fast needs less than what is about to stand still
+    const bool is_loose = !settles && !is_small;  // what moves fast needs less than what is about to stand still
     const double tolerance = (is_loose ? kLoose : 1.0) * tolerance_m_s, left = solver_.solve(movers_, points_, tolerance, most);
     costs_.sweeps += solver_.get_sweeps();
     return left <= tolerance && !gains();
   };
   const bool may_guess =
       std::all_of(stepped_->begin(), stepped_->end(), [&](int body) { return time_s_ >= next_guess_s_[static_cast<std::size_t>(body)]; });
-  const bool at_once = count <= (settles ? kMostAtOnce : options_.most_direct);
+  const bool at_once = is_small || (settles && count <= kMostAtOnce);
   if (at_once && may_guess) {
-    if (factorise()) return;
+    if (factorise(false)) return;
     movers_ = free;
     points_ = begun;
   }
@@ -277,7 +305,7 @@ void Space::solve(double tolerance_m_s) {
     // From the guess that the sweeps have made; they would let a pile tremble for long.
     const std::vector<Point> swept = points_;
     movers_ = free;
-    if (factorise()) return;
+    if (factorise(true)) return;
     movers_ = free;
     points_ = swept;
     sweep(2);
@@ -313,7 +341,9 @@ State Space::calc_moved(std::size_t n, double part_s, double step_s) const {
   to.centre = to.centre + (0.5 * part_s * part_s) * gained;
   const Vec3 spun = movers_[n].spin - free_spin_[n];
   to.rotation = normalise(multiply(make_turn((0.5 * part_s * part_s / step_s) * spun), to.rotation));
-  to.momentum = to.momentum + (part_s / step_s) * turned_[n];
+  // The impulses act at the middle of the part: there the centre is less far than where their arms begin.
+  const Vec3 late = cross((0.5 * (step_s - part_s)) * states_[i].velocity, (solids_[i].mass_kg * step_s) * gained);
+  to.momentum = to.momentum + (part_s / step_s) * (turned_[n] + late);
   return to;
 }
 

@@ -27,6 +27,21 @@ inline bank::Bank make_bank(const shape::tests::Solid& solid, const bank::Materi
   return bank;
 }
 
+/// Invented modes on the surface of a bank: every vertex moves in a direction of its own.
+inline bank::Bank add_modes(bank::Bank bank, int modes) {
+  for (int m = 0; m < modes; ++m) {
+    const double omega = 2.0 * M_PI * 300.0 * std::pow(1.13, m);
+    bank.eigenvalue_rad2_s2.push_back(omega * omega);
+    bank.decay_per_s.push_back(2.0 + 1e-6 * omega);
+    bank.residual.push_back(1e-10);
+    bank.radiation_gain.push_back(1.0);
+    bank.shape_scale.push_back(1.0 / 32767.0);
+  }
+  const std::size_t count = bank.vertices_m.size() * static_cast<std::size_t>(modes) * 3;
+  for (std::size_t i = 0; i < count; ++i) bank.shape.push_back(static_cast<std::int16_t>(32767.0 * std::sin(1.7 * static_cast<double>(i))));
+  return bank;
+}
+
 inline BodySpec make_body(std::string name, const bank::Bank& bank, const Vec3& position, double restitution = 0.3) {
   BodySpec body;
   body.name = std::move(name);

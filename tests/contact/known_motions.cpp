@@ -162,5 +162,31 @@ TEST(Dominoes, WithoutFrictionFallAsFastAsTheTrainThatLeans) {
   }
 }
 
+TEST(Rolling, AThinDiscOnItsRimPrecessesAtTheSteadyRate) {
+  // A disc without thickness that leans by a and rolls about a fixed centre turns about the vertical at sqrt(4 g/(r sin a)): H. K. Moffatt,
+  // "Euler's disk and its finite-time singularity", Nature 404 (2000), eq. 2.
+  for (const double degrees : {14.0, 30.0}) {
+    const double radius = 0.075, thickness = 0.002, a = degrees * M_PI / 180, rate = std::sqrt(4.0 * 9.81 / (radius * std::sin(a)));
+    const bank::Bank disc = make_bank(shape::tests::make_cylinder(radius, thickness, 96));
+    WorldSpec w;
+    w.ground = GroundSpec{.friction = 0.8};
+    const double height = radius * std::sin(a) + 0.5 * thickness * std::cos(a);
+    w.bodies = {make_body(disc, {0, 0, height}, 0.8)};
+    w.bodies[0].initial.rotation = {std::cos(a / 2), std::sin(a / 2), 0, 0};
+    w.bodies[0].angular_velocity_rad_s = {0, rate * std::sin(a) * std::cos(a), rate * std::sin(a) * std::sin(a)};
+    const auto motions = run(w, 1.0)[0];
+    double turned = 0.0, before = 0.0, lowest = height;
+    for (std::size_t i = 0; i < motions.size(); ++i) {
+      const auto& q = motions[i].rotation;  // where the axis of the disc leans to
+      const double angle = std::atan2(2 * (q[2] * q[3] - q[0] * q[1]), 2 * (q[1] * q[3] + q[0] * q[2]));
+      if (i > 0) turned += std::remainder(angle - before, 2 * M_PI);
+      before = angle;
+      lowest = std::min(lowest, motions[i].position_m[2]);
+    }
+    EXPECT_NEAR(std::abs(turned) / rate, 1.0, 0.03) << degrees << " degrees";
+    EXPECT_GT(lowest, height - 2e-3) << degrees << " degrees";  // rolling resistance takes 1e-3 of the weight times the way of the rim
+  }
+}
+
 }  // namespace
 }  // namespace carillon::contact::tests

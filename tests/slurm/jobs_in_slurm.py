@@ -79,7 +79,7 @@ class Store:
         deadline = time.monotonic() + 100
         while True:
             ranks = [int(pid) for pid in subprocess.run(["pgrep", "-f", "carillon-precompute job.json"], capture_output=True, text=True).stdout.split()
-                     if os.path.exists(f"/proc/{pid}/cwd") and os.readlink(f"/proc/{pid}/cwd") == str(self.work(job)) and comm(pid).startswith("carillon-precom")]
+                     if os.path.exists(f"/proc/{pid}/cwd") and os.readlink(f"/proc/{pid}/cwd") == str(self.work(job)) and program(pid) == "carillon-precompute"]
             progress = self.work(job) / "progress.jsonl"
             if len(ranks) == count and progress.exists() and progress.stat().st_size > 0:
                 return ranks
@@ -87,9 +87,9 @@ class Store:
             time.sleep(0.2)
 
 
-def comm(pid):
+def program(pid):
     try:
-        return pathlib.Path(f"/proc/{pid}/comm").read_text()
+        return os.path.basename(os.readlink(f"/proc/{pid}/exe"))
     except OSError:
         return ""
 
