@@ -14,6 +14,7 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
+#include <filesystem>
 #include <string_view>
 
 #include "precompute/petsc/session.hpp"
