@@ -398,6 +398,7 @@ void Iteration::project(bool is_first, Small& alpha) {
       largest = std::max(largest, part);
     }
     if (!is_spared_) orthogonality_.clear(std::sqrt(largest));
+    orthogonality_.put_back(locked_orthogonality_.calc_returned(lossy_, parts, next.count));
     if (taken < kTaken) break;
   }
 }
@@ -544,6 +545,7 @@ int Iteration::orthonormalise_by_columns(Small& r) {
 void Iteration::project_after_all() {
   is_spared_ = false;
   orthogonality_.clear(0);
+  orthogonality_.put_back(0);
   lossy_ = locked_orthogonality_.get_all();
   const Columns next = w_.part(0, width_);
   const Columns next_mass = z_.part(0, width_);

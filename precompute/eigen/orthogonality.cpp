@@ -1,6 +1,8 @@
 // Method:     With A V = V T + w E^T, S_j = V^T M V_j obeys S_{j+1} R_j = T S_j - S_j alpha_j - S_{j-1} R_{j-1}^T + rounding, where the
 //             rows of the last two blocks are left out, as these are always projected out. The rounding is the operator's: it is measured
-//             whenever the basis is projected out with all of it orthogonal. Locked eigenvectors have their theta in the place of T.
+//             whenever the basis is projected out with all of it orthogonal. Locked eigenvectors have their theta in the place of T;
+//             c = L^T M w taken out of w leaves V^T M L c along V, which is bounded by what was left standing of L, and projected out
+//             where that is too much.
 // Source:     Simon, The Lanczos algorithm with partial reorthogonalization, Math. Comp. 42, 1984; Grimes, Lewis, Simon, A shifted block
 //             Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 3.3.
 // Deviations: whole matrices go through the recurrence where they bound norms, which is sharper and costs next to nothing; rounding is
@@ -70,7 +72,7 @@ void Orthogonality::clear(double norm) { left_ = (worst_ + kRounding) * norm; }
 
 bool Orthogonality::is_still_good(const State& state, const std::vector<double>& r, int next_width, bool is_spared) const {
   const double divisor = calc_divisor(r, next_width, state.width);
-  return is_spared ? largest_ < kTolerable * divisor : left_ <= kLeftStanding * divisor;
+  return is_spared ? largest_ + returned_ < kTolerable * divisor : left_ + returned_ <= kLeftStanding * divisor;
 }
 
 void Orthogonality::learn(const State& state, const double* c, int stride) {
@@ -93,12 +95,12 @@ void Orthogonality::advance(const State& state, const std::vector<double>& r, in
   const std::size_t all = m + next;
   since_spared_ = is_spared ? 0 : since_spared_ + 1;
   divisor_ = calc_divisor(r, next_width, state.width);
-  const double cleared = std::max(kRounding, is_spared || !(divisor_ > 0) ? 0 : left_ / divisor_);
+  const double cleared = std::max(kRounding, divisor_ > 0 ? ((is_spared ? 0 : left_) + returned_) / divisor_ : 0);
   std::vector<double> product(all * next);
   for (std::size_t j = 0; j < next; ++j) {
     for (std::size_t i = 0; i < m; ++i) {
       const double random = 2 * petsc::make_noise(i, j);
-      product[j * all + i] = is_spared && i < known && next == b ? foreseen_[j * m + i] + noise_ * random : cleared * random;
+      product[j * all + i] = is_spared && i < known && next == b ? foreseen_[j * m + i] + (noise_ + returned_) * random : cleared * random;
     }
     product[j * all + m + j] = 1;
   }
@@ -110,7 +112,7 @@ void Orthogonality::advance(const State& state, const std::vector<double>& r, in
   for (std::size_t j = 0; j < next; ++j) {
     for (std::size_t i = 0; i < m; ++i) worst_ = std::max(worst_, std::abs(product[j * all + i]));
   }
-  left_ = 0;
+  left_ = returned_ = 0;
   before_.clear();
   if (last_.size() == m * b) {
     before_.resize(all * b);
@@ -136,7 +138,8 @@ LockedRange LockedOrthogonality::find_lossy(const Orthogonality::State& state, c
   const auto width = static_cast<std::size_t>(state.width);
   const auto old = static_cast<std::size_t>(state.size - state.previous - state.width);
   foreseen_.assign(rows * width, 0.0);
-  largest_ = 0;
+  largest_ = scale_ = 0;
+  for (std::size_t i = 0; i < width * width; ++i) scale_ = std::max(scale_, std::abs(alpha[i]));
   if (rows == 0 || clean_ == 0 || last_.size() != rows * width || before_.size() != rows * old) return get_all();
   PetscBLASInt m = static_cast<PetscBLASInt>(rows), b = state.width, k = static_cast<PetscBLASInt>(old), stride = state.stride;
   double one = 1, minus = -1;
@@ -174,8 +177,21 @@ void LockedOrthogonality::learn(LockedRange range, const double* c, int width) {
       noise_[row] = std::max(noise_[row], measured);
     } else if (measured > told) {
       noise_[row] *= measured < kMost * told ? measured / told : kMost;
+      // An eigenvector that is not exact has a residual along a few directions, and the row jumps when the basis reaches them.
+      left_[row] = std::max(left_[row], (measured - told) / std::max(std::abs(theta_[row]), scale_));
     }
   }
+}
+
+double LockedOrthogonality::calc_returned(LockedRange range, const std::vector<double>& c, int width) const {
+  double largest = 0;
+  for (int j = 0; j < width; ++j) {
+    double sum = 0;
+    for (int i = 0; i < range.count; ++i)
+      sum += left_[static_cast<std::size_t>(range.first + i)] * std::abs(c[static_cast<std::size_t>(j * range.count + i)]);
+    largest = std::max(largest, sum);
+  }
+  return largest;
 }
 
 bool LockedOrthogonality::is_still_good(const Orthogonality::State& state, const std::vector<double>& r, int next_width) const {

@@ -30,6 +30,9 @@ class Orthogonality {
   void learn(const State& state, const double* c, int stride);
   /// After the last pass of a projection, which took `norm` away from a column at most: V is not quite orthogonal, and leaves a part of it.
   void clear(double norm);
+  /// After the last pass, spared or not: what the step took out of w of locked modes has left at most this much along the basis, which is
+  /// not quite orthogonal to them (LockedOrthogonality::calc_returned).
+  void put_back(double returned) { returned_ = returned; }
   /// After the step: whether w, made a block with R (next_width, width), did without the projection indeed, or with as many passes as it
   /// had. R is known only then, and where the space is nearly exhausted it shrinks w by far more than the R before.
   bool is_still_good(const State& state, const std::vector<double>& r, int next_width, bool is_spared) const;
@@ -44,6 +47,7 @@ class Orthogonality {
   double noise_ = 0;              // what rounding adds to V^T M w; 0: not yet measured
   double worst_ = 0;              // entry of V^T M V - 1 so far
   double left_ = 0;               // of V^T M w by the projection
+  double returned_ = 0;           // to V^T M w with what was taken of locked modes
   double divisor_ = 0;            // by which R shrinks w at most, from the last step
   int since_spared_ = 0;
 };
@@ -69,17 +73,20 @@ class LockedOrthogonality {
   LockedRange find_lossy(const Orthogonality::State& state, const double* alpha);
   /// c = L^T M w of a range as it was measured, (range.count, width).
   void learn(LockedRange range, const double* c, int width);
+  /// An entry of V^T M L c at most, c = L^T M w of a range that is being subtracted from w.
+  double calc_returned(LockedRange range, const std::vector<double>& c, int width) const;
   bool is_still_good(const Orthogonality::State& state, const std::vector<double>& r, int next_width) const;
   /// After the step, which was cleared of `range`.
   void advance(const Orthogonality::State& state, const std::vector<double>& r, int next_width, LockedRange range);
   LockedRange get_all() const { return {0, static_cast<int>(theta_.size())}; }
-  /// (count) the largest entries of L^T M V_j that were left standing, as foreseen.
+  /// (count) the largest entries of L^T M V_j that were left standing, as foreseen, or as a later step has shown.
   const std::vector<double>& get_left() const { return left_; }
 
  private:
   std::vector<double> theta_;
   std::vector<double> foreseen_;  // L^T M w, (count, width)
   double largest_ = 0;            // of its rows that are not lossy
+  double scale_ = 0;              // largest entry of alpha
   std::vector<double> last_;      // L^T M V_j
   std::vector<double> before_;    // L^T M V_{j-1}
   std::vector<double> noise_;     // (count) what rounding, and the error of the eigenvector, add to a row
