@@ -302,8 +302,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"cord_from_an_unknown_body",
                  with_cord(R"("from": {"body": "c", "at_m": [0, 0, 0]}, "to": {"at_m": [0, 0, 1]})"),
                  {":2:", "no body is called \"c\""}},
-        BadScene{
-            "cord_without_a_place", with_cord(R"("from": {"body": "a", "at_m": [0, 0, 0]}, "to": {"body": "b"})"), {":2:", "at_m", "missing"}},
+        BadScene{"cord_without_a_place",
+                 with_cord(R"("from": {"body": "a", "at_m": [0, 0, 0]}, "to": {"body": "b"})"),
+                 {":2:", "at_m", "missing"}},
         BadScene{"short_cord",
                  with_cord(R"("from": {"body": "a", "at_m": [0, 0, 0]}, "to": {"at_m": [0, 0, 1]}, "length_m": 0.5)"),
                  {":2:", "length_m", "at least"}},
