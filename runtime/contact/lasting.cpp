@@ -11,11 +11,11 @@
 #include <numbers>
 
 #include "runtime/config/chance.hpp"
+#include "runtime/impact/spring.hpp"
 
 namespace carillon::contact {
 namespace {
 
-using impact::cross;
 using impact::dot;
 using impact::operator+;
 using impact::operator-;
@@ -32,12 +32,6 @@ constexpr double kSmallest = 1e-6;    // m; of a patch
 constexpr double kRollingSpin = 1.0;  // rad/s; slower, what sways stays where it is
 constexpr double kSharpest = 5e-4;    // m; radius of an edge that the mesh has sharp
 constexpr double kSticks = 1e-6;      // m/s; what is slower than this does not slip
-
-Vec3 calc_velocity(const rigid::Space& space, int body, const Vec3& where) {
-  if (body < 0 || space.solid(body).fixed) return {};
-  const rigid::State& s = space.state(body);
-  return s.velocity + cross(space.get_spin(body), where - s.centre);
-}
 
 std::uint64_t scramble(std::uint64_t state) { return config::draw(state); }
 
@@ -86,7 +80,7 @@ std::vector<LastingContacts::Group> LastingContacts::make_groups(const rigid::Sp
       g.push_n += push;
       g.where = g.where + push * c.touch.where_m;
       g.normal = g.normal + push * c.touch.normal;
-      g.carried = g.carried + push * calc_velocity(space, c.touch.side_a == shape::Side::plane ? g.b : g.a, c.touch.where_m);
+      g.carried = g.carried + push * space.calc_velocity(c.touch.side_a == shape::Side::plane ? g.b : g.a, c.touch.where_m);
       g.curvature_per_m += push * (c.touch.curvature_a_per_m + c.touch.curvature_b_per_m);
       g.smooth = g.smooth || c.touch.smooth;
       g.features.push_back(c.touch.id);
@@ -104,11 +98,9 @@ std::vector<LastingContacts::Group> LastingContacts::make_groups(const rigid::Sp
 }
 
 double LastingContacts::calc_patch(const Group& g, double radius_m) const {
-  const auto calc_compliance = [&](int body) {
-    const Matter& m = get_matter(body);
-    return (1.0 - m.poisson_ratio * m.poisson_ratio) / m.young_modulus_pa;
-  };
-  return std::max(kSmallest, std::cbrt(0.75 * g.push_n * radius_m * (calc_compliance(g.a) + calc_compliance(g.b))));
+  const Matter &a = get_matter(g.a), &b = get_matter(g.b);
+  const double compliance = impact::calc_contact_compliance(a.young_modulus_pa, a.poisson_ratio, b.young_modulus_pa, b.poisson_ratio);
+  return std::max(kSmallest, impact::calc_patch_radius(g.push_n, radius_m, compliance));
 }
 
 /// Of a plane wave into the body over the patch. Poisson's ratio is kept from 1/2, where the wave would be of infinite speed.
@@ -127,7 +119,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / (5.0 * calc_spot_radius(space, g.a, g.b)), 1.0 / kSharpest);
   }
   spot.recorded_s = time_s;
-  const Vec3 va = calc_velocity(space, g.a, g.where), vb = calc_velocity(space, g.b, g.where), u = va - vb;
+  const Vec3 va = space.calc_velocity(g.a, g.where), vb = space.calc_velocity(g.b, g.where), u = va - vb;
   Vec3 slip = u - dot(u, g.normal) * g.normal;
   if (norm(slip) < kSticks) slip = {};
   const auto calc_sweep = [&](const Vec3& surface) {

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/rigid/limits.hpp"
+
 namespace carillon::contact {
 namespace {
 
@@ -15,11 +17,11 @@ using impact::dot;
 using impact::operator+;
 using impact::operator-;
 using impact::operator*;
+using rigid::kSlowest;
 using rigid::norm;
 using stream::Vec3;
 
-constexpr double kSlowest = 1e-3;  // m/s; of an impact
-constexpr double kMasked = 0.01;   // of the largest impulse of the same instant: 40 dB below it
+constexpr double kMasked = 0.01;  // of the largest impulse of the same instant: 40 dB below it
 
 /// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
@@ -105,7 +107,7 @@ void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingC
       spot.push_back(&hit);
       wait_s = std::min(wait_s, hit.approach_m_s > kSlowest ? hit.touch.gap_m / hit.approach_m_s : 0.0);
     }
-    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -strike.together_s, strike.together_s), most_push, lasting, events);
+    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kTogether, strike.together_s), most_push, lasting, events);
   }
 }
 

@@ -16,6 +16,7 @@
 #include "runtime/contact/mode_sets.hpp"
 #include "runtime/contact/pulses.hpp"
 #include "runtime/rigid/groups.hpp"
+#include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
 
 namespace carillon::contact {
@@ -110,8 +111,8 @@ rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
 }
 
 void add_modes(rigid::Solid& solid, const bank::Bank& bank, ModeSets& sets) {
-  if (bank.mode_count() == 0) return;
   solid.modes = sets.find(bank);
+  if (!solid.modes) return;
   solid.find_shape = [&bank](const shape::Place& place) { return bank::calc_shapes(bank, place.triangle, place.barycentric); };
 }
 
@@ -321,8 +322,8 @@ class World::Course {
   }
 
  private:
-  static constexpr double kShortest = 2e-7;  // s; what is nearer than this to the end of a window has reached it
-  static constexpr double kEarliest = 1e-4;  // s; a pulse found in a window may have begun so much before it
+  static constexpr double kShortest = 2e-7;              // s; what is nearer than this to the end of a window has reached it
+  static constexpr double kEarliest = rigid::kTogether;  // a pulse found in a window may have begun so much before it (pulses.cpp)
 
   int count() const { return static_cast<int>(space_.states().size()); }
   bool is_over() const { return options_.end_s - reached_s_ <= kShortest; }

@@ -29,10 +29,19 @@ double calc_mean_power(double y0, double y1, double p) {
 
 }  // namespace
 
-double calc_hertz_stiffness(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double radius_m) {
-  const double compliance = (1.0 - poisson_a * poisson_a) / young_a_pa + (1.0 - poisson_b * poisson_b) / young_b_pa;
-  return 4.0 / 3.0 / compliance * std::sqrt(radius_m);
+double calc_contact_compliance(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b) {
+  return (1.0 - poisson_a * poisson_a) / young_a_pa + (1.0 - poisson_b * poisson_b) / young_b_pa;
 }
+
+double calc_patch_radius(double force_n, double radius_m, double compliance_per_pa) {
+  return std::cbrt(0.75 * force_n * radius_m * compliance_per_pa);
+}
+
+double calc_hertz_stiffness(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double radius_m) {
+  return calc_hertz_stiffness(calc_contact_compliance(young_a_pa, poisson_a, young_b_pa, poisson_b), radius_m);
+}
+
+double calc_hertz_stiffness(double compliance_per_pa, double radius_m) { return 4.0 / 3.0 / compliance_per_pa * std::sqrt(radius_m); }
 
 double calc_spring_energy(const Spring& spring, double y) {
   return y > 0.0 ? spring.stiffness * y * calc_power(y, spring.exponent) / (spring.exponent + 1.0) : 0.0;

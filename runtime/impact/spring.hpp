@@ -11,8 +11,15 @@ struct Spring {
   double hysteresis_s_m = 0.0;  // chi >= 0
 };
 
+/// 1/E* [1/Pa] of two bodies: (1 - nu_a^2)/E_a + (1 - nu_b^2)/E_b.
+double calc_contact_compliance(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b);
+
+/// Radius of the Hertz contact under a force [N]: cbrt(3/4 F R/E*) [m] (K. L. Johnson, "Contact mechanics" (1985), eq. 4.22).
+double calc_patch_radius(double force_n, double radius_m, double compliance_per_pa);
+
 /// 4/3 E* sqrt(R) [N/m^1.5] of two bodies: Young's moduli [Pa], Poisson's ratios, R [m] of the summed curvatures.
 double calc_hertz_stiffness(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double radius_m);
+double calc_hertz_stiffness(double compliance_per_pa, double radius_m);
 
 /// V(y) = K y^(p+1)/(p+1) [J]; 0 for y < 0.
 double calc_spring_energy(const Spring& spring, double y);

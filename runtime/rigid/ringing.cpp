@@ -91,9 +91,7 @@ shape::Place Space::find_place(int body, const shape::Touch& touch, bool is_a) c
 }
 
 impact::Spring Space::make_spring(const shape::Touch& touch, int a, int b) const {
-  const Elasticity ea = get_elasticity(a), eb = get_elasticity(b);
-  return {.stiffness = impact::calc_hertz_stiffness(ea.young_modulus_pa, ea.poisson_ratio, eb.young_modulus_pa, eb.poisson_ratio,
-                                                    calc_contact_radius(touch, a, b))};
+  return {.stiffness = impact::calc_hertz_stiffness(calc_compliance(a, b), calc_contact_radius(touch, a, b))};
 }
 
 /// Caps the restitution of every hit by what its modes take; true where an impact has to be integrated.

@@ -137,6 +137,8 @@ class Space {
   bool is_all_asleep() const;
   /// Where all is asleep: to the end of the next window, without a step.
   void skip_window(double end_s);
+  /// Of the point of a body that is there [m/s]; the ground and what is fixed have none.
+  Vec3 calc_velocity(int body, const Vec3& where) const;
   const Vec3& get_spin(int body) const { return placed_[static_cast<std::size_t>(body)].spin; }
   /// Contacts of bodies that are awake.
   void list_contacts(std::vector<const Contact*>& out) const;
@@ -191,9 +193,6 @@ class Space {
     Contact& get() const { return pair->contacts[contact]; }
     bool operator==(const Ref&) const = default;
   };
-  struct Elasticity {
-    double young_modulus_pa = 0.0, poisson_ratio = 0.0;
-  };
 
   /// The modal state of a body at a time.
   struct Ring {
@@ -234,7 +233,6 @@ class Space {
   double calc_pair_restitution(int a, int b) const;
   double calc_pair_speed(int a, int b) const;
   double calc_pair_size(int a, int b) const;
-  Vec3 calc_velocity(int body, const Vec3& where) const;
   double calc_approach(const Contact& contact) const;
   shape::Box calc_box(int body, double grown_m) const;
 
@@ -302,7 +300,7 @@ class Space {
   bool rests(Island& island, double h);
 
   // strike.cpp: impacts
-  Elasticity get_elasticity(int body) const;
+  double calc_compliance(int a, int b) const;
   double calc_contact_radius(const shape::Touch& touch, int a, int b) const;
   bool is_fast(const Contact& contact, double h) const;
   bool find_impact(const Island& island, double h, double& at_s, std::vector<Ref>& first);
@@ -397,7 +395,6 @@ class Space {
 };
 
 /// Hertz contact time [s]: 2.87 (m^2 / (R E*^2 v))^(1/5) (K. L. Johnson, "Contact mechanics" (1985), eq. 11.24), kept within 5 us .. 20 ms.
-double calc_hertz_duration(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double radius_m, double mass_kg,
-                           double speed_m_s);
+double calc_hertz_duration(double compliance_per_pa, double radius_m, double mass_kg, double speed_m_s);
 
 }  // namespace carillon::rigid

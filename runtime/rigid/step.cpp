@@ -13,6 +13,7 @@
 
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
+
 namespace carillon::rigid {
 namespace {
 
@@ -144,10 +145,7 @@ Point Space::make_point(const Contact& c) const {
 double Space::calc_patch_radius(const Contact& c) const {
   const double push = c.step_s > 0.0 ? dot(c.impulse, c.touch.normal) / c.step_s : 0.0;
   if (!(push > 0.0)) return 0.0;
-  const Elasticity a = get_elasticity(c.a), b = get_elasticity(c.b);
-  const double compliance =
-      (1.0 - a.poisson_ratio * a.poisson_ratio) / a.young_modulus_pa + (1.0 - b.poisson_ratio * b.poisson_ratio) / b.young_modulus_pa;
-  return std::cbrt(0.75 * push * calc_contact_radius(c.touch, c.a, c.b) * compliance);
+  return impact::calc_patch_radius(push, calc_contact_radius(c.touch, c.a, c.b), calc_compliance(c.a, c.b));
 }
 
 /// Where a smooth touch will be at the end of the step, contacts apart.

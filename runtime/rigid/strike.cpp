@@ -24,15 +24,16 @@ constexpr double kLongestHertz = 20e-3;
 
 }  // namespace
 
-double calc_hertz_duration(double young_a, double poisson_a, double young_b, double poisson_b, double radius, double mass, double speed) {
-  const double compliance = (1 - poisson_a * poisson_a) / young_a + (1 - poisson_b * poisson_b) / young_b;
+double calc_hertz_duration(double compliance, double radius, double mass, double speed) {
   const double duration = 2.87 * std::pow(mass * mass * compliance * compliance / (radius * std::max(speed, 1e-3)), 0.2);
   return std::clamp(duration, 5e-6, kLongestHertz);
 }
 
-Space::Elasticity Space::get_elasticity(int body) const {
-  if (body < 0) return {ground_->young_modulus_pa, ground_->poisson_ratio};
-  return {solid(body).young_modulus_pa, solid(body).poisson_ratio};
+/// 1/E* of two bodies, or of one and the ground [1/Pa].
+double Space::calc_compliance(int a, int b) const {
+  const double young = b >= 0 ? solid(b).young_modulus_pa : ground_->young_modulus_pa;
+  const double poisson = b >= 0 ? solid(b).poisson_ratio : ground_->poisson_ratio;
+  return impact::calc_contact_compliance(solid(a).young_modulus_pa, solid(a).poisson_ratio, young, poisson);
 }
 
 /// 1/R is the summed curvature, kept within 1/(0.5 mm) and one over half the size of the smaller body.
@@ -42,9 +43,7 @@ double Space::calc_contact_radius(const shape::Touch& touch, int a, int b) const
 }
 
 double Space::calc_contact_time(const Hit& hit, double mass_kg, double speed_m_s) const {
-  const Elasticity a = get_elasticity(hit.a), b = get_elasticity(hit.b);
-  return calc_hertz_duration(a.young_modulus_pa, a.poisson_ratio, b.young_modulus_pa, b.poisson_ratio,
-                             calc_contact_radius(hit.touch, hit.a, hit.b), mass_kg, speed_m_s);
+  return calc_hertz_duration(calc_compliance(hit.a, hit.b), calc_contact_radius(hit.touch, hit.a, hit.b), mass_kg, speed_m_s);
 }
 
 /// Will this touch come so fast within the step that it strikes?

@@ -200,6 +200,30 @@ TEST(Slices, EndWithAMarkThatNothingIsBefore) {
   EXPECT_EQ(mark, 0.5);
 }
 
+TEST(Slices, OfACrowdEndWithMarksThatNothingIsBefore) {
+  // A pile, whose groups strike once a step: pulses have their own instants all the same.
+  const bank::Bank box = make_box({0.06, 0.05, 0.04});
+  WorldSpec w;
+  w.ground = GroundSpec{};
+  for (int i = 0; i < 20; ++i) {
+    w.bodies.push_back(
+        make_body("box " + std::to_string(i), box, {0.045 * (i % 2 ? 1 : -1), 0.045 * (i / 2 % 2 ? 1 : -1), 0.06 + 0.09 * (i / 4)}));
+    const double half = 0.5 * (0.3 + 0.7 * i);
+    w.bodies.back().initial.rotation = {std::cos(half), 0.6 * std::sin(half), 0.0, 0.8 * std::sin(half)};
+  }
+  for (const double step_s : {2.5e-4, 2e-3}) {
+    World world(w, {.contact_step_s = step_s, .end_s = 0.6});
+    double mark = -1.0;
+    int impulses = 0;
+    world.advance(0.6, kForever, [&](const stream::Event& e) {
+      EXPECT_GE(stream::get_time_s(e), mark);
+      if (std::holds_alternative<stream::Mark>(e)) mark = stream::get_time_s(e);
+      if (std::holds_alternative<stream::Impulse>(e)) ++impulses;
+    });
+    EXPECT_GT(impulses, 200);
+  }
+}
+
 TEST(Slices, OfCpuEndAfterOneStep) {
   const bank::Bank box = make_box({0.06, 0.05, 0.04});
   World world(make_rain(box, 20), {.end_s = 1.0});
