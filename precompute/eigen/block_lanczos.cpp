@@ -352,7 +352,7 @@ void Iteration::start() {
   previous_ = 0;
 }
 
-// w -= (everything so far) (everything so far)^T M w, after the recurrence has taken the bulk away; where little is foreseen to be left,
+// w -= (everything so far) (everything so far)^T M w, after the recurrence has taken the bulk away; where little is predicted to be left,
 // only the blocks that the recurrence couples to. alpha: (width, width) the diagonal block.
 void Iteration::project(bool is_first, Small& alpha) {
   const Columns next = w_.part(0, is_first ? block_ : width_);
@@ -829,7 +829,7 @@ void Iteration::clear_nearest(const Ritz& ritz, int count) {
   }
 }
 
-// What was left standing of locked modes.
+// What remained of locked modes.
 void Iteration::clear_locked(int count) {
   const std::vector<double>& left = locked_orthogonality_.get_left();
   const auto is_left = [](double x) { return x > kLeft; };

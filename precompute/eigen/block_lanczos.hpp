@@ -52,7 +52,7 @@ struct LockedModes {
 };
 
 /// Modes that the iteration stays orthogonal to. They are taken as they are, which is what makes hundreds of them cheap
-/// (EPSSetDeflationSpace orthonormalises anew, vector by vector), and what they weigh in a step is foreseen (orthogonality.hpp). Must
+/// (EPSSetDeflationSpace orthonormalises anew, vector by vector), and what they weigh in a step is predicted (orthogonality.hpp). Must
 /// outlive the solve; null: none. Logically collective.
 PetscErrorCode set_locked(EPS eps, const LockedModes* locked);
 

@@ -1,7 +1,7 @@
 // Method:     With A V = V T + w E^T, S_j = V^T M V_j obeys S_{j+1} R_j = T S_j - S_j alpha_j - S_{j-1} R_{j-1}^T + rounding, where the
 //             rows of the last two blocks are left out, as these are always projected out. The rounding is the operator's: it is measured
 //             whenever the basis is projected out with all of it orthogonal. Locked eigenvectors have their theta in the place of T;
-//             c = L^T M w taken out of w leaves V^T M L c along V, which is bounded by what was left standing of L, and projected out
+//             c = L^T M w taken out of w leaves V^T M L c along V, which is bounded by what remained of L, and projected out
 //             where that is too much.
 // Source:     Simon, The Lanczos algorithm with partial reorthogonalization, Math. Comp. 42, 1984; Grimes, Lewis, Simon, A shifted block
 //             Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 3.3.
@@ -24,10 +24,10 @@ extern "C" void dtrtri_(const char* half, const char* diagonal, const int* n, do
 namespace carillon::eigen {
 namespace {
 
-constexpr double kGoodEnough = 2e-8;     // largest entry of V^T M V_j that is left standing
+constexpr double kGoodEnough = 2e-8;     // largest entry of V^T M V_j that remains
 constexpr double kLeftStanding = 1e-10;  // the same, after a projection
-constexpr double kTolerable = 2e-7;      // the same, where R turns out smaller than foreseen
-constexpr double kGoodForNow = 1e-7;     // largest entry of L^T M V_j that is left standing until the end: what it does to T is its square
+constexpr double kTolerable = 2e-7;      // the same, where R turns out smaller than predicted
+constexpr double kGoodForNow = 1e-7;     // largest entry of L^T M V_j that remains until the end: what it does to T is its square
 constexpr double kTolerableForNow = 1e-6;
 constexpr int kCleanBlocks = 3;                                            // wholly cleared of what is locked, before any is spared
 constexpr double kRounding = 10 * std::numeric_limits<double>::epsilon();  // the same after a projection
@@ -53,17 +53,17 @@ void Orthogonality::forget() {
 bool Orthogonality::is_good(const State& state, const double* alpha) {
   const auto size = static_cast<std::size_t>(state.size);
   const auto width = static_cast<std::size_t>(state.width);
-  foreseen_.assign(size * width, 0.0);
+  predicted_.assign(size * width, 0.0);
   if (last_.size() != size * width || before_.empty()) return false;
   PetscBLASInt m = state.size, b = state.width, old = state.size - state.previous - state.width, stride = state.stride;
   double one = 1, minus = -1, zero = 0;
   const double* r = state.t + static_cast<std::ptrdiff_t>(state.size - state.width) * state.stride + state.previous;
-  BLASgemm_("N", "N", &m, &b, &m, &one, state.t, &stride, last_.data(), &m, &zero, foreseen_.data(), &m);
-  BLASgemm_("N", "N", &m, &b, &b, &minus, last_.data(), &m, alpha, &b, &one, foreseen_.data(), &m);
-  BLASgemm_("N", "N", &m, &b, &old, &minus, before_.data(), &m, r, &stride, &one, foreseen_.data(), &m);
+  BLASgemm_("N", "N", &m, &b, &m, &one, state.t, &stride, last_.data(), &m, &zero, predicted_.data(), &m);
+  BLASgemm_("N", "N", &m, &b, &b, &minus, last_.data(), &m, alpha, &b, &one, predicted_.data(), &m);
+  BLASgemm_("N", "N", &m, &b, &old, &minus, before_.data(), &m, r, &stride, &one, predicted_.data(), &m);
   largest_ = noise_;
   for (std::size_t j = 0; j < width; ++j) {
-    for (int i = 0; i < state.previous; ++i) largest_ = std::max(largest_, std::abs(foreseen_[j * size + static_cast<std::size_t>(i)]));
+    for (int i = 0; i < state.previous; ++i) largest_ = std::max(largest_, std::abs(predicted_[j * size + static_cast<std::size_t>(i)]));
   }
   return noise_ > 0 && largest_ < kGoodEnough * divisor_;
 }
@@ -76,11 +76,11 @@ bool Orthogonality::is_still_good(const State& state, const std::vector<double>&
 }
 
 void Orthogonality::learn(const State& state, const double* c, int stride) {
-  if (since_spared_ < 2) return;  // What is foreseen then is partly noise itself.
+  if (since_spared_ < 2) return;  // What is predicted then is partly noise itself.
   double largest = 0;
   for (int j = 0; j < state.width; ++j) {
     for (int i = 0; i < state.previous; ++i) {
-      const double told = foreseen_[static_cast<std::size_t>(j) * static_cast<std::size_t>(state.size) + static_cast<std::size_t>(i)];
+      const double told = predicted_[static_cast<std::size_t>(j) * static_cast<std::size_t>(state.size) + static_cast<std::size_t>(i)];
       largest = std::max(largest, std::abs(c[static_cast<std::ptrdiff_t>(j) * stride + i] - told));
     }
   }
@@ -100,7 +100,7 @@ void Orthogonality::advance(const State& state, const std::vector<double>& r, in
   for (std::size_t j = 0; j < next; ++j) {
     for (std::size_t i = 0; i < m; ++i) {
       const double random = 2 * petsc::make_noise(i, j);
-      product[j * all + i] = is_spared && i < known && next == b ? foreseen_[j * m + i] + (noise_ + returned_) * random : cleared * random;
+      product[j * all + i] = is_spared && i < known && next == b ? predicted_[j * m + i] + (noise_ + returned_) * random : cleared * random;
     }
     product[j * all + m + j] = 1;
   }
@@ -137,7 +137,7 @@ LockedRange LockedOrthogonality::find_lossy(const Orthogonality::State& state, c
   const std::size_t rows = theta_.size();
   const auto width = static_cast<std::size_t>(state.width);
   const auto old = static_cast<std::size_t>(state.size - state.previous - state.width);
-  foreseen_.assign(rows * width, 0.0);
+  predicted_.assign(rows * width, 0.0);
   largest_ = scale_ = 0;
   for (std::size_t i = 0; i < width * width; ++i) scale_ = std::max(scale_, std::abs(alpha[i]));
   if (rows == 0 || clean_ == 0 || last_.size() != rows * width || before_.size() != rows * old) return get_all();
@@ -145,14 +145,14 @@ LockedRange LockedOrthogonality::find_lossy(const Orthogonality::State& state, c
   double one = 1, minus = -1;
   const double* r = state.t + static_cast<std::ptrdiff_t>(state.size - state.width) * state.stride + state.previous;
   for (std::size_t j = 0; j < width; ++j) {
-    for (std::size_t i = 0; i < rows; ++i) foreseen_[j * rows + i] = theta_[i] * last_[j * rows + i];
+    for (std::size_t i = 0; i < rows; ++i) predicted_[j * rows + i] = theta_[i] * last_[j * rows + i];
   }
-  BLASgemm_("N", "N", &m, &b, &b, &minus, last_.data(), &m, alpha, &b, &one, foreseen_.data(), &m);
-  BLASgemm_("N", "N", &m, &b, &k, &minus, before_.data(), &m, r, &stride, &one, foreseen_.data(), &m);
+  BLASgemm_("N", "N", &m, &b, &b, &minus, last_.data(), &m, alpha, &b, &one, predicted_.data(), &m);
+  BLASgemm_("N", "N", &m, &b, &k, &minus, before_.data(), &m, r, &stride, &one, predicted_.data(), &m);
   if (clean_ < kCleanBlocks) return get_all();
   std::vector<double> loss = noise_;
   for (std::size_t j = 0; j < width; ++j) {
-    for (std::size_t i = 0; i < rows; ++i) loss[i] = std::max(loss[i], std::abs(foreseen_[j * rows + i]));
+    for (std::size_t i = 0; i < rows; ++i) loss[i] = std::max(loss[i], std::abs(predicted_[j * rows + i]));
   }
   const auto is_lossy = [&](double x) { return !(x < kGoodForNow * divisor_); };
   const auto first = std::find_if(loss.begin(), loss.end(), is_lossy);
@@ -171,7 +171,7 @@ void LockedOrthogonality::learn(LockedRange range, const double* c, int width) {
     double measured = 0, told = 0;
     for (int j = 0; j < width; ++j) {
       measured = std::max(measured, std::abs(c[static_cast<std::ptrdiff_t>(j) * range.count + i]));
-      told = std::max(told, std::abs(foreseen_[static_cast<std::size_t>(j) * rows + row]));
+      told = std::max(told, std::abs(predicted_[static_cast<std::size_t>(j) * rows + row]));
     }
     if (clean_ > 0 && clean_ < kCleanBlocks) {
       noise_[row] = std::max(noise_[row], measured);
@@ -208,7 +208,7 @@ void LockedOrthogonality::advance(const Orthogonality::State& state, const std::
   last_.assign(rows * next, 0.0);
   if (!is_cleared) {
     for (std::size_t j = 0; j < next; ++j) {
-      for (std::size_t i = 0; i < rows; ++i) last_[j * rows + i] = foreseen_[j * rows + i] + noise_[i] * 2 * petsc::make_noise(i, j);
+      for (std::size_t i = 0; i < rows; ++i) last_[j * rows + i] = predicted_[j * rows + i] + noise_[i] * 2 * petsc::make_noise(i, j);
     }
     PetscBLASInt m = static_cast<PetscBLASInt>(rows), width = state.width;
     double one = 1;

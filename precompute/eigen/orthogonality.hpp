@@ -25,7 +25,7 @@ class Orthogonality {
   void forget();
   /// Before the projection: whether w = A V_j - V_j alpha - V_{j-1} R^T, made a block, would do without. alpha: (width, width).
   bool is_good(const State& state, const double* alpha);
-  /// After the first pass of a projection: c = V^T M w as it was measured, (size, width) with stride `stride`. What was not foreseen is
+  /// After the first pass of a projection: c = V^T M w as it was measured, (size, width) with stride `stride`. What was not predicted is
   /// rounding, and expected again.
   void learn(const State& state, const double* c, int stride);
   /// After the last pass of a projection, which took `norm` away from a column at most: V is not quite orthogonal, and leaves a part of it.
@@ -40,15 +40,15 @@ class Orthogonality {
   void advance(const State& state, const std::vector<double>& r, int next_width, bool is_spared);
 
  private:
-  std::vector<double> foreseen_;  // V^T M w, (size, width)
-  double largest_ = 0;            // of it and of noise_
-  std::vector<double> last_;      // V^T M V_j, (size, width)
-  std::vector<double> before_;    // V^T M V_{j-1}, (size, width of that block)
-  double noise_ = 0;              // what rounding adds to V^T M w; 0: not yet measured
-  double worst_ = 0;              // entry of V^T M V - 1 so far
-  double left_ = 0;               // of V^T M w by the projection
-  double returned_ = 0;           // to V^T M w with what was taken of locked modes
-  double divisor_ = 0;            // by which R shrinks w at most, from the last step
+  std::vector<double> predicted_;  // V^T M w, (size, width)
+  double largest_ = 0;             // of it and of noise_
+  std::vector<double> last_;       // V^T M V_j, (size, width)
+  std::vector<double> before_;     // V^T M V_{j-1}, (size, width of that block)
+  double noise_ = 0;               // what rounding adds to V^T M w; 0: not yet measured
+  double worst_ = 0;               // entry of V^T M V - 1 so far
+  double left_ = 0;                // of V^T M w by the projection
+  double returned_ = 0;            // to V^T M w with what was taken of locked modes
+  double divisor_ = 0;             // by which R shrinks w at most, from the last step
   int since_spared_ = 0;
 };
 
@@ -79,17 +79,17 @@ class LockedOrthogonality {
   /// After the step, which was cleared of `range`.
   void advance(const Orthogonality::State& state, const std::vector<double>& r, int next_width, LockedRange range);
   LockedRange get_all() const { return {0, static_cast<int>(theta_.size())}; }
-  /// (count) the largest entries of L^T M V_j that were left standing, as foreseen, or as a later step has shown.
+  /// (count) the largest entries of L^T M V_j that remained, as predicted, or as a later step has shown.
   const std::vector<double>& get_left() const { return left_; }
 
  private:
   std::vector<double> theta_;
-  std::vector<double> foreseen_;  // L^T M w, (count, width)
-  double largest_ = 0;            // of its rows that are not lossy
-  double scale_ = 0;              // largest entry of alpha
-  std::vector<double> last_;      // L^T M V_j
-  std::vector<double> before_;    // L^T M V_{j-1}
-  std::vector<double> noise_;     // (count) what rounding, and the error of the eigenvector, add to a row
+  std::vector<double> predicted_;  // L^T M w, (count, width)
+  double largest_ = 0;             // of its rows that are not lossy
+  double scale_ = 0;               // largest entry of alpha
+  std::vector<double> last_;       // L^T M V_j
+  std::vector<double> before_;     // L^T M V_{j-1}
+  std::vector<double> noise_;      // (count) what rounding, and the error of the eigenvector, add to a row
   std::vector<double> left_;
   double divisor_ = 0;
   int clean_ = 0;  // blocks in a row that were cleared of everything

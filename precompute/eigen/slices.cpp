@@ -2,7 +2,7 @@
 //             logarithms; below the first one that counts anything, the power of the next interval, or the usual one, is taken.
 // Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994, section 4 (shifts by
 //             counts). Courant, Hilbert, Methods of mathematical physics I, 1953, section VI.4: powers of 1 (bending plates) to 3 (solids).
-// Deviations: a slice ends where it was foreseen to, not where its pairs stop to converge.
+// Deviations: a slice ends where it was predicted to, not where its pairs stop to converge.
 #include "precompute/eigen/slices.hpp"
 
 #include <algorithm>
@@ -80,9 +80,9 @@ Sweep::Part Sweep::take() {
   double under = 0;          // the shift
   bool is_cluster = false;
   for (int trial = 0;; ++trial) {
-    const double foreseen = std::midpoint(rest_.low, counts_.find_lambda(below_low + share, kNearEnd));
+    const double predicted = std::midpoint(rest_.low, counts_.find_lambda(below_low + share, kNearEnd));
     part.sigma = is_cluster ? many : std::midpoint(few, many);
-    if (trial < kTrials && !is_cluster) part.sigma = std::clamp(foreseen, std::lerp(few, many, kNearEnd), std::lerp(many, few, kNearEnd));
+    if (trial < kTrials && !is_cluster) part.sigma = std::clamp(predicted, std::lerp(few, many, kNearEnd), std::lerp(many, few, kNearEnd));
     const std::int64_t below = count_below_(part.sigma);
     counts_.add(part.sigma, below);
     part.below_sigma = below;
@@ -94,9 +94,9 @@ Sweep::Part Sweep::take() {
   }
   const double reach = part.sigma - rest_.low;
   const double wanted = std::max(share, 1.25 * under);
-  const double foreseen = counts_.find_lambda(below_low + wanted, 0);
-  part.slice.high = is_cluster ? std::max(foreseen, many * (1 + kNarrow))
-                               : std::clamp(foreseen, part.sigma + reach / kLopsided, part.sigma + reach * kLopsided);
+  const double predicted = counts_.find_lambda(below_low + wanted, 0);
+  part.slice.high = is_cluster ? std::max(predicted, many * (1 + kNarrow))
+                               : std::clamp(predicted, part.sigma + reach / kLopsided, part.sigma + reach * kLopsided);
   part.slice.high = std::min(part.slice.high, rest_.high);
   part.slice.below_high = rest_.below_low + static_cast<std::int64_t>(wanted);
   return part;

@@ -1,3 +1,4 @@
+// The reader of one format, a short function for each of its keys; longer than most files.
 #include "runtime/host/scene.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// One integration, whose bodies, contacts, modes and books change together in every step; longer than most files.
 // Method: see impact.hpp. A row is a direction of relative motion at a contact; phi of a row has the sign of the body in it, so that the
 // motion of row r is  free_r + sum_s A_rs f_s,   A = h^2/2 J M^-1 J^T + sum over modes phi_r g phi_s.
 // One pass over the modes of a step takes the force in and finds where they go freely in the next.

@@ -32,10 +32,7 @@ Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional
   asleep_.assign(solids_.size(), 0);
   flying_.assign(solids_.size(), 0);
   in_ringing_.assign(solids_.size(), 0);
-  slow_s_.assign(solids_.size(), 0.0);
-  crowded_until_s_.assign(solids_.size(), 0.0);
-  next_proof_s_.assign(solids_.size(), 0.0);
-  next_guess_s_.assign(solids_.size(), 0.0);
+  paces_.resize(solids_.size());
   reach_m_s_.assign(solids_.size(), 0.0);
   flew_from_ = states_;
   index_.assign(solids_.size(), -1);
@@ -195,7 +192,7 @@ void Space::open_window(double end_s) {
     states_[n] = fly(solids_[n], states_[n], gravity_, length);
     check_finite(i);
     place_body(i);
-    slow_s_[n] = 0.0;
+    paces_[n].slow_s = 0.0;
     ++costs_.body_steps;
   }
   fly_windows_of_linked(active, length);
@@ -288,7 +285,7 @@ void Space::wake(int body) {
     const auto n = static_cast<std::size_t>(i);
     if (!asleep_[n]) continue;
     asleep_[n] = 0;
-    slow_s_[n] = 0.0;
+    paces_[n].slow_s = 0.0;
     flying_[n] = 0;
     reach_m_s_[n] = norm(gravity_) * kWindow;
     for (auto& [key, pair] : pairs_) {

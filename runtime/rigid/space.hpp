@@ -186,6 +186,13 @@ class Space {
     std::vector<int> bodies;
     std::vector<Pair*> pairs;
   };
+  /// What a body's group has done lately, and what it may try.
+  struct Pace {
+    double slow_s = 0.0;           // it has been slow for so long
+    double crowded_until_s = 0.0;  // its impacts come all at once until then
+    double next_proof_s = 0.0;     // when rest may be looked for again
+    double next_guess_s = 0.0;     // when factorisation may be tried again
+  };
   /// A contact by its place in a pair.
   struct Ref {
     Pair* pair = nullptr;
@@ -361,7 +368,8 @@ class Space {
   std::vector<Pair> cord_pairs_;  // one a cord
   std::vector<Placed> placed_;
   std::vector<char> asleep_, flying_, in_ringing_;
-  std::vector<double> slow_s_, reach_m_s_, crowded_until_s_, next_proof_s_, next_guess_s_;
+  std::vector<Pace> paces_;
+  std::vector<double> reach_m_s_;
   std::vector<State> flew_from_;
   std::optional<Ground> ground_;
   Vec3 gravity_{};

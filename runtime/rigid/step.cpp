@@ -46,7 +46,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
   bool begun = false;
   const double g = norm(gravity_);
   const bool is_crowded = std::any_of(island.bodies.begin(), island.bodies.end(),
-                                      [&](int body) { return crowded_until_s_[static_cast<std::size_t>(body)] > start_s; });
+                                      [&](int body) { return paces_[static_cast<std::size_t>(body)].crowded_until_s > start_s; });
   if (is_crowded) {
     strike_at_once(island, start_s, step_s);
     impacts = kMostImpacts;
@@ -90,7 +90,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
 }
 
 void Space::note_crowd(const Island& island, double time_s) {
-  for (const int body : island.bodies) crowded_until_s_[static_cast<std::size_t>(body)] = time_s + kCrowded;
+  for (const int body : island.bodies) paces_[static_cast<std::size_t>(body)].crowded_until_s = time_s + kCrowded;
 }
 
 /// The impacts of a crowded group: all touches that close within a step strike at its beginning.
@@ -281,7 +281,7 @@ void Space::solve(double tolerance_m_s) {
   const auto factorise = [&](bool are_swept) {
     if (solver_.solve_directly(movers_, points_, is_small ? kMostGuesses : kGuesses, are_swept) && !gains()) return true;
     if (!is_small)
-      for (const int body : *stepped_) next_guess_s_[static_cast<std::size_t>(body)] = time_s_ + kRetry;
+      for (const int body : *stepped_) paces_[static_cast<std::size_t>(body)].next_guess_s = time_s_ + kRetry;
     return false;
   };
   const auto sweep = [&](int most) {
@@ -290,8 +290,8 @@ void Space::solve(double tolerance_m_s) {
     costs_.sweeps += solver_.get_sweeps();
     return left <= tolerance && !gains();
   };
-  const bool may_guess =
-      std::all_of(stepped_->begin(), stepped_->end(), [&](int body) { return time_s_ >= next_guess_s_[static_cast<std::size_t>(body)]; });
+  const bool may_guess = std::all_of(stepped_->begin(), stepped_->end(),
+                                     [&](int body) { return time_s_ >= paces_[static_cast<std::size_t>(body)].next_guess_s; });
   const bool at_once = is_small || (settles && count <= kMostAtOnce);
   if (at_once && may_guess) {
     if (factorise(false)) return;
@@ -448,8 +448,8 @@ bool Space::may_rest(const Island& island, double h) {
   for (const int body : island.bodies) {
     const auto i = static_cast<std::size_t>(body);
     const double speed = norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m;
-    slow_s_[i] = speed < kSlow && !has_impact(body) ? slow_s_[i] + h : 0.0;
-    all = all && slow_s_[i] > kPatience && time_s_ >= next_proof_s_[i];
+    paces_[i].slow_s = speed < kSlow && !has_impact(body) ? paces_[i].slow_s + h : 0.0;
+    all = all && paces_[i].slow_s > kPatience && time_s_ >= paces_[i].next_proof_s;
   }
   return all;
 }
@@ -472,7 +472,7 @@ bool Space::rests(Island& island, double h) {
   for (const int body : island.bodies) {
     State& s = states_[static_cast<std::size_t>(body)];
     kept.push_back(s);
-    slow_s = std::min(slow_s, slow_s_[static_cast<std::size_t>(body)]);
+    slow_s = std::min(slow_s, paces_[static_cast<std::size_t>(body)].slow_s);
     s.velocity = s.momentum = {};
     place_body(body);
   }
@@ -518,7 +518,7 @@ bool Space::rests(Island& island, double h) {
       lost_j_ += rigid::calc_kinetic(solids_[i], kept[n]);
     } else {
       states_[i] = kept[n];
-      next_proof_s_[i] = time_s_ + std::min(0.5 * slow_s, kLong);
+      paces_[i].next_proof_s = time_s_ + std::min(0.5 * slow_s, kLong);
       place_body(island.bodies[n]);
     }
   }

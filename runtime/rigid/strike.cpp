@@ -294,7 +294,7 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
   give_to_modes(record, give_impulses(record, points));
   for (const int body : record.bodies) {
     place_body(body);
-    slow_s_[static_cast<std::size_t>(body)] = 0.0;
+    paces_[static_cast<std::size_t>(body)].slow_s = 0.0;
     record.after.push_back(state(body));
     reach_out(body);
   }

@@ -1,3 +1,4 @@
+// One body's sound: all that acts on its modes acts on one state; longer than most files.
 // Method:     the modes ring by kernels.hpp, period by period. A strike is worked out as the answer of modes at rest, over the quanta that
 //             its pulse touches, and added to what rings: the modes are linear. Modes near and above critical damping are few and die at
 //             once; they go sample by sample in double precision. Groups of modes that cannot be heard any more are dropped from the

@@ -108,7 +108,7 @@ Outcome run_next_to_locked(int count, double error) {
 }
 
 // A locked mode with an error has a residual, which points where the basis comes late. What has come up of the mode until it is taken out
-// is then far more than foreseen, and taking it out turns the new block towards older ones. Residuals of 1e-6 and 3e-6 are far above
+// is then far more than predicted, and taking it out turns the new block towards older ones. Residuals of 1e-6 and 3e-6 are far above
 // rounding. Orthogonality that a step is not to lose: 2e-8.
 TEST(BlockLanczos, stays_orthogonal_next_to_locked_modes_with_errors) {
   for (const int count : {0, 1, 10, kLocked}) {

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "tests/rigid/momenta.hpp"
 #include "tests/shape/solids.hpp"
 
 namespace carillon::rigid {
@@ -135,21 +136,12 @@ TEST(joints, impulse_goes_through_a_chain) {
   states[2].velocity = {-3, 0.2, 0};
   Space space(std::move(solids), std::move(states), std::nullopt, {}, {.joint_tolerance = 1e-12},
               {.joints = {{.kind = joints::Kind::kBall, .body = 0, .to = 1, .at = {}}}, .cords = {}});
-  const auto calc = [&] {
-    Vec3 momentum{}, angular{};
-    for (int i = 0; i < 3; ++i) {
-      const Vec3 p = space.solid(i).mass_kg * space.state(i).velocity;
-      momentum = momentum + p;
-      angular = angular + cross(space.state(i).centre, p) + space.state(i).momentum;
-    }
-    return std::pair(momentum, angular);
-  };
-  const auto [p0, l0] = calc();
+  const rigid::Momenta before = rigid::add_up(space);
   run(space, 0.1);
-  const auto [p1, l1] = calc();
+  const rigid::Momenta after = rigid::add_up(space);
   EXPECT_GT(norm(space.state(1).velocity), 0.1);
-  EXPECT_LT(norm(p1 - p0), 1e-9 * norm(p0));
-  EXPECT_LT(norm(l1 - l0), 1e-7 * norm(l0));
+  EXPECT_LT(norm(after.linear - before.linear), 1e-9 * norm(before.linear));
+  EXPECT_LT(norm(after.angular - before.angular), 1e-7 * norm(before.angular));
   const Mat3 r0 = make_rotation(space.state(0).rotation), r1 = make_rotation(space.state(1).rotation);
   EXPECT_LT(norm(space.state(0).centre + r0 * Vec3{0, 0, 0.1} - space.state(1).centre - r1 * Vec3{0, 0, -0.1}), 1e-12);
 }
@@ -328,20 +320,11 @@ TEST(cords, two_balls_on_a_cord_keep_momentum) {
   states[1].velocity = {0.5, -0.2, 0.3};
   Space space(std::move(solids), std::move(states), std::nullopt, {}, {},
               {.joints = {}, .cords = {{.a = 0, .b = 1, .at_a = {}, .at_b = {}, .length_m = 0.2}}});
-  const auto calc = [&] {
-    Vec3 momentum{}, angular{};
-    for (int i = 0; i < 2; ++i) {
-      const Vec3 p = space.solid(i).mass_kg * space.state(i).velocity;
-      momentum = momentum + p;
-      angular = angular + cross(space.state(i).centre, p) + space.state(i).momentum;
-    }
-    return std::pair(momentum, angular);
-  };
-  const auto [p0, l0] = calc();
+  const rigid::Momenta before = rigid::add_up(space);
   run(space, 1.0);
-  const auto [p1, l1] = calc();
-  EXPECT_LT(norm(p1 - p0), 1e-12);
-  EXPECT_LT(norm(l1 - l0), 1e-6 * norm(l0));
+  const rigid::Momenta after = rigid::add_up(space);
+  EXPECT_LT(norm(after.linear - before.linear), 1e-12);
+  EXPECT_LT(norm(after.angular - before.angular), 1e-6 * norm(before.angular));
   EXPECT_NEAR(norm(space.state(0).centre - space.state(1).centre), 0.2, 3e-6);
 }
 

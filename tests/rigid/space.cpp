@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/rigid/momenta.hpp"
 #include "tests/shape/solids.hpp"
 
 namespace carillon::rigid {
@@ -30,23 +31,6 @@ Solid make_solid(const shape::tests::Solid& from, double mass_kg, const Vec3& si
   }
   for (const Vec3& x : from.vertices) s.radius_m = std::max(s.radius_m, norm(x));
   return s;
-}
-
-struct Momenta {
-  Vec3 linear{}, angular{};
-  double kinetic_j = 0.0;
-};
-
-Momenta add_up(const Space& space) {
-  Momenta sum;
-  for (int i = 0; i < static_cast<int>(space.states().size()); ++i) {
-    const State& s = space.state(i);
-    const Vec3 p = space.solid(i).mass_kg * s.velocity;
-    sum.linear = sum.linear + p;
-    sum.angular = sum.angular + cross(s.centre, p) + s.momentum;
-    sum.kinetic_j += calc_kinetic(space.solid(i), s);
-  }
-  return sum;
 }
 
 TEST(space, free_crowd_keeps_momentum_and_angular_momentum_and_gains_no_energy) {

@@ -215,7 +215,7 @@ def recommend_ranks(facts):
 
 
 def recommend_knob(knob, turns):
-    """A default of the runtime, by what the section on it measured. One looser setting that nobody tells apart is the distance that a default keeps, since other scenes are more sensitive; of more,
+    """A default of the runtime, by what the section on it measured. One looser setting that does not differ audibly is the distance that a default keeps, since other scenes are more sensitive; of more,
     those count that would save a hundredth of a core."""
     index = next(i for i, turn in enumerate(turns) if turn.setting == knob.default)
     usual = turns[index]
@@ -234,14 +234,14 @@ def recommend_modes(results):
     counts = [row for modes, _ in results.values() for row in modes[1:] if row.kept == "loudest"]
     fewest = {name: found for name, (modes, _) in results.items() if (found := banks.find_fewest(modes, "loudest"))}
     if counts and fewest:
-        figure = "; ".join(f"{name}: {row.modes} of {results[name][0][0].modes} are not told from all where it is struck" for name, row in fewest.items())
+        figure = "; ".join(f"{name}: {row.modes} of {results[name][0][0].modes} do not differ audibly from all where it is struck" for name, row in fewest.items())
         saving = median(results[name][0][0].played.cpu_ms / max(row.played.cpu_ms, 1e-9) for name, row in fewest.items())
         rows.append(("modes of a bank", "all of the band", figure + "; struck elsewhere other modes are the loudest, so the bank keeps all", "none", f"those alone: all take {saving:.2g} times their CPU time", True))
     bits = [row for _, tried in results.values() for row in tried[1:]]
     if bits:
         byte = [row for row in bits if row.bits == 8]
         shipped = max(banks.estimate_shipped_db(tried) for _, tried in results.values())
-        looser = f"8: {max(row.difference.error_db for row in byte):.0f} dB(A), told apart on {sum(row.difference.is_told for row in byte)} of {len(byte)}" if byte else "none was measured"
+        looser = f"8: {max(row.difference.error_db for row in byte):.0f} dB(A), audible on {sum(row.difference.is_told for row in byte)} of {len(byte)}" if byte else "none was measured"
         rows.append(("bits of a shape", str(banks.SHIPPED_BITS), f"an error of {shipped:.0f} dB(A) at most", "floats: twice the bytes", looser, shipped < sounds.ERROR_LIMIT_DB))
     return rows
 
@@ -273,7 +273,7 @@ def study(lab, bodies):
     if banks.NAME in lab.found:
         add_defaults(page, "bank", "Defaults of the bank (section banks).", recommend_modes(lab.found[banks.NAME]))
     if playing.NAME in lab.found:
-        add_defaults(page, "runtime", f"Defaults of the runtime (section playing). One agrees when nobody tells it from the most accurate setting and no more than one looser setting that nobody tells either would save {WORTH_MS:g} ms of CPU for a second.", [recommend_knob(knob, turns) for knob, turns in lab.found[playing.NAME]])
+        add_defaults(page, "runtime", f"Defaults of the runtime (section playing). One agrees when it does not differ audibly from the most accurate setting, and no more than one looser setting of which that is true, too, would save {WORTH_MS:g} ms of CPU for a second.", [recommend_knob(knob, turns) for knob, turns in lab.found[playing.NAME]])
     else:
         page.say("Defaults of bank and runtime: `--only banks playing advice`.")
     write(lab, bodies, lab.out / "advice.json")

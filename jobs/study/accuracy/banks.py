@@ -138,7 +138,7 @@ def measure_bits(lab, name, bank, bits=BITS):
 def describe_verdict(difference):
     if difference is None:
         return "the reference"
-    return "is told apart" if difference.is_told else "not told apart"
+    return "audible" if difference.is_told else "inaudible"
 
 
 def to_cells(row):
@@ -157,7 +157,7 @@ DATA = ("bank_bytes", "cpu_ms_per_s", "cpu_spread", *sounds.DATA)
 
 
 def find_fewest(rows, kept):
-    """The fewest modes of a kind from which on nothing is told apart; None when even the most are."""
+    """The fewest modes of a kind from which on nothing differs audibly; None when even the most are."""
     fewest = None
     for row in sorted((row for row in rows if row.kept == kept), key=lambda row: -row.modes):
         if row.difference.is_told:
@@ -173,12 +173,12 @@ def describe_modes(name, rows):
     for kept in dict.fromkeys(row.kept for row in rows[1:]):
         fewest = find_fewest(rows, kept)
         if fewest:
-            out.append(f"Of the {whole.modes} modes of the {name}, the {fewest.modes} {kept} do: nobody tells them from all ({fewest.difference.distance_db:.2f} dB log-spectral distance, "
+            out.append(f"Of the {whole.modes} modes of the {name}, the {fewest.modes} {kept} do: they do not differ audibly from all ({fewest.difference.distance_db:.2f} dB log-spectral distance, "
                        f"{sounds.format_change(fewest.difference.loudness_db)} dB loudness), with {100 * fewest.bank_bytes / whole.bank_bytes:.0f} % of the bank's bytes and "
                        f"{100 * fewest.played.cpu_ms / max(whole.played.cpu_ms, 1e-9):.0f} % of the CPU.")
         else:
             most = max((row for row in rows if row.kept == kept), key=lambda row: row.modes)
-            out.append(f"Of the {whole.modes} modes of the {name}, even the {most.modes} {kept} are told from all ({most.difference.distance_db:.2f} dB log-spectral distance, "
+            out.append(f"Of the {whole.modes} modes of the {name}, even the {most.modes} {kept} differ audibly from all ({most.difference.distance_db:.2f} dB log-spectral distance, "
                        f"{sounds.format_change(most.difference.loudness_db)} dB loudness).")
     return out
 
@@ -226,7 +226,7 @@ def describe_bits(name, bits):
     enough = [row for row in bits[1:] if not row.difference.is_told]
     if enough:
         least = min(enough, key=lambda row: row.bits)
-        text += f"{least.bits} bits are the fewest that nobody tells from them ({sounds.format_db(least.difference.error_db)} dB(A))"
+        text += f"{least.bits} bits are the fewest that do not differ audibly from them ({sounds.format_db(least.difference.error_db)} dB(A))"
     else:
         text += f"none of the coarser ones escapes the ear ({bits[1].bits} bits: {sounds.format_db(bits[1].difference.error_db)} dB(A))"
     byte = next((row for row in bits if row.bits == 8), None)
@@ -260,7 +260,7 @@ def add_charts(section, results):
             if group:
                 curves[label] = [(row.bank_bytes / 1e6, row.difference.distance_db) for row in group]
                 rows += [(name, label, r.modes, r.bits, r.bank_bytes, r.played.cpu_ms, r.difference.error_db, r.difference.distance_db) for r in group]
-        panels.append(plots.Panel(f"{name}: what is heard against bytes", "bank, MB", "log-spectral distance, dB", curves, levels=[(sounds.DISTANCE_LIMIT_DB, "1 dB: told apart above")], y_log=False))
+        panels.append(plots.Panel(f"{name}: what is heard against bytes", "bank, MB", "log-spectral distance, dB", curves, levels=[(sounds.DISTANCE_LIMIT_DB, "1 dB: audible above")], y_log=False))
         cpu = {label: [(row.played.cpu_ms, row.difference.distance_db) for row in modes if row.kept == kept] for label, kept in (("loudest modes", "loudest"), ("lowest modes", "lowest"))}
         panels.append(plots.Panel(f"{name}: what is heard against CPU", "CPU, ms for a second of sound", "log-spectral distance, dB", {k: v for k, v in cpu.items() if v}, levels=[(sounds.DISTANCE_LIMIT_DB, "1 dB")], x_log=False, y_log=False))
     svg = plots.draw_panels(panels, "Fewer modes, coarser shapes", "against the whole bank; three hard blows, heard at 1 m")
@@ -285,6 +285,6 @@ def study(lab, bodies):
 
 
 def describe_measures():
-    return (f"error, the A-weighted exposure of the difference below that of the reference (IEC 61672-1; it knows phases; below {sounds.ERROR_LIMIT_DB:.0f} dB nothing is told apart); log-spectral distance, root mean "
-            f"square of level differences in third-octave bands and frames of 43 ms, down to {sounds.RANGE_DB:.0f} dB below the loudest (below {sounds.DISTANCE_LIMIT_DB:.0f} dB, with no more than {100 * sounds.OUTLIER_LIMIT:.0f} % of the frames more than {sounds.OUTLIER_DB:.0f} dB off, not told apart, Paliwal & Atal 1993); change of "
+    return (f"error, the A-weighted exposure of the difference below that of the reference (IEC 61672-1; it knows phases; below {sounds.ERROR_LIMIT_DB:.0f} dB it is inaudible); log-spectral distance, root mean "
+            f"square of level differences in third-octave bands and frames of 43 ms, down to {sounds.RANGE_DB:.0f} dB below the loudest (below {sounds.DISTANCE_LIMIT_DB:.0f} dB, with no more than {100 * sounds.OUTLIER_LIMIT:.0f} % of the frames more than {sounds.OUTLIER_DB:.0f} dB off, inaudible, Paliwal & Atal 1993); change of "
             f"loudness, of the loudest A-weighted level within 0.2 s (10 dB are twice as many sones, ISO 131; {sounds.LOUDNESS_LIMIT_DB:.0f} dB is just heard, Jesteadt, Wier & Green 1977).")

@@ -202,7 +202,7 @@ def describe_difference(difference):
 
 
 def describe_knob(knob, turns):
-    """What the default is worth against the most accurate and the loosest setting that nobody tells apart."""
+    """What the default is worth against the most accurate and the loosest setting that does not differ audibly."""
     best, usual = turns[0], find_turn(turns, knob.default)
     cheap = None
     for one in turns[1:]:
@@ -216,10 +216,10 @@ def describe_knob(knob, turns):
         text = (f"{knob.title} (`{knob.key}`): the default, {format_setting(knob.default)}, takes {usual.cpu_ms:.2f} ms of {what} for a second where the most accurate one, {format_setting(best.setting)}, takes "
                 f"{best.cpu_ms:.2f}, and {describe_difference(usual.difference)}")
     if cheap is None:
-        return text + "; every looser setting is told apart."
+        return text + "; every looser setting differs audibly."
     if cheap is usual:
-        return text + "; it is the loosest that nobody tells apart."
-    return text + f"; the loosest that nobody tells apart is {format_setting(cheap.setting)}, {cheap.cpu_ms:.2f} ms, {sounds.format_db(cheap.difference.error_db)} dB(A)."
+        return text + "; it is the loosest that does not differ audibly."
+    return text + f"; the loosest that does not differ audibly is {format_setting(cheap.setting)}, {cheap.cpu_ms:.2f} ms, {sounds.format_db(cheap.difference.error_db)} dB(A)."
 
 
 def add_knob(section, knob, turns):
@@ -254,7 +254,7 @@ def add_chart(section, measured):
         points = [(one.cpu_ms, one.difference.error_db) for one in turns[1:] if one.difference.error_db > sounds.NONE_DB]
         rows += [(knob.key, format_setting(one.setting), *to_data(one)) for one in turns]
         panels.append(plots.Panel(knob.key, f"{'physics' if knob.physics else 'CPU'}, ms for a second", "error, dB(A)", {"settings": points},
-                                  levels=[(sounds.ERROR_LIMIT_DB, "-40 dB: not told apart below")], x_log=False, y_log=False))
+                                  levels=[(sounds.ERROR_LIMIT_DB, "-40 dB: inaudible below")], x_log=False, y_log=False))
     section.add_chart("knobs", plots.draw_panels(panels, "Each knob by itself", "error against the most accurate setting, and the CPU of a second of sound", 3), "Error of the sound against CPU, setting by setting.", rows)
 
 
@@ -306,4 +306,4 @@ def find_defaults(measured):
 def describe_defaults(measured):
     told = [f"`{knob.key}`" for knob, turns in measured if (usual := find_turn(turns, knob.default).difference) and usual.is_told]
     kept = [f"`{knob.key}` {format_setting(knob.default)}" for knob, turns in measured if f"`{knob.key}`" not in told]
-    return (f"Defaults that nobody tells from the most accurate setting: {', '.join(kept) or 'none'}." + (f" Defaults that are told from it: {', '.join(told)}." if told else ""))
+    return (f"Defaults that do not differ audibly from the most accurate setting: {', '.join(kept) or 'none'}." + (f" Defaults that do: {', '.join(told)}." if told else ""))

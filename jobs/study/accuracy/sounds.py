@@ -1,10 +1,10 @@
 """Sounds as carillon-render makes them, and how far two of them are apart.
 
 Three measures, each of the whole of two sounds at the same places:
-  error_db      exposure of the difference over that of the reference, both A-weighted (IEC 61672-1:2013, E.4.2) from 20 Hz to 20 kHz, all channels. It knows phases: below -40 dB nothing is told apart;
+  error_db      exposure of the difference over that of the reference, both A-weighted (IEC 61672-1:2013, E.4.2) from 20 Hz to 20 kHz, all channels. It knows phases: below -40 dB it is inaudible;
                 of two sounds that run out of step it says nothing.
   distance_db   log-spectral distance: root mean square, over third-octave bands (IEC 61260-1) and frames of 43 ms, of the difference of levels in dB. Cells count that either sound lifts above a floor:
-                60 dB below the reference's loudest cell of all and not below 0 dB re 20 uPa; what is softer counts as the floor. It knows no phases. Below 1 dB, with no more than 2 % of the frames more than 2 dB off (outliers), nothing is told apart (Paliwal & Atal 1993).
+                60 dB below the reference's loudest cell of all and not below 0 dB re 20 uPa; what is softer counts as the floor. It knows no phases. Below 1 dB, with no more than 2 % of the frames more than 2 dB off (outliers), it is inaudible (Paliwal & Atal 1993).
   loudness_db   change of the loudest A-weighted level within the ear's own time, 0.2 s (Zwislocki 1969), in dB(A): the model of loudness is ISO 131's, sones = 2^((L - 40 dB) / 10) with L the A-weighted level,
                 so that 10 dB double the loudness. 1 dB is just heard (Jesteadt, Wier & Green 1977).
 """
@@ -28,7 +28,7 @@ RANGE_DB = 60.0
 LOW_HZ, HIGH_HZ = 20.0, 20000.0
 # Full scale per pascal, in files of floating point: so small that nothing is ever scaled down.
 GAIN_PER_PA = 1e-6
-# Below these nobody tells two sounds apart (above).
+# Below these two sounds do not differ audibly (above).
 NONE_DB = -200.0  # the same but for the rounding of these sums
 ERROR_LIMIT_DB, DISTANCE_LIMIT_DB, LOUDNESS_LIMIT_DB = -40.0, 1.0, 1.0
 OUTLIER_DB, OUTLIER_LIMIT = 2.0, 0.02

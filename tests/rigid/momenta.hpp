@@ -1,0 +1,25 @@
+// What a space holds of momentum, angular momentum about the origin and kinetic energy.
+#pragma once
+
+#include "runtime/rigid/space.hpp"
+
+namespace carillon::rigid {
+
+struct Momenta {
+  Vec3 linear{}, angular{};
+  double kinetic_j = 0.0;
+};
+
+inline Momenta add_up(const Space& space) {
+  Momenta sum;
+  for (int i = 0; i < static_cast<int>(space.states().size()); ++i) {
+    const State& s = space.state(i);
+    const Vec3 p = space.solid(i).mass_kg * s.velocity;
+    sum.linear = sum.linear + p;
+    sum.angular = sum.angular + impact::cross(s.centre, p) + s.momentum;
+    sum.kinetic_j += calc_kinetic(space.solid(i), s);
+  }
+  return sum;
+}
+
+}  // namespace carillon::rigid
