@@ -33,7 +33,7 @@ alignas(16) std::array<char, kStack> alternate_stack;
 
 bool guarded = false;
 const char* program_name = "";
-double limit_s = 0;
+double limit_s = 0;  // set by us; 0: none, and what ends the process is a limit that it came with
 // What the handlers write, each a whole line.
 std::array<char, 1024> crash_line{}, time_line{};
 
@@ -45,14 +45,14 @@ void store(std::array<char, 1024>& line, const std::string& text) {
   std::memcpy(line.data(), text.data(), length);
 }
 
-void write_and_end(const char* line) {
+void write_and_end(const char* line, int code) {
   const std::size_t length = ::strnlen(line, 1024);
   [[maybe_unused]] const auto written = ::write(STDERR_FILENO, line, length);
-  ::_exit(kExitInput);
+  ::_exit(code);
 }
 
-void end_by_crash(int) { write_and_end(crash_line.data()); }
-void end_by_time(int) { write_and_end(time_line.data()); }
+void end_by_crash(int) { write_and_end(crash_line.data(), kExitInput); }
+void end_by_time(int) { write_and_end(time_line.data(), limit_s > 0 ? kExitInput : kExitSystem); }
 
 }  // namespace
 
@@ -83,10 +83,15 @@ void set_guarded_step(std::string_view file, std::string_view step) {
   const std::string place = file.empty() ? std::string(program_name) : fmt::format("{}: {}", program_name, file.substr(0, 300));
   store(crash_line,
         fmt::format("{}: the mesher broke down at the step '{}': the surface is one that it cannot take; {}", place, step, kAdvice));
-  store(
-      time_line,
-      fmt::format("{}: the mesher was ended at the step '{}' after {:.0f} s of processor time, far more than a body of this size takes; {}",
-                  place, step, limit_s, kAdvice));
+  if (limit_s > 0)
+    store(time_line,
+          fmt::format(
+              "{}: the mesher was ended at the step '{}' after {:.0f} s of processor time, far more than a body of this size takes; {}",
+              place, step, limit_s, kAdvice));
+  else
+    store(time_line,
+          fmt::format("{}: the mesher was ended at the step '{}': the processor time that this process may use is over (ulimit -t)", place,
+                      step));
 }
 
 CpuLimit::CpuLimit(double seconds) {
@@ -101,11 +106,12 @@ CpuLimit::CpuLimit(double seconds) {
   before_ = limit.rlim_cur;
   limit.rlim_cur = wanted;
   set_ = ::setrlimit(RLIMIT_CPU, &limit) == 0;
-  limit_s = seconds;
+  if (set_) limit_s = seconds;
 }
 
 CpuLimit::~CpuLimit() {
   rlimit limit{};
+  limit_s = 0;
   if (!set_ || ::getrlimit(RLIMIT_CPU, &limit) != 0) return;
   limit.rlim_cur = before_;
   ::setrlimit(RLIMIT_CPU, &limit);

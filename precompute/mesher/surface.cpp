@@ -35,8 +35,8 @@ constexpr double kCountAim = 0.08;        // where the search is content; half o
 constexpr double kSmallTarget = 5000;
 constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
-constexpr double kSliverDeg = 12;
-constexpr double kVisible = 0.02;  // of a linear element's edge: bulges below this are lost in its own chords
+constexpr double kFlatDeg = 12;                      // elements flatter than this are improved one by one at the end
+constexpr double kVisible = 0.02;                    // of a linear element's edge: bulges below this are lost in its own chords
 // Of the body's diagonal and of its mean thickness: facets that bulge less are as good as round.
 constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMostRounded = 100'000;  // triangles
@@ -101,6 +101,8 @@ void check_options(const SurfaceOptions& o) {
     throw InputError(fmt::format("nodes is {}; it must be from {} to {:.0f}", *o.nodes, o.order == 1 ? 8 : 27, kMostNodes));
   if (!(o.sharp_angle_deg > 0 && o.sharp_angle_deg <= 180))
     throw InputError(fmt::format("the sharp angle is {} degrees; it must be in (0, 180]", o.sharp_angle_deg));
+  if (!(o.sliver_deg >= 0 && o.sliver_deg <= 30))
+    throw InputError(fmt::format("the angle of slivers is {} degrees; it must be in [0, 30]", o.sliver_deg));
 }
 
 /// Scales the surface to metres.
@@ -163,7 +165,7 @@ void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   const double close = body.field ? 0.25 * body.field->voxel_m : 1e-6 * calc_box(body.mended.surface.points).diagonal();
   const auto is_on_skin = [&](const Vec3& p) { return calc_off_skin(body, p) <= close; };
   report.parted_nodes = part_pinched_nodes(mesh, report.components, project_here, is_on_skin);
-  better_flat_elements(mesh, kSliverDeg, project_here);
+  better_flat_elements(mesh, kFlatDeg, project_here);
 }
 
 /// The finished mesh is not the body (verify.hpp); what() is the end of a sentence.
@@ -200,6 +202,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
       finish(mesh);
       refuse_empty(mesh);
       if (is_the_body(mesh)) return mesh;
+      if (comparison.lacks_part) break;
     }
     throw WrongMesh(comparison.fault, edge_m);
   }
@@ -214,6 +217,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     const double count = std::max(static_cast<double>(count_nodes(mesh, options.order)), 1.0);
     const bool met = std::abs(count / asked - 1) <= kCountTolerance;
     if (met && is_the_body(mesh)) return mesh;
+    if (comparison.lacks_part) break;
     if (met) {
       target = std::min(1.03 * target, asked * (1 + 0.7 * kCountTolerance));
       edge_m *= kShorter;
@@ -265,7 +269,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
     auto delaunay = phases.run("finding sharp edges", [&] { return make_delaunay(body, options, edge_m, keep_sharp, report); });
     const auto refine = [&](double edge) { return delaunay->refine(calc_sizes(body, options, edge)); };
     const auto finish = [&](mesh::TetMesh& mesh) {
-      mesh = phases.run("removing slivers", [&] { return delaunay->optimise(kSliverDeg); });
+      if (options.sliver_deg > 0) mesh = phases.run("removing slivers", [&] { return delaunay->optimise(options.sliver_deg); });
       phases.run("mending the mesh", [&] { return finish_mesh(mesh, body, report), 0; });
     };
     return meet_count(body, options, edge_m, report, phases, refine, finish);

@@ -44,6 +44,7 @@ struct SurfaceOptions {
   bool straight = false;                             // order 2: all mid-side nodes in the middle, none on the true surface
   double sharp_angle_deg = 40;                       // an edge whose two faces turn by more than this, and not by noise, stays sharp
   Method method = Method::kAutomatic;
+  double sliver_deg = 12;  // kDelaunay: smaller dihedral angles are worked on, most of the time of a coarse mesh; 0: none are
 };
 
 /// What came out, and what had to be done to the surface for it.
@@ -115,7 +116,8 @@ mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report,
 
 /// For a program that meshes files of strangers: from now on a crash inside CGAL, or a mesh_surface that takes far more processor time than
 /// its size explains (12 s, and 2 ms a triangle, and 5 ms a node), ends the process with exit code kExitInput and one line that begins with
-/// `program` and says at which step. Not under sanitizers, which report crashes themselves.
+/// `program` and says at which step; with kExitSystem where the process came with a tighter limit (ulimit -t). Under
+/// sanitizers crashes are left to them.
 void guard_program(const char* program);
 
 /// The report as lines for a person.

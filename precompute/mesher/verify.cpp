@@ -19,6 +19,9 @@ namespace {
 
 // Parts thinner than this many edges, or shorter than the second, may be lost in elements of that size.
 constexpr double kLeastThickness = 1.0, kLeastLength = 3;
+// Of an extent of the body, and in edges: what coarse elements may lack of its tips.
+constexpr double kMostLost = 0.1, kMostLostEdges = 2;
+constexpr double kHopelessWalls = 3;  // edges this many times as long as the wall is thick do not bring a lost hollow back
 
 /// A region of the field: where the body is, or where it is not.
 struct Region {
@@ -180,6 +183,21 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
                                expectation.shells.least == expectation.shells.most
                                    ? fmt::format("{}", expectation.shells.most)
                                    : fmt::format("{} to {}", expectation.shells.least, expectation.shells.most));
+
+  // Of a hollow that was filled where elements are as long as the wall is thick several times over.
+  result.lacks_part =
+      !result.fault.empty() && result.shells < expectation.shells.least && body.wall_m > 0 && edge > kHopelessWalls * body.wall_m;
+  TriangleSurface used;  // points without a triangle do not count for the extent
+  for (const Triangle& t : body.mended.surface.triangles)
+    for (const std::int32_t v : t) used.points.push_back(body.mended.surface.points[static_cast<std::size_t>(v)]);
+  const Vec3 wanted = calc_box(used.points).extent(), made = calc_box(linear.nodes).extent();
+  for (int c = 0; c < 3; ++c) {
+    const double extent = wanted[c] - 2 * body.mended.offset_m, lost = extent - made[c];
+    if (lost <= kMostLost * extent || lost <= kMostLostEdges * edge) continue;
+    result.lacks_part = true;
+    result.fault = fmt::format("is {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", made[c],
+                               "xyz"[c], extent);
+  }
   return result;
 }
 

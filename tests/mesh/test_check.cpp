@@ -15,7 +15,7 @@
 namespace carillon::mesh {
 namespace {
 
-TetMesh make_one() { return {1, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 1, 2, 3}, {0}, {}, {}}; }
+TetMesh make_one() { return {1, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 1, 2, 3}, {0}, {}, {}, {}}; }
 
 /// Two elements on the face 1 2 3 of the unit simplex.
 TetMesh make_two() {
@@ -85,7 +85,7 @@ TEST(check, a_whole_mesh_is_left_as_it_is) {
 }
 
 TEST(check, a_regular_tetrahedron_has_mean_ratio_one_and_dihedral_angles_of_arccos_one_third) {
-  TetMesh mesh{1, {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}, {0, 1, 2, 3}, {}, {}, {}};
+  TetMesh mesh{1, {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}, {0, 1, 2, 3}, {}, {}, {}, {}};
   const CheckReport report = check_mesh(mesh);
   EXPECT_NEAR(report.mean_ratio_min, 1.0, 1e-12);
   EXPECT_NEAR(report.min_dihedral_deg, 70.528779365509308, 1e-9);
@@ -308,7 +308,7 @@ TEST(check, the_volume_of_a_curved_element_is_that_of_its_curved_boundary) {
 }
 
 TEST(check, slivers_and_strange_sizes_are_warned_of) {
-  TetMesh mesh{1, {{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, 0.4, 0.01}}, {0, 1, 2, 3}, {}, {}, {}};
+  TetMesh mesh{1, {{0, 0, 0}, {1, 0, 0}, {0.5, 1, 0}, {0.5, 0.4, 0.01}}, {0, 1, 2, 3}, {}, {}, {}, {}};
   EXPECT_EQ(check_mesh(mesh).slivers, 1);
   TetMesh large = make_cube(2);
   for (auto& x : large.nodes) x = {100 * x[0], 100 * x[1], 100 * x[2]};

@@ -285,6 +285,52 @@ TEST(bodies, coarse_round_solids_pass_the_comparison_with_the_body) {
       }
 }
 
+TEST(bodies, a_part_that_elements_are_too_coarse_for_is_not_left_out_in_silence) {
+  // A block with a fin. A fin of 0.2 mm is a hundredth of the block's volume at most and falls between the samples of the distance field.
+  for (const double thickness : {0.0002, 0.008}) {
+    const double low = 0.015 - thickness / 2, high = 0.015 + thickness / 2;
+    Polygons s = make_box(0.1, 0.05, 0.03);
+    s.points.insert(s.points.end(), {{0.1, 0, low},
+                                     {0.1, 0.05, low},
+                                     {0.1, 0, high},
+                                     {0.1, 0.05, high},  // 8: where it grows from
+                                     {0.15, 0, low},
+                                     {0.15, 0.05, low},
+                                     {0.15, 0, high},
+                                     {0.15, 0.05, high}});  // 12: its end
+    s.faces = {{0, 2, 3},
+               {0, 3, 1},
+               {4, 5, 7},
+               {4, 7, 6},
+               {0, 4, 6},
+               {0, 6, 2},
+               {1, 3, 9, 8},
+               {10, 11, 7, 5},  // the block's end, under and over the fin
+               {0, 1, 8, 12, 14, 10, 5, 4},
+               {3, 2, 6, 7, 11, 15, 13, 9},
+               {8, 9, 13, 12},
+               {14, 15, 11, 10},
+               {12, 13, 15, 14}};
+    SurfaceOptions options{.surface = write_text("fin.off", to_off(s)), .edge_m = 0.012, .facets = true, .method = Method::kStuffing};
+    SurfaceReport report;
+    if (thickness < 0.001) {
+      try {
+        mesh_surface(options, report);
+        ADD_FAILURE() << "was meshed without its fin: " << report.mesh_extent_m[0] << " m";
+      } catch (const InputError& error) {
+        EXPECT_NE(
+            std::string(error.what()).find("long along x where the body is 0.15 m: parts thinner than its elements are missing; ask for"),
+            std::string::npos)
+            << error.what();
+      }
+    } else {
+      options.edge_m = 0.006;
+      mesh_surface(options, report);
+      EXPECT_NEAR(report.mesh_extent_m[0], 0.15, 0.003);
+    }
+  }
+}
+
 TEST(bodies, small_and_slender_targets_are_met) {
   const struct {
     const char* name;

@@ -5,6 +5,7 @@ usage: guard_test.py BIN_DIR
 """
 import json
 import pathlib
+import resource
 import signal
 import subprocess
 import sys
@@ -50,6 +51,12 @@ class Guard(unittest.TestCase):
         code, said = self.send(signal.SIGXCPU)
         self.assertEqual(code, 2)
         self.assertIn("box.off: the mesher was ended at the step 'refining' after 10012 s of processor time", said)
+
+    def test_a_limit_of_the_users_own_is_called_one(self):
+        limit = lambda: resource.setrlimit(resource.RLIMIT_CPU, (1, 100))
+        done = subprocess.run([BIN / "carillon-mesh", "box.off", "-o", "out.msh", "--nodes", "2000000", "-q"], cwd=self.folder, capture_output=True, text=True, preexec_fn=limit)
+        self.assertEqual((done.returncode, done.stdout), (4, ""), done.stderr)
+        self.assertRegex(done.stderr, r"^carillon-mesh: box.off: the mesher was ended at the step '[a-z ]+': the processor time that this process may use is over \(ulimit -t\)\n$")
 
     def test_nothing_but_the_mesh_is_written_and_nothing_but_the_reason_said(self):
         # A box with a corner moved through its faces: CGAL gives up on it, and would leave files of its own where the program stands.

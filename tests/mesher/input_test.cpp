@@ -221,6 +221,43 @@ TEST(input, a_letter_with_sharp_corners_is_meshed_or_refused_with_the_count_it_n
   EXPECT_NEAR(report.volume_m3, 0.2 * (2 * 0.2 * 1.0 + 0.3 * 0.45), 1e-6);
 }
 
+TEST(input, boxes_with_one_corner_moved_hardly_or_kilometres_away_are_meshed_or_refused) {
+  // Each of these once ended in a signal: in the search for a count, where balls were placed on a slit; and in the test of the nesting.
+  Polygons slit = make_box(0.1, 0.05, 0.03), hair = slit, far = slit;
+  slit.points.push_back({0, 0.05, -4.16333625e-19});  // the far corner of a triangle of the lid, on the floor
+  slit.faces[3][2] = 8;
+  hair.points.push_back({0, 0, 1.79366203e-42});  // less than a float holds with all its digits
+  hair.faces[4][0] = 8;
+  far.points.insert(far.points.end(), {{-71.5, -107603880.0, 0},
+                                       {-71.5, -107603880.0, -107605600.0},
+                                       {-71.6197205, 0, 0},
+                                       {-71.6197205, 0, -107479040.0},
+                                       {0, -107479040.0, -107605600.0},
+                                       {-71.6197205, -107603880.0, 0},
+                                       {-71.5, 0, 0},
+                                       {0, 0, -107479040.0},
+                                       {-71.6197205, -107603880.0, -107605600.0}});
+  far.faces = {{0, 3, 1}, {0, 2, 3}, {4, 5, 7}, {8, 9, 10}, {9, 11, 10}, {12, 13, 14}, {15, 16, 10}};
+  for (const bool facets : {false, true}) {
+    SurfaceReport report;
+    mesh_surface({.surface = write_text("hair.stl", to_binary_stl(hair)), .nodes = 200, .facets = facets}, report);
+    EXPECT_NEAR(report.volume_m3, 0.1 * 0.05 * 0.03, 1e-9);
+    EXPECT_EQ(report.sharp_curves, 12);
+    // The tip of the slit asks for more than 200 nodes.
+    const std::string slit_file = write_text("slit.stl", to_binary_stl(slit)).string(),
+                      far_file = write_text("far.stl", to_binary_stl(far));
+    for (const auto& [file, words] : {std::pair{slit_file, "needs at least about"}, std::pair{far_file, "far.stl: "}}) {
+      try {
+        mesh_surface({.surface = file, .nodes = 200, .facets = facets}, report);
+        ADD_FAILURE() << file << " was meshed";
+      } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+        EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+      }
+    }
+  }
+}
+
 TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
   const std::string box = to_off(make_box(1, 1, 1));
   Polygons open = make_box(1, 1, 1);
