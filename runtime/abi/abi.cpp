@@ -358,12 +358,13 @@ carillon_status carillon_model_make(const carillon_bank* bank, const carillon_mo
     return refuse("carillon_model_make: options.radiation is none of carillon_radiation", message, message_size);
   return run(message, message_size, [&] {
     const auto kind = ours->radiation == CARILLON_RADIATION_SPHERE ? radiation::GainKind::kSphere : radiation::GainKind::kOsg02;
-    const std::vector<double> gains = radiation::calc_gains(bank->bank, kind);
+    std::vector<double> gains = radiation::calc_gains(bank->bank, kind);
     // What fixes the body takes of its modes what the bank says; a bank without losses is not copied.
     std::optional<bank::Bank> mounted;
     if (const support::Losses losses = support::calc_losses(bank->bank, {}); !losses.is_empty())
       support::apply(losses, mounted.emplace(bank->bank));
     const bank::Bank& played = mounted ? *mounted : bank->bank;
+    if (kind == radiation::GainKind::kSphere) radiation::limit_gains(gains, played.decay_per_s);
     *model = new carillon_model{
         synth::Model::make(played, {.rate_hz = ours->rate_hz, .gains = gains, .sphere_radius_m = find_sphere_radius_m(played)})};
   });

@@ -38,6 +38,8 @@ Banks read_banks(Scene& scene) {
         radiation::Radiation radiation = radiation::calc_radiation(slot->bank, scene.radiation);
         slot->bank.radiation_gain = std::move(radiation.gains);
         slot->sphere_radius_m = radiation.sphere_radius_m;
+        if (scene.radiation == radiation::GainKind::kSphere)
+          slot->limited = radiation::limit_gains(slot->bank.radiation_gain, slot->bank.decay_per_s);
       } catch (const InputError& error) {
         throw InputError(fmt::format("{}: the bank of body \"{}\": {}", place, body.name, error.what()));
       }
@@ -47,6 +49,7 @@ Banks read_banks(Scene& scene) {
     }
     body.spec.bank = &slot->bank;
     body.sphere_radius_m = slot->sphere_radius_m;
+    body.limited = slot->limited;
   }
   return banks;
 }

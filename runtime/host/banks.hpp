@@ -15,13 +15,14 @@ namespace carillon::host {
 struct ReadBank {
   bank::Bank bank;
   double sphere_radius_m = 0.0;
+  radiation::Limited limited;
 };
 /// By file, and what carries the body (support::write_key()).
 using Banks = std::map<std::pair<std::filesystem::path, std::string>, std::unique_ptr<ReadBank>>;
 
-/// Reads every bank once, puts in what the supports take, and gives it the gains that the scene asks for: a bank for every way in which its
-/// bodies are mounted. The scene's bodies point into the result, and know its radius and in words how they are mounted; warnings about
-/// supports join the scene's. Throws InputError, which names scene and body.
+/// Reads every bank once for every way in which its bodies are mounted, puts in what the supports take, and gives it the gains that the
+/// scene asks for; those of `"sphere"` are limited to what damping takes. The scene's bodies point into the result, and know its radius and
+/// in words how they are mounted; warnings about supports join the scene's. Throws InputError, which names scene and body.
 Banks read_banks(Scene& scene);
 
 }  // namespace carillon::host

@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <numbers>
 
+#include "runtime/bank/air.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/radiation/flow.hpp"
 
@@ -222,6 +223,19 @@ Radiation calc_radiation(const bank::Bank& bank, GainKind kind) {
   check_sizes(bank);
   const Skin skin = make_skin(bank);
   return {kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, skin), calc_sphere_radius_of_skin(skin)};
+}
+
+Limited limit_gains(std::span<double> gains, std::span<const double> decay_per_s) {
+  if (gains.size() != decay_per_s.size()) throw InputError("there must be one decay for every radiation gain");
+  Limited limited;
+  for (std::size_t m = 0; m < gains.size(); ++m) {
+    const double share = bank::calc_radiation_decay(gains[m]) / decay_per_s[m];
+    if (!(decay_per_s[m] > 0.0) || !(share > 1.0)) continue;
+    gains[m] /= std::sqrt(share);
+    ++limited.modes;
+    limited.most_db = std::max(limited.most_db, 10.0 * std::log10(share));
+  }
+  return limited;
 }
 
 double calc_sphere_radius_m(const bank::Bank& bank) {

@@ -1,6 +1,8 @@
 // How loud a mode is: from its shape on the outer surface to the pressure in the far field. Made once, when a bank is loaded.
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
@@ -27,6 +29,17 @@ struct Radiation {
   double sphere_radius_m = 0.0;
 };
 Radiation calc_radiation(const bank::Bank& bank, GainKind kind);
+
+/// What limit_gains() has done.
+struct Limited {
+  std::size_t modes = 0;  // whose gains came down
+  double most_db = 0.0;   // by at most so much
+};
+
+/// Brings every gain (m) down to that with which its mode radiates all that its damping takes, g^2 = rho c d / 2 pi: a decay (m) [1/s]
+/// counts as all there is, radiation included, so that what sounds is never more than what the mode had. A mode that nothing damps (0)
+/// keeps its gain: it rings for ever, as it was asked to. Throws InputError where the sizes differ.
+Limited limit_gains(std::span<double> gains, std::span<const double> decay_per_s);
 
 /// Radius [m] of the sphere that has the volume inside the outer surface, cavities and all. InputError as above.
 double calc_sphere_radius_m(const bank::Bank& bank);

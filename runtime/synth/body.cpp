@@ -266,7 +266,7 @@ bool hit(Player& player, const stream::Force& force, const Attitudes&... attitud
   return player.push(force, attitude...);
 }
 
-/// To all who play pulses. What goes on with a pulse is none of its own.
+/// To all who play pulses. What continues a pulse is no strike of its own.
 template <class Strike>
 bool Body::play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept {
   wake(sample);
@@ -276,7 +276,7 @@ bool Body::play(const Strike& strike, bool has_length, bool is_new, std::int64_t
     own.time_s = strike.time_s - static_cast<double>(first_) / frame_.rate_hz;
     const std::int64_t late = voice_->get_counters().late;
     (hit(*voice_, own) ? is_taken : is_refused) = true;
-    work_.late += voice_->get_counters().late - late;
+    if (is_new) work_.late += voice_->get_counters().late - late;
   }
   if (has(effects_, Effect::kAccelerationNoise) && clicker_) {
     own.time_s = strike.time_s - static_cast<double>(clicker_->first) / frame_.rate_hz;

@@ -13,6 +13,7 @@
 #include <numbers>
 #include <utility>
 
+#include "runtime/bank/air.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
@@ -36,7 +37,7 @@ constexpr double kParallel = 3e-7;
 }  // namespace
 
 double calc_radiated_share(double gain, double decay_per_s) noexcept {
-  const double radiation_per_s = 2.0 * std::numbers::pi * gain * gain / (bank::kAirDensityKgM3 * bank::kSoundSpeedMs);
+  const double radiation_per_s = bank::calc_radiation_decay(gain);
   return radiation_per_s < decay_per_s ? radiation_per_s / decay_per_s : 1.0;
 }
 

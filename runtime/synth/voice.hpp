@@ -39,9 +39,8 @@ struct VoiceCounters {
   double radiated_j = 0.0;        // share of what damping took from what rang at the start of each period; 0 unless asked for
 };
 
-/// The share of a mode's damping that is sound. A far field whose amplitude at 1 m is g q', in the root mean square over all directions,
-/// carries away 4 pi (g q')^2 / (2 rho c) of the mode's q'^2 / 2: the decay d_r = 2 pi g^2 / (rho c). The bank's decay d counts as all
-/// there is, so that the share is d_r / d, and 1 where that is more.
+/// The share of a mode's damping that is sound: d_r = bank::calc_radiation_decay(gain) of the bank's decay d, which counts as all there
+/// is; 1 where d_r is more, as gains that radiation::limit_gains() has not limited may have it.
 double calc_radiated_share(double gain, double decay_per_s) noexcept;
 
 /// A mode at or near critical damping: amplitude and velocity.

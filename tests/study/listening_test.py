@@ -61,11 +61,10 @@ class Listening(unittest.TestCase):
         self.assertIn("auto", rows)
         self.assertGreater(float(rows["without hertz_pulse"]["error_dba"]), -40.0)
 
-    def test_a_finer_step_is_dearer_and_nearer_to_the_closed_form(self):
+    def test_a_finer_step_is_dearer_and_the_loosest_is_near_to_the_closed_form(self):
         rows = {float(row["contact_step_s"]): row for row in read(self.out, "contact-contact_step_s")}
         errors = {step: float(row["error"]) for step, row in rows.items()}
-        self.assertLess(errors[2.5e-4], 1e-3)  # of the second order in the step: 64 times from 0.00025 to 0.002
-        self.assertGreater(errors[2e-3], 10 * errors[2.5e-4])
+        self.assertLess(max(errors.values()), 1e-4)  # a top turns fast, and so takes short steps whatever the longest may be
         self.assertGreater(float(rows[1e-4]["cpu_ms_per_s"]), float(rows[2e-3]["cpu_ms_per_s"]))
         self.assertLess(float(read(self.out, "contact-triangles")[-1]["error"]), 0.01)
         self.assertTrue(any("`modes_in_impacts`" in text for text in self.findings["contact"]))

@@ -179,7 +179,11 @@ TEST(Synthesiser, CountsWhatItCannotPlay) {
   EXPECT_FALSE(synthesiser.push(make_impulse(body, 0.01)));
   play(synthesiser, {}, 4800, [] { return 64; });
   EXPECT_TRUE(synthesiser.push(make_impulse(body, 0.02)));  // 0.08 s too late
-  play(synthesiser, {}, 256, [] { return 64; });
+  play(synthesiser, {}, 192, [] { return 64; });
+  // The rest of that pulse, as late as its beginning.
+  EXPECT_TRUE(synthesiser.push(
+      stream::Force{.time_s = 0.02, .step_s = 1e-5, .body = body, .count = 1, .continues = true, .impulse_n_s = {{{0, 0, 1e-3F}}}}));
+  play(synthesiser, {}, 64, [] { return 64; });
   const SynthesiserCounters counters = synthesiser.get_counters();
   EXPECT_EQ(counters.strikes, 3);
   EXPECT_EQ(counters.refused, 2);

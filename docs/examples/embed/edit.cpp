@@ -18,7 +18,8 @@ namespace {
 constexpr double kRateHz = 48000.0;
 
 std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank) {
-  const auto gains = radiation::calc_gains(bank, radiation::GainKind::kSphere);
+  auto gains = radiation::calc_gains(bank, radiation::GainKind::kSphere);
+  radiation::limit_gains(gains, bank.decay_per_s);  // no louder than its damping allows
   return synth::Model::make(bank, {.rate_hz = kRateHz, .gains = gains});
 }
 

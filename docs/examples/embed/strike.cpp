@@ -15,7 +15,8 @@ int main(int argc, char** argv) {
   try {
     constexpr double kRateHz = 48000.0;
     const bank::Bank bank = bank::read_bank(argv[1]);
-    const auto gains = radiation::calc_gains(bank, radiation::GainKind::kSphere);
+    auto gains = radiation::calc_gains(bank, radiation::GainKind::kSphere);
+    radiation::limit_gains(gains, bank.decay_per_s);  // no louder than its damping allows
     const auto model = synth::Model::make(bank, {.rate_hz = kRateHz, .gains = gains});
 
     synth::Synthesiser synthesiser({.rate_hz = kRateHz});

@@ -1,0 +1,16 @@
+// What the air takes of a mode.
+#pragma once
+
+#include <numbers>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+
+/// The decay [1/s] that sound alone makes of a mode whose far field has the amplitude `gain` q' at 1 m, in the root mean square over all
+/// directions: it carries away 4 pi (g q')^2 / (2 rho c) of the mode's q'^2 / 2, which is d_r = 2 pi g^2 / (rho c).
+constexpr double calc_radiation_decay(double gain) noexcept {
+  return 2.0 * std::numbers::pi * gain * gain / (kAirDensityKgM3 * kSoundSpeedMs);
+}
+
+}  // namespace carillon::bank
