@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <string>
@@ -16,6 +17,9 @@ namespace carillon::impact {
 namespace {
 
 constexpr double kSlowest = 1e-6;  // m/s: speed for which the step is chosen where nothing approaches
+constexpr double kTaper = 0.05;    // of how long a contact has pressed: time constant with which a rebound comes to its limit
+constexpr double kStill = 1e-3;    // m/s: what rests and moves no faster has settled
+constexpr int kLimitings = 8;      // rounds in which contacts that share bodies settle on it
 
 std::size_t pad(int n) { return static_cast<std::size_t>((n + kLanes - 1) / kLanes * kLanes); }
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
@@ -105,7 +109,8 @@ double Books::calc_error() const {
   return (start + given - end) / largest;
 }
 
-Impact::Impact(std::vector<Body> bodies, std::vector<Contact> contacts, const Options& options) : above_band_(options.above_band) {
+Impact::Impact(std::vector<Body> bodies, std::vector<Contact> contacts, const Options& options)
+    : above_band_(options.above_band), settling_s_(options.settling_s) {
   check(!contacts.empty(), "there is no contact");
   check(options.steps_per_pulse >= 1.0 && options.longest_step_s > 0.0 && options.part_s >= 0.0, "options out of range");
   for (Body& body : bodies) place_body(std::move(body));
@@ -190,6 +195,9 @@ void Impact::add_contact(const Contact& contact) {
   pulses_.emplace_back().contact = static_cast<int>(contacts_.size()) - 1;
   silent_.push_back(0);
   normal_impulse_.push_back(0.0);
+  closing_.push_back(0.0);
+  pressed_s_.push_back(0.0);
+  is_limited_.push_back(contact.is_limit && !(contact.shape_a.empty() && contact.shape_b.empty()) ? 1 : 0);
 }
 
 /// Axes, mobilities and shape values of a contact, new or moved; its rows begin with `row`.
@@ -300,6 +308,7 @@ void Impact::choose_step(const Options& options) {
         speed[c] -= calc_dot(phi, group.v.data(), group.q.size());
         modal += calc_dot(phi, phi, group.q.size());
       }
+    closing_[c] = std::max({0.0, speed[c], -calc_row_speed(row)});
     if (inverse_mass[c] == 0.0) inverse_mass[c] = modal;
     fastest_ = std::max(fastest_, speed[c]);
   }
@@ -332,15 +341,18 @@ void Impact::choose_step(const Options& options) {
 void Impact::set_up_step() {
   const std::size_t n = rows_.size();
   A_.assign(n * n, 0.0);
+  mobility_.assign(n * n, 0.0);
   free_.assign(n, 0.0);
   moved_.assign(n, 0.0);
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j)
       for (std::size_t s = 0; s < 2; ++s)
         for (std::size_t t = 0; t < 2; ++t)
-          if (rows_[i].body[s] >= 0 && rows_[i].body[s] == rows_[j].body[t])
-            A_[i * n + j] +=
-                0.5 * h_ * h_ * (dot(rows_[i].linear[s], rows_[j].to_velocity[t]) + dot(rows_[i].angular[s], rows_[j].to_spin[t]));
+          if (rows_[i].body[s] >= 0 && rows_[i].body[s] == rows_[j].body[t]) {
+            const double gain = dot(rows_[i].linear[s], rows_[j].to_velocity[t]) + dot(rows_[i].angular[s], rows_[j].to_spin[t]);
+            mobility_[i * n + j] += gain;
+            A_[i * n + j] += 0.5 * h_ * h_ * gain;
+          }
   for (Group& group : groups_) {
     const Modes& modes = *bodies_[static_cast<std::size_t>(group.body)].modes;
     group.p = group.tail ? modes.find_tail_propagator(step_index_) : modes.find_propagator(step_index_);
@@ -365,6 +377,40 @@ void Impact::set_up_step() {
   }
 }
 
+/// The forces of the step, none of which throws its bodies apart faster than its restitution allows.
+void Impact::solve_forces() {
+  bool found = solver_.solve(touches_, A_, free_, h_, force_);
+  for (int round = 0; round < kLimitings && limit_forces(); ++round) found = solver_.solve(touches_, A_, free_, h_, force_) && found;
+  if (!found) ++misses_;
+}
+
+/// Bounds the normal forces, where modes push, under which rigid bodies would part too fast at the end of the step; true where there are
+/// any. What is left to the limit goes down as exp(-t / tau), so that a force is not cut off, which would be heard.
+bool Impact::limit_forces() {
+  const std::size_t n = rows_.size();
+  bool any = false;
+  for (std::size_t c = 0; c < touches_.size(); ++c) {
+    Touch& t = touches_[c];
+    const auto row = static_cast<std::size_t>(t.row);
+    const double gain = h_ * mobility_[row * n + row];
+    if (!is_limited_[c] || contacts_[c].restitution >= 1.0 || !(force_[row] > 0.0) || !(gain > 0.0)) continue;
+    const double before = calc_row_speed(rows_[row]), limit = contacts_[c].restitution * closing_[c];
+    double parting = before;
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (rows_[row].body[side] < 0) continue;
+      const Body& body = bodies_[static_cast<std::size_t>(rows_[row].body[side])];
+      parting += h_ * (dot(rows_[row].linear[side], body.acceleration_m_s2) + dot(rows_[row].angular[side], body.spin_acceleration_rad_s2));
+    }
+    for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
+    const double left = limit - before, allowed = left > 0.0 ? before - left * std::expm1(-h_ / (kTaper * (pressed_s_[c] + h_))) : limit;
+    const double over = (parting - allowed) / gain;
+    if (over <= 1e-9 * force_[row]) continue;
+    t.most_n = std::max(0.0, force_[row] - over);
+    any = true;
+  }
+  return any;
+}
+
 void Impact::step() {
   const std::size_t n = rows_.size();
   const double half = 0.5 * h_ * h_;
@@ -378,26 +424,33 @@ void Impact::step() {
   }
   for (const Group& group : groups_)
     for (std::size_t r = 0; r < group.rows.size(); ++r) free_[static_cast<std::size_t>(group.rows[r])] += group.w_free[r] - group.w[r];
+  for (std::size_t c = 0; c < touches_.size(); ++c)
+    closing_[c] = std::max(closing_[c], -calc_row_speed(rows_[static_cast<std::size_t>(touches_[c].row)]));
 
   const bool reached = std::any_of(touches_.begin(), touches_.end(), [&](const Touch& t) {
     return t.compression_m > 0.0 || t.compression_m - free_[static_cast<std::size_t>(t.row)] > 0.0;
   });
-  if (!reached)
+  if (reached)
+    solve_forces();
+  else
     std::fill(force_.begin(), force_.end(), 0.0);
-  else if (!solver_.solve(touches_, A_, free_, h_, force_))
-    ++misses_;
 
-  bool pushed = false;
+  bool pushed = false, struck = false;
   for (std::size_t i = 0; i < n; ++i) {
     moved_[i] = free_[i];
     for (std::size_t j = 0; j < n; ++j) moved_[i] += A_[i * n + j] * force_[j];
     pushed = pushed || force_[i] != 0.0;
+    struck = struck || (force_[i] != 0.0 && !contacts_[static_cast<std::size_t>(rows_[i].contact)].rests);
   }
   for (std::size_t c = 0; c < touches_.size(); ++c) {
     Touch& t = touches_[c];
     const auto row = static_cast<std::size_t>(t.row);
     const double before = t.compression_m;
     t.compression_m -= moved_[row];
+    // What is not let push gives way where it is pressed further: it takes up no energy, and gives back less than it has.
+    if (std::isfinite(t.most_n)) t.compression_m = std::min(t.compression_m, before);
+    t.most_n = std::numeric_limits<double>::infinity();
+    pressed_s_[c] = t.compression_m > 0.0 ? pressed_s_[c] + h_ : 0.0;
     books_.dissipated_contact -=
         force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before));
     Vec3 impulse = h_ * force_[row] * rows_[row].axis;
@@ -471,13 +524,26 @@ void Impact::step() {
     move(state, static_cast<int>(m), group.f.data(), group.w_free.data(), group.lanes.data());
   }
   ++steps_;
-  quiet_ = pushed ? 0 : quiet_ + 1;
+  quiet_ = struck ? 0 : quiet_ + 1;
+}
+
+/// Have all parted, but for what rests and has settled, or had its time?
+bool Impact::is_over() const {
+  const double quiet_s = quiet_ * h_;
+  if (quiet_s < part_s_) return false;
+  for (std::size_t c = 0; c < touches_.size(); ++c) {
+    if (touches_[c].compression_m <= 0.0) continue;
+    if (!contacts_[c].rests) return false;
+    const double moved = moved_[static_cast<std::size_t>(touches_[c].row)];
+    if (std::abs(moved) > kStill * h_ && quiet_s < settling_s_) return false;
+  }
+  return true;
 }
 
 bool Impact::advance(double until_s) {
   while (!ended_ && get_time() < until_s) {
     step();
-    ended_ = quiet_ * h_ >= part_s_ && std::all_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.compression_m <= 0.0; });
+    ended_ = is_over();
   }
   return ended_;
 }

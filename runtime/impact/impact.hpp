@@ -54,16 +54,19 @@ struct Contact {
   double gap_m = 0.0;                        // at the beginning; negative: compressed by that much
   Spring spring;                             // its hysteresis is set by `restitution`
   double restitution = 1.0;                  // of what the modes do not show: loss in the spring at the approach speed
+  bool is_limit = false;                     // it limits the whole rebound, too: that of the rigid bodies, whatever modes throw back
   double friction = 0.0;                     // mu
   double tangential_ratio = 0.82;            // k_t over the secant of the normal spring at its peak: 2 (1 - nu)/(2 - nu) (Mindlin 1949)
+  bool rests = false;                        // touched before the impact: it is over when the others have parted and this has settled
   std::span<const double> shape_a, shape_b;  // (n, 3) mode shapes there [1/sqrt(kg)], world axes; empty: does not ring there
 };
 
 struct Options {
   double steps_per_pulse = 20.0;  // of the shortest elastic pulse; see docs/decisions/impact.md for what it costs
   double longest_step_s = 1e-3;
-  double part_s = 0.0;     // it is over when there was no force for so long; 0: the length of the longest elastic pulse
-  bool above_band = true;  // modes above the band of plate-like bodies (modes.hpp)
+  double settling_s = 3e-3;  // how long contacts that rest may take to settle after the others have parted
+  double part_s = 0.0;       // it is over when there was no force for so long; 0: the length of the longest elastic pulse
+  bool above_band = true;    // modes above the band of plate-like bodies (modes.hpp)
 };
 
 /// The force on body a of a contact, as impulses of equal steps; world axes.
@@ -161,6 +164,9 @@ class Impact {
   void set_up_step();
   void step();
   double calc_row_speed(const Row& row) const;
+  void solve_forces();
+  bool limit_forces();
+  bool is_over() const;
   double calc_rigid_energy() const;
   double calc_spring_energies() const;
 
@@ -171,10 +177,14 @@ class Impact {
   std::vector<Row> rows_;
   std::vector<Group> groups_;
   std::vector<double> A_, free_, force_, moved_;
+  std::vector<double> mobility_;   // (rows, rows), of the rigid bodies: relative velocity per impulse
+  std::vector<double> pressed_s_;  // of each contact: how long it has been pressed
+  std::vector<char> is_limited_;   // of each contact: do modes push against a limit?
+  std::vector<double> closing_;    // of each contact: the largest speed of approach so far [m/s]
   StepSolver solver_;
   bool above_band_ = true, ended_ = false;
   int step_index_ = 0, steps_ = 0, quiet_ = 0, misses_ = 0;
-  double h_ = 0.0, part_s_ = 0.0, fastest_ = 0.0;
+  double h_ = 0.0, part_s_ = 0.0, settling_s_ = 0.0, fastest_ = 0.0;
   double on_joints_j_ = 0.0;  // work done on bodies on joints
   Books books_;
   std::vector<Pulse> pulses_;

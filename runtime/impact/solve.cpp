@@ -17,6 +17,12 @@ namespace {
 
 constexpr int kSweeps = 200;
 
+/// The normal force of a step at whose end the compression is y1.
+StepForce calc_normal_force(const Touch& touch, double y1, double h_s) {
+  const StepForce one = calc_step_force(touch.spring, touch.compression_m, y1, h_s);
+  return one.force > touch.most_n ? StepForce{touch.most_n, 0.0} : one;
+}
+
 }  // namespace
 
 std::array<double, 2> calc_shortened(const std::array<double, 2>& x, double longest) {
@@ -28,10 +34,10 @@ std::array<double, 2> calc_shortened(const std::array<double, 2>& x, double long
 void StepSolver::solve_one(const Touch& touch, double compliance, double free, double h_s, double& f) const {
   // In the compression m: r(m) = m - m_free + A F(y0 + m) grows with slope >= 1; r <= 0 at m_free - A F(m_free), r >= 0 at m_free.
   const double m_free = -free, y0 = touch.compression_m;
-  double high = m_free, low = m_free - compliance * calc_step_force(touch.spring, y0, y0 + m_free, h_s).force;
+  double high = m_free, low = m_free - compliance * calc_normal_force(touch, y0 + m_free, h_s).force;
   double m = std::clamp(m_free - compliance * f, low, high);
   for (int i = 0; i < 100; ++i) {
-    const StepForce one = calc_step_force(touch.spring, y0, y0 + m, h_s);
+    const StepForce one = calc_normal_force(touch, y0 + m, h_s);
     f = one.force;
     const double r = m - m_free + compliance * f;
     (r > 0.0 ? high : low) = m;
@@ -41,7 +47,7 @@ void StepSolver::solve_one(const Touch& touch, double compliance, double free, d
     m = next;
     if (change <= 2e-16 * (std::abs(m) + std::abs(m_free))) break;
   }
-  f = calc_step_force(touch.spring, y0, y0 + m, h_s).force;
+  f = calc_normal_force(touch, y0 + m, h_s).force;
 }
 
 /// Fills law_ with the forces at `moved` (and slopes_); returns the largest.
@@ -50,7 +56,7 @@ double StepSolver::calc_law(const std::vector<Touch>& touches, const std::vector
   for (std::size_t c = 0; c < touches.size(); ++c) {
     const Touch& t = touches[c];
     const auto row = static_cast<std::size_t>(t.row);
-    const StepForce normal = calc_step_force(t.spring, t.compression_m, t.compression_m - moved[row], h_s);
+    const StepForce normal = calc_normal_force(t, t.compression_m - moved[row], h_s);
     auto& slope = slopes_[c];
     if (with_slopes) slope = {};
     law_[row] = normal.force;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "runtime/impact/spring.hpp"
@@ -11,11 +12,12 @@ namespace carillon::impact {
 /// A contact's law and its state at the beginning of a step. It has one row of the step's unknowns (the normal), or three where it rubs.
 struct Touch {
   Spring spring;
-  double friction = 0.0;            // mu; 0: one row
-  double tangential_n_m = 0.0;      // k_t of the anchor spring [N/m]
-  double compression_m = 0.0;       // y
-  std::array<double, 2> stretch{};  // u of the anchor spring [m]
-  int row = 0;                      // of the normal; the tangents follow
+  double friction = 0.0;                                    // mu; 0: one row
+  double tangential_n_m = 0.0;                              // k_t of the anchor spring [N/m]
+  double compression_m = 0.0;                               // y
+  std::array<double, 2> stretch{};                          // u of the anchor spring [m]
+  double most_n = std::numeric_limits<double>::infinity();  // that it may push with in this step: its spring lets go of the rest
+  int row = 0;                                              // of the normal; the tangents follow
 };
 
 /// With friction the force of a step that stretches the spring from u0 to u = u0 + s (anchor at rest) is
