@@ -6,9 +6,9 @@
 
 #include <filesystem>
 #include <mutex>
-#include <stdexcept>
 #include <string_view>
 
+#include "runtime/config/error.hpp"
 #include "runtime/joints/engine.hpp"
 
 namespace carillon::joints {
@@ -39,13 +39,12 @@ MakeMechanism load_engine() {
     }
     void* module = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (module == nullptr)
-      throw std::runtime_error(fmt::format("joints need Simbody, and {} cannot be loaded: {}; install libsimbody3.7 (Debian)",
-                                           file.lexically_normal().string(), dlerror()));
+      throw SystemError(fmt::format("joints need Simbody, and {} cannot be loaded: {}; install libsimbody3.7 (Debian)",
+                                    file.lexically_normal().string(), dlerror()));
     if (void* found = dlsym(module, kEngineName); found != nullptr) return reinterpret_cast<MakeMechanism>(found);
-    throw std::runtime_error(fmt::format("{} belongs to another version of Carillon; install both from one build", file.string()));
+    throw SystemError(fmt::format("{} belongs to another version of Carillon; install both from one build", file.string()));
   }
-  throw std::runtime_error(
-      fmt::format("joints need the module {}, which is at none of {}; install it with the programs", kEngineFile, tried));
+  throw SystemError(fmt::format("joints need the module {}, which is at none of {}; install it with the programs", kEngineFile, tried));
 }
 
 }  // namespace

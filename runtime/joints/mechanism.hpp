@@ -88,7 +88,7 @@ class Mechanism {
 };
 
 /// The members must hang together by the joints, as a tree. Without a joint to the world the first member is free. Throws
-/// std::runtime_error where the engine cannot be loaded, std::invalid_argument where the members do not make a tree.
+/// SystemError where the engine cannot be loaded, std::invalid_argument where the members do not make a tree.
 std::unique_ptr<Mechanism> make_mechanism(const std::vector<Member>& members, const std::vector<Joint>& joints, const Vec3& gravity);
 
 }  // namespace carillon::joints

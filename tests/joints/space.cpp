@@ -328,5 +328,125 @@ TEST(cords, two_balls_on_a_cord_keep_momentum) {
   EXPECT_NEAR(norm(space.state(0).centre - space.state(1).centre), 0.2, 3e-6);
 }
 
+/// The stop of a joint of body 0 to the world, whose centre is at `centre` at the start; its arm is `arm_m`.
+Cord make_stop(bool turns, const Vec3& centre, const Vec3& axis, double most, bool is_lower, double restitution, double arm_m = 0.1) {
+  Stop stop{.turns = turns, .at_a = -1.0 * centre, .axis = axis, .arm_m = arm_m, .most = most, .is_lower = is_lower};
+  stop.lever_a = stop.lever_b = {0, 0, -1};
+  return {.a = 0, .b = -1, .restitution = restitution, .stop = stop};
+}
+
+TEST(stops, pendulum_is_thrown_back_by_a_stop) {
+  // Let go at 0.6 rad; the stop is before the lowest place, at it, or past it.
+  const double r = 0.03, arm = 0.4, mass = 0.5, a = 0.6, e = 0.6;
+  for (const double past : {-0.3, 0.0, 0.2}) {  // of the vertical
+    const Vec3 centre{arm * std::sin(a), 0, -arm * std::cos(a)};
+    Links links{.joints = {hinge(0, -1, {})}, .cords = {}};
+    // About +y the ball, on the side of +x, falls with a positive angle.
+    Cord stop = make_stop(true, centre, {0, 1, 0}, a + past, false, e);
+    links.cords = {stop};
+    Space space({make_ball_solid(mass, r)}, {at(centre)}, std::nullopt, kGravity, {}, links);
+    const double inertia = mass * arm * arm + 0.4 * mass * r * r, gained = mass * kG * arm * (std::cos(past) - std::cos(a));
+    const double before = calc_sum(space.calc_books());
+    std::vector<Strike> strikes;
+    while (strikes.empty() && space.get_time() < 2.0) {
+      space.step(2.0);
+      for (Strike& s : space.take_strikes()) strikes.push_back(std::move(s));
+    }
+    ASSERT_EQ(strikes.size(), 1u);
+    const Strike& hit = strikes.front();
+    const double speed = arm * std::sqrt(2.0 * gained / inertia);
+    EXPECT_NEAR(norm(hit.before[0].velocity), speed, 1e-4 * speed) << past;
+    EXPECT_NEAR(norm(hit.after[0].velocity), e * speed, 1e-4 * speed) << past;
+    EXPECT_NEAR(hit.before[0].centre[0], -arm * std::sin(past), 1e-6) << past;
+    EXPECT_NEAR(calc_sum(space.calc_books()), before, 1e-6 * gained);
+    // Back as far as what is left goes; never beyond the stop.
+    double highest = -1.0, least = 1.0;
+    while (space.get_time() < hit.time_s + 0.6) {
+      space.step(3.0);
+      highest = std::max(highest, space.state(0).centre[2]);
+      least = std::min(least, space.state(0).centre[0]);
+    }
+    EXPECT_NEAR(mass * kG * (highest + arm * std::cos(past)), e * e * gained, 2e-3 * gained) << past;
+    EXPECT_GT(least, -arm * std::sin(past) - 1e-5) << past;
+  }
+}
+
+TEST(stops, leaning_on_a_stop_is_rest) {
+  // A bar on a hinge at its end falls from upright and comes to lie on a stop 1 rad from there, after bounces of restitution 0.3.
+  const double l = 0.3;
+  const Vec3 centre{1e-3, 0, 0.5 * l};
+  Links links{.joints = {hinge(0, -1, {})}, .cords = {make_stop(true, centre, {0, 1, 0}, 1.0, false, 0.3)}};
+  Space space({make_box_solid(0.4, {0.02, 0.02, l})}, {at(centre)}, std::nullopt, kGravity, {}, links);
+  const double before = calc_sum(space.calc_books());
+  run(space, 4.0);
+  EXPECT_TRUE(space.is_all_asleep());
+  const double angle = std::atan2(space.state(0).centre[0], space.state(0).centre[2]) - std::atan2(centre[0], centre[2]);
+  EXPECT_NEAR(angle, 1.0, 1e-4);
+  EXPECT_NEAR(calc_sum(space.calc_books()), before, 1e-3 * std::abs(before));
+}
+
+TEST(stops, slider_bounces_between_its_ends) {
+  // Without gravity, to and fro between two stops: the speed is e^n times the first, the times follow.
+  const double e = 0.8, v = 0.5, low = -0.1, high = 0.2;
+  joints::Joint slider{.kind = joints::Kind::kSlider, .body = 0, .to = -1, .at = {}, .axis = {0.6, 0, 0.8}};
+  Links links{.joints = {slider},
+              .cords = {make_stop(false, {}, {0.6, 0, 0.8}, low, true, e), make_stop(false, {}, {0.6, 0, 0.8}, high, false, e)}};
+  State start = at({});
+  start.velocity = {0.6 * v, 0, 0.8 * v};
+  Space space({make_box_solid(0.4, {0.02, 0.03, 0.05})}, {start}, std::nullopt, {}, {}, links);
+  std::vector<Strike> strikes;
+  while (strikes.size() < 5 && space.get_time() < 10.0) {
+    space.step(10.0);
+    for (Strike& s : space.take_strikes()) strikes.push_back(std::move(s));
+  }
+  ASSERT_EQ(strikes.size(), 5u);
+  double time = high / v, speed = v;
+  for (const Strike& s : strikes) {
+    EXPECT_NEAR(s.time_s, time, 1e-5 * time);
+    EXPECT_NEAR(norm(s.after[0].velocity), e * speed, 1e-9);
+    speed *= e;
+    time += (high - low) / speed;
+  }
+}
+
+TEST(stops, of_two_free_bars_keep_momentum_and_angular_momentum) {
+  // Two bars with a hinge between them float; one turns until it strikes the stop. Restitution 1: the energy stays.
+  const double l = 0.2, mass = 0.3;
+  for (const double e : {1.0, 0.4}) {
+    std::vector<State> states{at({0, 0, 0.5 * l}), at({0, 0, -0.5 * l})};
+    const Solid bar = make_box_solid(mass, {0.02, 0.02, l});
+    states[0].momentum = {0, bar.inertia_kg_m2[1][1] * 3.0, 0};
+    states[0].velocity = {0.5 * l * 3.0, 0, 0};
+    Stop stop{.turns = true, .at_a = {0, 0, -0.5 * l}, .at_b = {0, 0, 0.5 * l}, .axis = {0, 1, 0}, .arm_m = 0.1, .most = 0.7};
+    stop.lever_a = stop.lever_b = {0, 0, 1};
+    Links links{.joints = {hinge(0, 1, {})}, .cords = {{.a = 0, .b = 1, .restitution = e, .stop = stop}}};
+    Space space({bar, bar}, std::move(states), std::nullopt, {}, {.joint_tolerance = 1e-11}, links);
+    const auto calc_momentum = [&] { return mass * (space.state(0).velocity + space.state(1).velocity); };
+    const auto calc_spin = [&] {
+      Vec3 sum{};
+      for (const int i : {0, 1}) sum = sum + space.state(i).momentum + mass * cross(space.state(i).centre, space.state(i).velocity);
+      return sum;
+    };
+    const Vec3 p = calc_momentum(), m = calc_spin();
+    const double before = space.calc_books().motion_j;
+    std::vector<Strike> strikes;
+    while (strikes.empty() && space.get_time() < 3.0) {
+      space.step(3.0);
+      for (Strike& s : space.take_strikes()) strikes.push_back(std::move(s));
+    }
+    ASSERT_EQ(strikes.size(), 1u);
+    const auto calc_opening = [&](const std::vector<State>& s) {  // of the hinge
+      return s[0].momentum[1] / bar.inertia_kg_m2[1][1] - s[1].momentum[1] / bar.inertia_kg_m2[1][1];
+    };
+    EXPECT_NEAR(calc_opening(strikes[0].after), -e * calc_opening(strikes[0].before), 1e-6);
+    EXPECT_LT(norm(calc_momentum() - p), 1e-6 * norm(p));
+    EXPECT_LT(norm(calc_spin() - m), 1e-6 * norm(m));
+    if (e == 1.0) {
+      EXPECT_NEAR(space.calc_books().motion_j, before, 1e-6 * before);
+    }
+    EXPECT_NEAR(calc_sum(space.calc_books()), before, 1e-6 * before);
+  }
+}
+
 }  // namespace
 }  // namespace carillon::rigid

@@ -168,12 +168,42 @@ TEST(Jointed, WhatCannotBeIsRefusedByName) {
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.bodies[0].velocity_m_s = {0, 1, 0}; }), "what its joints allow"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].damping = -1.0; }), "damping"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].axis = {}; }), "axis"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {0.1, 0.2}; }), "on both sides of the start"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {-4.0, 0.2}; }), "within 3.06 rad"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].limits = {-1, 1}, w.joints[1].stop_restitution = 2; }), "of its stops"));
+  EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) { w.joints[1].kind = Kind::kBall, w.joints[1].limits = {-1, 1}; }), "only hinges"));
   EXPECT_TRUE(contains(find_refusal([](WorldSpec& w) {
                          w.cords.push_back({.body = 0, .to = 1, .from_m = {0, 0.3, 0}, .to_m = {0, 0, -0.3}, .length_m = 0.2});
                        }),
                        "it is 0.2 m long"));
   EXPECT_TRUE(
       contains(find_refusal([](WorldSpec& w) { w.cords.push_back({.body = 0, .to = -1, .from_m = {}, .to_m = {}}); }), "at one place"));
+}
+
+TEST(Jointed, StopsHoldInWhateverOrderTheBodiesAreNamed) {
+  // A ball that hangs 0.3 m to the side of a hinge may fall by 0.5 rad; then it is thrown back, and comes to rest there.
+  const bank::Bank ball = make_ball(0.03, 3), post = make_box({0.05, 0.05, 0.05});
+  for (const bool turned : {false, true}) {
+    WorldSpec w;
+    w.bodies = {make_body("ball", ball, {0.3, 0, 0}), make_body("post", post, {0, 0.3, 0})};
+    w.bodies[1].fixed = true;
+    JointSpec hinge{.kind = Kind::kHinge, .body = turned ? 1 : 0, .to = turned ? 0 : 1, .at_m = {}, .axis = {0, 1, 0}};
+    hinge.limits = turned ? std::array<double, 2>{-0.5, 0.1} : std::array<double, 2>{-0.1, 0.5};
+    hinge.stop_restitution = 0.5;
+    w.joints = {hinge};
+    const Outcome r = run(w, 3.0);
+    double lowest = 0.0, after = -1.0;
+    for (const stream::Event& event : r.events)
+      if (const auto* m = std::get_if<stream::Motion>(&event); m != nullptr && m->body == 0) {
+        lowest = std::min(lowest, m->position_m[2]);
+        if (m->velocity_m_s[2] > 0.0) after = std::max(after, norm(m->velocity_m_s));
+      }
+    EXPECT_NEAR(lowest, -0.3 * std::sin(0.5), 1e-4);
+    EXPECT_NEAR(find_last(r, 0).position_m[2], -0.3 * std::sin(0.5), 1e-4);
+    const double inertia = ball.rigid.mass_kg * 0.09 + ball.rigid.inertia_kg_m2[4];
+    EXPECT_NEAR(after, 0.5 * 0.3 * std::sqrt(2.0 * ball.rigid.mass_kg * 9.81 * 0.3 * std::sin(0.5) / inertia), 0.02 * after);
+    EXPECT_LT(r.energy.error_j, 1e-3 * ball.rigid.mass_kg);
+  }
 }
 
 TEST(Jointed, WhatIsFarFromItsBodiesIsQuestioned) {
