@@ -4,6 +4,9 @@
 // Source: D. Gregorius, "The separating axis test between convex polyhedra" (GDC 2013); I. Sutherland, G. Hodgman (1974); C. Ericson,
 //   "Real-Time Collision Detection" (2005), 5.1.9.
 // Deviations: facets are preferred to edges that are within a degree of them.
+#include <algorithm>
+#include <cmath>
+
 #include "runtime/shape/polyhedron.hpp"
 #include "runtime/shape/reduce.hpp"
 #include "runtime/shape/search.hpp"
@@ -13,6 +16,7 @@ namespace {
 
 constexpr double kPrefer = 1e-5;   // of the size: how much better another axis must be
 constexpr double kFlush = 0.9998;  // cosine of a degree
+constexpr double kSeam = 3e-6;     // m; facets that are so flush have no step between them
 constexpr double kBrim = 1e-5;     // of the size: a corner may stand out so far beyond a facet
 
 /// Polyhedron b in the frame of a; a stays as it is.
@@ -75,6 +79,24 @@ class Pair {
       if (gap > enough) break;
     }
     return best;
+  }
+
+  /// Facets in whose plane a facet of the other body lies, back to front. Along them the bodies pass each other, or one lies on the other:
+  /// they do not meet across, however near they come.
+  std::vector<Axis> find_seams() const {
+    std::vector<Axis> seams;
+    for (const int kind : {0, 1}) {
+      const std::vector<Vec3>&mine = kind == 0 ? a_.normals : t_.normals, &theirs = kind == 0 ? t_.normals : a_.normals;
+      for (std::size_t i = 0; i < mine.size(); ++i) {
+        const double gap = calc_gap(kind, static_cast<int>(i));
+        if (std::abs(gap) > kSeam) continue;
+        const Vec3 normal = kind == 0 ? -1.0 * mine[i] : mine[i];
+        if (std::any_of(seams.begin(), seams.end(), [&](const Axis& other) { return dot(other.normal, normal) > kFlush; })) continue;
+        if (std::any_of(theirs.begin(), theirs.end(), [&](const Vec3& n) { return dot(n, mine[i]) < -kFlush; }))
+          seams.push_back({gap, kind, static_cast<int>(i), -1, normal});
+      }
+    }
+    return seams;
   }
 
   Axis find_edge_axis() {
@@ -272,6 +294,15 @@ void find_polyhedra_touches(const Shape& a, const Frame& fa, const Shape& b, con
   const bool was_b = memory.axis[0] == 1;
   Axis facet = on_b.gap > on_a.gap + (was_b ? -prefer : prefer) ? on_b : on_a;
   memory.axis = {facet.kind, facet.i};
+  if (facet.gap > 0.0) {
+    const std::vector<Axis> seams = pair.find_seams();
+    if (seams.size() > 1) return;  // edge to edge, they pass
+    if (seams.size() == 1 && dot(seams.front().normal, facet.normal) < kFlush) {
+      pair.clip(seams.front(), margin, out);
+      reduce(out, Box::kFar);
+      return;
+    }
+  }
   const Axis edges = pair.find_edge_axis();
   if (edges.gap > margin) return;
   const bool crossed = edges.i >= 0 && edges.gap > facet.gap + prefer && dot(edges.normal, facet.normal) < kFlush;

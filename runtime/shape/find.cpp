@@ -252,6 +252,7 @@ class Pass {
       }
     }
     if (!found) return;
+    if (t.side_b == Side::plane && sample.kind != VertexKind::corner && !mine_.skin().is_flat(sample.face) && add_rim(sample, t)) return;
     if (t.side_b != Side::skin) settle(t, mine_, fm_, &theirs_, ft_, reach_);
     t.curvature_a_per_m = curve(sample.kind, mine_);
     t.id = make_id(Feature::corner_a, sample.vertex, 0);
@@ -274,6 +275,28 @@ class Pass {
       t.axis_b = n;
     });
     return best > -Box::kFar;
+  }
+
+  /// A rim over a facet is round: the lowest place of the skin about the sample. False where that is not over the facet.
+  bool add_rim(const Sample& sample, Touch t) {
+    const double reach = kWalk * std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m);
+    const double brim = kBrim * std::min(mine_.get_size_m(), theirs_.get_size_m());
+    t.side_a = Side::skin;
+    t.face_a = sample.face;
+    t.smooth = true;
+    t.id = make_id(Feature::corner_a, sample.vertex, 0);
+    const auto add = [&](const Touch& touch) {
+      if (theirs_.mesh().find_nearest(touch.station_b, Box::kFar, -1).distance2 > brim * brim) return false;
+      if (touch.gap_m <= reach_) out_.push_back(touch);
+      return true;
+    };
+    Touch stays = t;
+    stays.stays = true;
+    const bool remains = settle(stays, mine_, fm_, &theirs_, ft_, reach);
+    if (!settle(t, mine_, fm_, &theirs_, ft_, reach) || is_level(t, mine_, fm_, &theirs_, ft_)) return remains && add(stays);
+    if (remains && norm(t.station_a - sample.point) > kGuard * mine_.get_size_m()) add(stays);
+    settle(t, mine_, fm_, &theirs_, ft_, reach);  // the spring's centre is now there
+    return add(t);
   }
 
   /// A place of a curved part.
@@ -306,7 +329,13 @@ class Pass {
       t.face_b = facing.side == Side::skin ? at.face : -1;
       if (facing.side == Side::line) t.curvature_b_per_m = curve(VertexKind::ridge, theirs_);
       if (facing.side == Side::point) t.curvature_b_per_m = curve(VertexKind::corner, theirs_);
-      const bool settled = settle(t, mine_, fm_, &theirs_, ft_, facing.side == Side::plane ? kWalk * reach : reach, kFirst);
+      const Touch before = t;
+      bool settled = settle(t, mine_, fm_, &theirs_, ft_, facing.side == Side::plane ? kWalk * reach : reach, kFirst);
+      if (settled && facing.side == Side::plane && is_level(t, mine_, fm_, &theirs_, ft_)) {
+        t = before;
+        t.stays = true;
+        settled = settle(t, mine_, fm_, &theirs_, ft_, kWalk * reach);
+      }
       if (settled && facing.side == Side::plane) settle(t, mine_, fm_, &theirs_, ft_, reach);
       if (facing.side == Side::plane || facing.side == Side::line) {
         const Nearest foot = mesh.find_nearest(t.station_b, Box::kFar, at.face);
@@ -337,6 +366,7 @@ class Pass {
       // Falling on beyond its reach: of another sample, unless it is nearly parallel.
       const Vec3 outward = rotation_ * mine_.skin().calc_normal(spot.face, spot.weights);
       if (facing.side != Side::plane || norm(outward + n) > kFlush) return;
+      t.stays = true;
       t.station_a = spot.point;
       t.face_a = spot.face;
       t.gap_m = dot(n, x - at.place);

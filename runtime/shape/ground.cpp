@@ -63,8 +63,17 @@ void find_candidates(const Shape& a, const Frame& fa, double height, double marg
         t.face_a = sample.face;
         t.smooth = true;
         const double reach = kWalk * std::max(1.5 * sample.reach_m, 2.0 * s.spacing_m);
-        const Touch before = t;
-        if (!settle(t, a, fa, nullptr, fa, reach)) {
+        Touch before = t;
+        before.stays = true;
+        const bool settled = settle(t, a, fa, nullptr, fa, reach);
+        if (settled && is_level(t, a, fa, nullptr, fa)) {
+          t = before;
+          if (!settle(t, a, fa, nullptr, fa, reach)) continue;
+        } else if (norm(t.station_a - sample.point) > kGuard * a.get_size_m() && settle(before, a, fa, nullptr, fa, reach) &&
+                   before.gap_m <= margin) {
+          out.push_back(before);
+        }
+        if (!settled) {
           // Falling on beyond its reach: of another sample, unless it is nearly parallel to the ground.
           t = before;
           const Spot spot = a.skin().locate(t.station_a, t.face_a);
@@ -127,9 +136,9 @@ void thin(std::vector<Touch>& touches, double spacing, double patch) {
 void answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, bool moved, PairMemory& memory,
             std::vector<Touch>& out) {
   const double size = b != nullptr ? std::min(a.get_size_m(), b->get_size_m()) : a.get_size_m();
-  for (const Touch& candidate : memory.candidates) {
+  for (Touch& candidate : memory.candidates) {
+    if (moved) settle(candidate, a, fa, b, fb, 0.1 * size);
     out.push_back(candidate);
-    if (moved) settle(out.back(), a, fa, b, fb, 0.1 * size);
     if (out.back().gap_m > margin) out.pop_back();
   }
   if (moved) thin(out, 0.02 * size, kPatch * size);

@@ -69,8 +69,6 @@ Mesh::Mesh(std::span<const Vec3> given_vertices, std::span<const Triangle> trian
   check_input(given_vertices, triangles);
   faces.assign(triangles.begin(), triangles.end());
   opposite = find_opposites(faces, given_vertices.size());
-  given.resize(faces.size());
-  std::iota(given.begin(), given.end(), 0);
   // A vertex for each fan of faces about a given one.
   std::vector<std::int32_t> fan(3 * faces.size(), -1);
   std::vector<std::array<std::int32_t, 3>> renumbered(faces.size());
@@ -173,7 +171,7 @@ Nearest Mesh::find_nearest(const Vec3& x, double within2, int hint, double slack
     }
   };
   tighten();
-  std::array<std::pair<double, int>, 64> open{};
+  std::array<std::pair<double, int>, 64> open;
   std::size_t count = 0;
   open[count++] = {nodes_[0].box.calc_distance2(x), 0};
   while (count > 0) {

@@ -77,7 +77,6 @@ class Mesh {
   // Read only after the making.
   std::vector<Vec3> vertices, normals;  // normals: unit, of faces
   std::vector<std::array<std::int32_t, 3>> faces;
-  std::vector<std::int32_t> given;          // the triangle that the maker was given, of every face
   std::vector<std::int32_t> opposite;       // half-edge 3 f + k runs from corner k to the next; the one that runs back
   std::vector<Vec3> vertex_normals;         // weighted by angle; not unit
   std::vector<std::int32_t> any_half_edge;  // that begins at a vertex

@@ -31,7 +31,7 @@ struct Half {
     flat = to_world(*frame, shape->mesh().place(face, spot.weights));
     outward = frame->rotation * shape->skin().calc_normal(face, spot.weights);
     tensor = shape->skin().calc_tensor(face, spot.weights);
-    curvature = 0.5 * (tensor[0] + tensor[1] + tensor[2]);
+    curvature = calc_mean(tensor);
   }
   void begin() {
     point = to_world(*frame, station);
@@ -150,6 +150,9 @@ bool settle_curved(Touch& touch, Half& a, Half& b, double reach, int most) {
   touch.normal = n;
   touch.gap_m = dot(n, a.point - b.point);
   touch.where_m = 0.5 * (a.point + b.point);
+  const Vec3 s = find_across(n), t = cross(n, s);
+  const double ss = a.bend(s, s) + b.bend(s, s), st = a.bend(s, t) + b.bend(s, t), tt = a.bend(t, t) + b.bend(t, t);
+  touch.steepest_per_m = 0.5 * (ss + tt) + std::hypot(0.5 * (ss - tt), st);
   const Vec3 across = (a.point - b.point) - touch.gap_m * n;
   // The nearest place of a mesh is off that of the smooth body by the tilt of its facets.
   const bool left = std::min(norm(a.point - start_a), norm(b.point - start_b)) > 4.0 * reach;
@@ -170,11 +173,15 @@ bool settle(Touch& t, const Shape& a, const Frame& fa, const Shape* b, const Fra
     const Vec3 n = plane.rotation * (on_b ? t.axis_b : t.axis_a);  // outward of the plane
     if ((on_b ? t.side_a : t.side_b) == Side::skin) {
       int& face = on_b ? t.face_a : t.face_b;
-      const Spot spot = shape->skin().walk_lowest(turn_back(other.rotation, n), face, station, reach);
+      const Vec3 up = turn_back(other.rotation, n);
+      Spot spot = shape->skin().walk_lowest(up, face, station, reach, t.stays);
       settled = spot.settled;
+      if (t.stays && settled) spot = shape->skin().walk_lowest(up, spot.face, spot.point, reach, true);  // it lags less across a rod
       station = spot.point;
       face = spot.face;
-      (on_b ? t.curvature_a_per_m : t.curvature_b_per_m) = shape->skin().calc_mean_curvature(face, spot.weights);
+      const Tensor bend = shape->skin().calc_tensor(face, spot.weights);
+      (on_b ? t.curvature_a_per_m : t.curvature_b_per_m) = calc_mean(bend);
+      t.steepest_per_m = calc_steepest(bend);
     }
     const Vec3 x = to_world(other, station);
     t.gap_m = dot(n, x - to_world(plane, origin));
@@ -216,6 +223,22 @@ bool settle(Touch& t, const Shape& a, const Frame& fa, const Shape* b, const Fra
   if (t.side_a == Side::skin) t.curvature_a_per_m = ha.curvature;
   if (t.side_b == Side::skin) t.curvature_b_per_m = hb.curvature;
   return settled;
+}
+
+bool is_level(const Touch& t, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb) {
+  constexpr double kTilt = 2e-3, kFar = 0.05;
+  const bool on_b = t.side_b == Side::plane;
+  const Shape& shape = on_b || b == nullptr ? a : *b;
+  const Vec3 n = on_b ? (b != nullptr ? fb.rotation * t.axis_b : t.axis_b) : fa.rotation * t.axis_a;
+  const Vec3 up = turn_back((on_b ? fa : fb).rotation, n), s = find_across(up), along[2] = {s, cross(up, s)};
+  for (const Vec3& way : along)
+    for (const double tilt : {-kTilt, kTilt})
+      if (!shape.skin()
+               .walk_lowest(normalise(up + tilt * way), on_b ? t.face_a : t.face_b, on_b ? t.station_a : t.station_b,
+                            kFar * shape.get_size_m(), false)
+               .settled)
+        return true;
+  return false;
 }
 
 void refresh(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, PairMemory& /*memory*/) {

@@ -26,6 +26,11 @@ inline constexpr int kFirst = 12, kAgain = 2;  // iterations between two curved 
 bool settle(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m,
             int iterations = kAgain);
 
+/// Of a touch at the lowest place of a skin over a plane: would that place move by more than a twentieth of the body's size if the body
+/// tilted by 2e-3 rad? It would under a rod or a coin that lies, which stand on several places, and not under a coin that leans by more
+/// than a degree.
+bool is_level(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b);
+
 /// Is all that is nearer than margin_m now among the candidates of the last search?
 bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position_m, const Shape& a, double margin_m);
 /// Keeps of touches that travel and have met one, the deepest; then few of a patch.
@@ -36,6 +41,8 @@ void answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& f
 
 /// Of two bodies at a distance of 0 to `size`: how far a search looks beyond the margin, so that the next ones can be spared.
 inline double choose_slack(double margin_m, double size_m) { return std::max(margin_m, 1e-3 * size_m); }
+inline constexpr double kGuard =
+    0.25;  // of the size: a place near the plane that is further than this from the lowest one is a touch of its own
 inline constexpr double kWalk = 4.0;    // reaches of a sample: how far the lowest place may be, at a tip that no sample is near
 inline constexpr double kPatch = 0.25;  // of the smaller body: what is further apart are different patches
 

@@ -45,7 +45,11 @@ Box Shape::calc_box(const Frame& frame) const {
   return box;
 }
 
-Place Shape::find_place(const Vec3& point, const Vec3& outward) const {
+Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hint) const {
+  if (hint >= 0) {
+    const Nearest on = mesh_->find_nearest_on_face(point, hint);
+    if (on.distance2 < 1e-12 * size_m_ * size_m_) return choose_face(on, point, outward);
+  }
   const Nearest nearest = mesh_->find_nearest(point, Box::kFar, -1);
   // At an edge or a corner, and under a curved skin, several faces are near: the one that looks the way asked.
   const double reach = std::sqrt(nearest.distance2) + 1e-6 * size_m_;
@@ -59,7 +63,32 @@ Place Shape::find_place(const Vec3& point, const Vec3& outward) const {
     most = along;
     best = on;
   });
-  return {mesh_->given[best.face], best.weights, skin_->calc_mean_curvature(best.face, best.weights)};
+  return {best.face, best.weights, skin_->calc_mean_curvature(best.face, best.weights)};
+}
+
+/// Of the faces that meet where a point of the surface was found, the one that looks the way asked.
+Place Shape::choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const {
+  constexpr double kEdge = 1e-6;
+  int face = on.face, zeros = 0, whole = 0;
+  double most = dot(mesh_->normals[face], outward);
+  const auto look = [&](int f) {
+    const double along = dot(mesh_->normals[f], outward);
+    if (along > most) most = along, face = f;
+  };
+  for (int k = 0; k < 3; ++k) {
+    if (on.weights[k] > kEdge) {
+      whole = k;
+      continue;
+    }
+    ++zeros;
+    look(mesh_->opposite[3 * on.face + (k + 1) % 3] / 3);
+  }
+  if (zeros == 2) {
+    const int start = 3 * on.face + whole;
+    for (int e = Mesh::next(mesh_->opposite[start]); e != start; e = Mesh::next(mesh_->opposite[e])) look(e / 3);
+  }
+  const Vec3 weights = face == on.face ? on.weights : mesh_->find_nearest_on_face(point, face).weights;
+  return {face, weights, skin_->calc_mean_curvature(face, weights)};
 }
 
 void Shape::prepare(bool meets_bodies) const {

@@ -14,6 +14,7 @@
 
 namespace carillon::shape {
 
+struct Nearest;
 class Mesh;
 class Skin;
 struct Polyhedron;
@@ -43,8 +44,9 @@ class Shape {
   double calc_radius_m(const Vec3& centre) const;
   /// Along the world's axes.
   Box calc_box(const Frame& frame) const;
-  /// The triangle of the fine mesh at a point of the surface whose normal is `outward`; mesh frame.
-  Place find_place(const Vec3& point_m, const Vec3& outward) const;
+  /// The triangle of the fine mesh at a point of the surface whose normal is `outward`; mesh frame. `hint`: a triangle that may be it; -1:
+  /// none.
+  Place find_place(const Vec3& point_m, const Vec3& outward, std::int32_t hint = -1) const;
   /// Makes now what a search against the ground will need, or against other bodies as well, so that the first one is as quick as the next.
   void prepare(bool meets_bodies = true) const;
   bool is_polyhedron() const { return polyhedron_ != nullptr; }
@@ -59,6 +61,8 @@ class Shape {
   const Grid& grid() const;
 
  private:
+  Place choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const;
+
   std::unique_ptr<const Mesh> mesh_;
   std::unique_ptr<const Skin> skin_;
   std::unique_ptr<const Polyhedron> polyhedron_;

@@ -22,16 +22,15 @@ constexpr double kSharper = 3.0;     // than the mean about it
 constexpr double kLargePlane = 6.0;  // times the area of its curved neighbours
 constexpr double kLargePlaneOfAll = 0.01;
 constexpr double kAlpha = 0.5;
-constexpr double kSpring = 0.2;  // curvature over the size
+constexpr double kSpring = 1e-3, kStays = 0.2;  // curvatures over the size
 
 double calc_angle(const Vec3& a, const Vec3& b) { return std::atan2(norm(cross(a, b)), dot(a, b)); }
 
 }  // namespace
 
 Skin::Skin(const Mesh& mesh) : mesh_(mesh) {
-  const double size = norm(mesh.box.high - mesh.box.low);
-  tiny_ = 1e-14 * size;
-  spring_ = 0.5 * kSpring / size;
+  size_m_ = norm(mesh.box.high - mesh.box.low);
+  tiny_ = 1e-14 * size_m_;
   find_regions();
   find_sharp_edges();
   make_fans();
@@ -303,18 +302,15 @@ Tensor Skin::calc_tensor(int face, const Vec3& w) const {
   return sum;
 }
 
-double Skin::calc_mean_curvature(int face, const Vec3& w) const {
-  const Tensor t = calc_tensor(face, w);
-  return 0.5 * (t[0] + t[1] + t[2]);
-}
+double Skin::calc_mean_curvature(int face, const Vec3& w) const { return calc_mean(calc_tensor(face, w)); }
 
-Spot Skin::find_lowest(const Vec3& up, int face, const Vec3& centre) const {
+Spot Skin::find_lowest(const Vec3& up, int face, const Vec3& centre, double spring) const {
   const Patch q = make_patch(face);
   const Vec3 d0 = q.p[0] - centre, d1 = q.p[1] - centre, d2 = q.p[2] - centre;
-  const double a0 = dot(up, q.p[0]) + spring_ * norm2(d0), a1 = dot(up, q.p[1]) + spring_ * norm2(d1),
-               a2 = dot(up, q.p[2]) + spring_ * norm2(d2);
-  const double c01 = dot(up, q.c[0]) + spring_ * dot(d0, d1), c12 = dot(up, q.c[1]) + spring_ * dot(d1, d2),
-               c20 = dot(up, q.c[2]) + spring_ * dot(d2, d0);
+  const double a0 = dot(up, q.p[0]) + spring * norm2(d0), a1 = dot(up, q.p[1]) + spring * norm2(d1),
+               a2 = dot(up, q.p[2]) + spring * norm2(d2);
+  const double c01 = dot(up, q.c[0]) + spring * dot(d0, d1), c12 = dot(up, q.c[1]) + spring * dot(d1, d2),
+               c20 = dot(up, q.c[2]) + spring * dot(d2, d0);
   Spot spot;
   spot.face = face;
   spot.height = Box::kFar;
@@ -354,9 +350,10 @@ Spot Skin::find_lowest(const Vec3& up, int face, const Vec3& centre) const {
   return spot;
 }
 
-Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reach) const {
+Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reach, bool stays) const {
   constexpr int kMost = 400;
-  Spot best = find_lowest(up, face, centre);
+  const double spring = 0.5 * (stays ? kStays : kSpring) / size_m_;
+  Spot best = find_lowest(up, face, centre, spring);
   for (int step = 0; step < kMost; ++step) {
     if (norm2(best.point - centre) > reach * reach) {
       best.settled = false;
@@ -375,12 +372,12 @@ Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reac
     Spot better = best;
     const double below = best.height - tiny_;
     if (zeros == 1) {
-      const Spot beyond = find_lowest(up, mesh_.opposite[3 * best.face + (zero + 1) % 3] / 3, centre);
+      const Spot beyond = find_lowest(up, mesh_.opposite[3 * best.face + (zero + 1) % 3] / 3, centre, spring);
       if (beyond.height < below) better = beyond;
     } else {
       const int start = 3 * best.face + whole;
       for (int e = Mesh::next(mesh_.opposite[start]); e != start; e = Mesh::next(mesh_.opposite[e])) {
-        const Spot beyond = find_lowest(up, e / 3, centre);
+        const Spot beyond = find_lowest(up, e / 3, centre, spring);
         if (beyond.height < below && beyond.height < better.height) better = beyond;
       }
     }

@@ -18,6 +18,12 @@ inline double calc_along(const Tensor& t, const Vec3& a, const Vec3& b) {
   return t[0] * a[0] * b[0] + t[1] * a[1] * b[1] + t[2] * a[2] * b[2] + t[3] * (a[0] * b[1] + a[1] * b[0]) +
          t[4] * (a[0] * b[2] + a[2] * b[0]) + t[5] * (a[1] * b[2] + a[2] * b[1]);
 }
+inline double calc_mean(const Tensor& t) { return 0.5 * (t[0] + t[1] + t[2]); }
+/// The larger of both principal curvatures of a tensor that bends nothing along the normal.
+inline double calc_steepest(const Tensor& t) {
+  const double mean = calc_mean(t), square = t[0] * t[0] + t[1] * t[1] + t[2] * t[2] + 2.0 * (t[3] * t[3] + t[4] * t[4] + t[5] * t[5]);
+  return mean + std::sqrt(std::max(0.0, 0.5 * square - mean * mean));
+}
 
 struct Patch {
   std::array<Vec3, 3> p, c;  // corners; control point of the edge from corner k to the next
@@ -58,8 +64,9 @@ class Skin {
   double calc_mean_curvature(int face, const Vec3& w) const;
 
   /// Down to the lowest place along `up` on the curved skin, from a face on; not further than `reach` from `centre`. A weak spring to the
-  /// centre (of a curvature of 0.2 over the size) keeps it from sliding along what is level.
-  Spot walk_lowest(const Vec3& up, int face, const Vec3& centre, double reach) const;
+  /// centre keeps it from sliding along what is level. Under a body that rolls the place lags by the spring's curvature over the body's, so
+  /// that of the spring is 0.001 over the size; 0.2 where the place `stays`.
+  Spot walk_lowest(const Vec3& up, int face, const Vec3& centre, double reach, bool stays) const;
   /// The place of the mesh near x, by way of neighbours from a face on, and its point on the curved skin.
   Spot locate(const Vec3& x, int face) const;
 
@@ -70,7 +77,7 @@ class Skin {
   void make_groups();
   bool is_tip(const std::vector<int>& corners, const Vec3& mean) const;  // of half-edges about a vertex that leave it
   void fit_tensor(int vertex, const std::vector<int>& corners, int fan);
-  Spot find_lowest(const Vec3& up, int face, const Vec3& centre) const;
+  Spot find_lowest(const Vec3& up, int face, const Vec3& centre, double spring) const;
 
   const Mesh& mesh_;
   bool all_curved_ = false;
@@ -82,7 +89,7 @@ class Skin {
   std::vector<Tensor> fan_tensors_;
   std::vector<char> fan_curved_;
   std::vector<VertexKind> kinds_;
-  double sag_m_ = 0.0, tiny_ = 0.0, spring_ = 0.0;
+  double sag_m_ = 0.0, tiny_ = 0.0, size_m_ = 0.0;
 };
 
 }  // namespace carillon::shape

@@ -21,12 +21,14 @@ struct Touch {
   Vec3 where_m{}, normal{};       // world; unit, from b to a
   double gap_m = 0.0;             // negative: inside
   Vec3 station_a{}, station_b{};  // surface points in the mesh frames (b: world for the ground)
-  double curvature_a_per_m = 0.0, curvature_b_per_m = 0.0;  // for Hertz; 0 flat
+  double curvature_a_per_m = 0.0, curvature_b_per_m = 0.0;  // mean, for Hertz; 0 flat
+  double steepest_per_m = 0.0;                              // the largest curvature of curved sides together: of what rolls; 0 flat
   bool smooth = false;                                      // the point travels over a curved surface while it rolls: refresh() moves it
   // How refresh() goes on:
   Side side_a = Side::point, side_b = Side::plane;
   Vec3 axis_a{}, axis_b{};       // outward normal of a plane, direction of a line; in the frame of its body (world for the ground)
   int face_a = -1, face_b = -1;  // of the fine mesh, where the skin search begins; -1: none
+  bool stays = false;            // of several on what is nearly level: stays about where it is and does not go to the lowest place
 };
 
 /// The caller's, one per pair: what makes the next search cheap and gives touches their names. Of no meaning to the caller.

@@ -29,6 +29,27 @@ TEST(polyhedra, flush_boxes_touch_at_the_corners_of_their_overlap) {
   EXPECT_EQ(find(*small, top, *small, bottom, 1e-4).size(), 4U);
 }
 
+TEST(polyhedra, pass_each_other_at_a_flush_seam) {
+  // A tile comes over the edge of a board whose face it slides in, from 1 um too high to 1 um too deep: no touch is across its way.
+  const auto tile = make_box({0.08, 0.06, 0.02}, 2).make(), board = make_box({0.4, 0.3, 0.04}, 1).make();
+  for (const double x : {-0.241, -0.2401, -0.240002, -0.24 - 1e-9}) {
+    for (const double lift : {-1e-6, -1e-11, 0.0, 1e-11, 1e-6}) {
+      Frame above, below;
+      above.position_m = {x, 0, 0.03 + lift};
+      for (const Touch& t : find(*tile, above, *board, below, 2e-3)) EXPECT_NEAR(t.normal[2], 1.0, 1e-12) << x << " " << lift;
+      above.position_m = {x + 0.01, 0, 0.03 + lift};
+      const auto touches = find(*tile, above, *board, below, 2e-3);
+      EXPECT_EQ(touches.size(), 4U) << x << " " << lift;
+      for (const Touch& t : touches) EXPECT_NEAR(t.normal[2], 1.0, 1e-12) << x << " " << lift;
+    }
+    Frame above, below;
+    above.position_m = {x, 0, 0.03 - 1e-5};
+    const auto touches = find(*tile, above, *board, below, 2e-3);  // a step of 10 um
+    ASSERT_FALSE(touches.empty()) << x;
+    for (const Touch& t : touches) EXPECT_NEAR(t.normal[0], -1.0, 1e-12) << x;
+  }
+}
+
 TEST(polyhedra, crossed_edges_touch_in_one_point) {
   const auto bar = make_box({0.2, 0.02, 0.02}, 2).make();
   Frame below, above;

@@ -91,6 +91,25 @@ TEST(shape, touched_triangle_is_the_one_that_looks_the_way_asked) {
     }
     EXPECT_NEAR(norm(x - Vec3{1, 1, 1}), 0.0, 1e-12);
   }
+  // Whatever triangle is looked at first.
+  const auto round = make_ball(0.03, 4);
+  for (const Solid* body : {&solid, &round}) {
+    const auto made = body->make();
+    for (int n = 0; n < 300; ++n) {
+      const auto& t = body->triangles[(7 * n) % body->triangles.size()];
+      const double u = 0.5 * (n % 3), v = 0.5 * (n / 3 % 2) * (1.0 - u);  // corners, edges and the inside
+      const Vec3 at = u * body->vertices[t[0]] + v * body->vertices[t[1]] + (1.0 - u - v) * body->vertices[t[2]];
+      const Vec3 outward = (1.0 / norm(at)) * at + Vec3{0.1 * (n % 5), 0.07 * (n % 3), -0.05 * (n % 7)};
+      const Place whole = made->find_place(at, outward);
+      for (int hint = 0; hint < static_cast<int>(body->triangles.size()); hint += 1 + n % 7) {
+        const Place place = made->find_place(at, outward, hint);
+        EXPECT_NEAR(dot(made->mesh().normals[place.triangle], outward), dot(made->mesh().normals[whole.triangle], outward), 1e-12);
+        Vec3 x{};
+        for (int i = 0; i < 3; ++i) x = x + place.barycentric[i] * body->vertices[body->triangles[place.triangle][i]];
+        EXPECT_NEAR(norm(x - at), 0.0, 1e-9);
+      }
+    }
+  }
   const auto ball = make_ball(0.03, 16).make();
   EXPECT_NEAR(ball->find_place({0, 0, 0.03}, {0, 0, 1}).curvature_per_m, 1.0 / 0.03, 0.5);
 }
