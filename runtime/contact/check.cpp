@@ -12,6 +12,8 @@
 namespace carillon::contact {
 namespace {
 
+constexpr double kWidest = 3.06;  // rad, of a hinge with stops; past pi the angle wraps round to the other side
+
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
 bool is_zero(const Vec3& x) { return x[0] == 0.0 && x[1] == 0.0 && x[2] == 0.0; }
@@ -92,6 +94,18 @@ void check_joints(const WorldSpec& spec) {
       throw InputError(who + ": its second axis is not of length 1 and at right angles to the first");
     if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
       throw InputError(fmt::format("{}: damping {} must be a finite number, 0 or more", who, joint.damping));
+    if (joint.limits) {
+      const auto [low, high] = *joint.limits;
+      const bool turns = joint.kind == joints::Kind::kHinge;
+      if (!turns && joint.kind != joints::Kind::kSlider) throw InputError(who + ": only hinges and sliders have limits");
+      if (!(low <= 0.0 && high >= 0.0 && high - low > 1e-6 && std::isfinite(high - low)))
+        throw InputError(fmt::format("{}: its limits {:g} and {:g} must be on both sides of the start, which is 0", who, low, high));
+      if (turns && !(low >= -kWidest && high <= kWidest))
+        throw InputError(
+            fmt::format("{}: its limits must be within {:g} rad of the start; leave out what never comes so far", who, kWidest));
+      if (!(joint.stop_restitution >= 0.0 && joint.stop_restitution <= 1.0))
+        throw InputError(fmt::format("{}: the restitution {} of its stops is not within 0..1", who, joint.stop_restitution));
+    }
     if (joint.kind == joints::Kind::kWeld && (is_fixed(joint.body) || is_fixed(joint.to)))
       throw InputError(who + " welds a body to what does not move; set \"fixed\" of that body to true instead");
     if (groups.find(find(joint.body)) == groups.find(find(joint.to)))

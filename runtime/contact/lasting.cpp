@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "runtime/config/chance.hpp"
 #include "runtime/impact/spring.hpp"
@@ -23,6 +24,7 @@ using impact::operator*;
 using rigid::norm;
 using stream::Vec3;
 
+constexpr double kInstant = 1e-8;     // s; shorter than any step, longer than what a step may leave out at its end
 constexpr double kPatience = 5e-3;    // s
 constexpr double kRise = 5e-3;        // s; the force of a new contact comes within it: the impact before has been heard already
 constexpr double kInterval = 1e-3;    // s
@@ -42,9 +44,9 @@ double calc_spot_radius(const rigid::Space& space, int a, int b) {
   return 0.1 * (b >= 0 ? std::min(size, space.solid(b).shape->get_size_m()) : size);
 }
 
-Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const Vec3& where, const Vec3& outward) {
+Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const Vec3& where, const Vec3& outward, std::int32_t hint) {
   const rigid::Mat3 back = rigid::transpose(rigid::make_rotation(state.rotation));
-  const shape::Place place = solid.shape->find_place(solid.centre_m + back * (where - state.centre), back * outward);
+  const shape::Place place = solid.shape->find_place(solid.centre_m + back * (where - state.centre), back * outward, hint);
   return {place.triangle, place.barycentric};
 }
 
@@ -59,10 +61,15 @@ struct LastingContacts::Group {
 
 std::vector<LastingContacts::Group> LastingContacts::make_groups(const rigid::Space& space) {
   space.list_contacts(contacts_);
-  std::erase_if(contacts_,
-                [](const rigid::Contact* c) { return !(c->step_s > 0.0 && c->touching && dot(c->impulse, c->touch.normal) > 0.0); });
+  // Groups have steps of different lengths: each counts when its step ends.
+  std::erase_if(contacts_, [&](const rigid::Contact* c) {
+    return !(c->step_s > 0.0 && c->touching && dot(c->impulse, c->touch.normal) > 0.0) ||
+           std::abs(c->until_s - space.get_time()) > kInstant;
+  });
   const auto get_push = [](const rigid::Contact* c) { return dot(c->impulse, c->touch.normal) / c->step_s; };
-  std::stable_sort(contacts_.begin(), contacts_.end(), [&](const auto* x, const auto* y) { return get_push(x) > get_push(y); });
+  std::stable_sort(contacts_.begin(), contacts_.end(), [&](const auto* x, const auto* y) {
+    return std::tuple(x->a, x->b, -get_push(x)) < std::tuple(y->a, y->b, -get_push(y));
+  });
   std::vector<char> taken(contacts_.size(), 0);
   std::vector<Group> groups;
   for (std::size_t seed = 0; seed < contacts_.size(); ++seed) {
@@ -72,9 +79,9 @@ std::vector<LastingContacts::Group> LastingContacts::make_groups(const rigid::Sp
     g.a = first.a;
     g.b = first.b;
     const double near = calc_spot_radius(space, g.a, g.b);
-    for (std::size_t i = seed; i < contacts_.size(); ++i) {
+    for (std::size_t i = seed; i < contacts_.size() && contacts_[i]->a == g.a && contacts_[i]->b == g.b; ++i) {
       const rigid::Contact& c = *contacts_[i];
-      if (taken[i] || c.a != g.a || c.b != g.b || norm(c.touch.where_m - first.touch.where_m) > near) continue;
+      if (taken[i] || norm(c.touch.where_m - first.touch.where_m) > near) continue;
       taken[i] = 1;
       const double push = get_push(&c);
       g.push_n += push;
@@ -133,7 +140,8 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     const double sign = side == 0 ? 1.0 : -1.0;
     const rigid::State& state = space.state(body);
     const rigid::Mat3 back = rigid::transpose(rigid::make_rotation(state.rotation));
-    const Spotted place = find_place(space.solid(body), state, g.where, (-sign) * g.normal);
+    const Spotted place =
+        find_place(space.solid(body), state, g.where, (-sign) * g.normal, is_new ? -1 : spot.last[static_cast<std::size_t>(side)].triangle);
     stream::Contact c;
     c.time_s = time_s;
     c.id = spot.id;
@@ -164,8 +172,11 @@ std::uint64_t LastingContacts::make_id(const Spot& spot) {
   std::uint64_t id = scramble(scramble(hash_name(spot.a)) + scramble(hash_name(spot.b)) + touch) >> 1;  // files hold signed numbers
   ++touch;
   // Bodies may have one name.
-  while (std::any_of(spots_.begin(), spots_.end(), [&](const Spot& other) { return other.begun_s >= 0.0 && other.id == id; }))
-    id = scramble(id) >> 1;
+  const auto is_taken = [&](const auto& of_pair) {
+    return std::any_of(of_pair.second.begin(), of_pair.second.end(),
+                       [&](const Spot& other) { return other.begun_s >= 0.0 && other.id == id; });
+  };
+  while (std::any_of(spots_.begin(), spots_.end(), is_taken)) id = scramble(id) >> 1;
   return id;
 }
 
@@ -174,8 +185,9 @@ void LastingContacts::update(const rigid::Space& space, std::vector<stream::Even
   for (const Group& g : make_groups(space)) {
     Spot* nearest = nullptr;
     double least = 2.0 * calc_spot_radius(space, g.a, g.b);
-    for (Spot& spot : spots_) {
-      if (spot.a != g.a || spot.b != g.b || spot.seen_s >= time_s) continue;
+    std::vector<Spot>& spots = spots_[{g.a, g.b}];
+    for (Spot& spot : spots) {
+      if (spot.seen_s >= time_s) continue;
       const double distance = norm(spot.where - g.where);
       if (distance >= least) continue;
       nearest = &spot;
@@ -189,7 +201,7 @@ void LastingContacts::update(const rigid::Space& space, std::vector<stream::Even
       spot.features = g.features;
       spot.load_n = g.push_n;
       spot.quiet_s = spot.seen_s = time_s;
-      spots_.push_back(std::move(spot));
+      spots.push_back(std::move(spot));
       continue;
     }
     Spot& spot = *nearest;
@@ -207,8 +219,19 @@ void LastingContacts::update(const rigid::Space& space, std::vector<stream::Even
     if (spot.begun_s < 0.0) spot.id = make_id(spot);
     record(space, g, spot, events);
   }
-  for (Spot& spot : spots_) {
-    // Where both lie still the contact goes on, and after one record of that nothing changes.
+  // At times that do not depend on the steps of other groups.
+  if (!space.is_at_window()) return;
+  for (auto pair = spots_.begin(); pair != spots_.end();) {
+    end_or_keep(space, pair->second, events);
+    pair = pair->second.empty() ? spots_.erase(pair) : std::next(pair);
+  }
+}
+
+/// The spots of a pair that were not seen, or lie still.
+void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<stream::Event>& events) {
+  const double time_s = space.get_time();
+  for (Spot& spot : spots) {
+    // Where both lie still the contact lasts, and after one record of that nothing changes.
     const bool lies = space.is_still(spot.a) && (spot.b < 0 || space.is_still(spot.b));
     if (lies) {
       spot.seen_s = time_s;
@@ -235,13 +258,14 @@ void LastingContacts::update(const rigid::Space& space, std::vector<stream::Even
       events.push_back(c);
     }
   }
-  std::erase_if(spots_, [&](const Spot& s) { return time_s - s.seen_s > kGone; });
+  std::erase_if(spots, [&](const Spot& s) { return time_s - s.seen_s > kGone; });
 }
 
 void LastingContacts::note_impact(const rigid::Space& space, int a, int b, const Vec3& where, double time_s) {
-  for (Spot& spot : spots_) {
-    if (spot.a == a && spot.b == b && norm(spot.where - where) < 2.0 * calc_spot_radius(space, a, b)) spot.quiet_s = time_s;
-  }
+  const auto found = spots_.find({a, b});
+  if (found == spots_.end()) return;
+  for (Spot& spot : found->second)
+    if (norm(spot.where - where) < 2.0 * calc_spot_radius(space, a, b)) spot.quiet_s = time_s;
 }
 
 }  // namespace carillon::contact

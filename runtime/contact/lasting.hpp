@@ -22,12 +22,13 @@ struct Matter {
 /// Points of a pair nearer to each other than this belong to one spot [m]: a tenth of the smaller body's size.
 double calc_spot_radius(const rigid::Space& space, int a, int b);
 
-/// The place of a point of the world on a body's bank.
+/// The place of a point of the world on a body's bank; `hint`: a triangle that may be it.
 struct Spotted {
   std::int32_t triangle = 0;
   stream::Vec3 barycentric{};
 };
-Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const stream::Vec3& where, const stream::Vec3& outward);
+Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const stream::Vec3& where, const stream::Vec3& outward,
+                   std::int32_t hint = -1);
 
 class LastingContacts {
  public:
@@ -60,6 +61,7 @@ class LastingContacts {
 
   std::vector<Group> make_groups(const rigid::Space& space);
   void record(const rigid::Space& space, const Group& group, Spot& spot, std::vector<stream::Event>& events);
+  void end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<stream::Event>& events);
   std::uint64_t make_id(const Spot& spot);
   std::uint64_t hash_name(int body) const;
   const Matter& get_matter(int body) const { return body < 0 ? matter_.back() : matter_[static_cast<std::size_t>(body)]; }
@@ -67,8 +69,8 @@ class LastingContacts {
   double calc_impedance(int body, double patch_m) const;
 
   std::vector<Matter> matter_;
-  std::map<std::pair<int, int>, std::uint64_t> touches_;  // how many lasting contacts each pair has had
-  std::vector<Spot> spots_;
+  std::map<std::pair<int, int>, std::uint64_t> touches_;    // how many lasting contacts each pair has had
+  std::map<std::pair<int, int>, std::vector<Spot>> spots_;  // by their bodies
   std::vector<const rigid::Contact*> contacts_;
 };
 

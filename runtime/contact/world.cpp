@@ -81,11 +81,41 @@ std::vector<Matter> list_matter(const WorldSpec& spec) {
   return matter;
 }
 
+/// The stops of a joint: one at each end of its way.
+void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states, rigid::Links& links) {
+  using impact::operator-;
+  using rigid::operator*;
+  const bool turned = solids[static_cast<std::size_t>(j.body)].fixed;  // what moves comes first
+  const int a = turned ? j.to : j.body, b = turned ? j.body : j.to;
+  const auto get_turn = [&](int body) {
+    return body < 0 ? rigid::Mat3{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}
+                    : rigid::transpose(rigid::make_rotation(states[static_cast<std::size_t>(body)].rotation));
+  };
+  const auto get_place = [&](int body) {
+    return body < 0 ? j.at_m : get_turn(body) * (j.at_m - states[static_cast<std::size_t>(body)].centre);
+  };
+  const Vec3 lever = impact::find_across(j.axis);
+  double arm = solids[static_cast<std::size_t>(a)].radius_m;
+  if (b >= 0 && !solids[static_cast<std::size_t>(b)].fixed) arm = std::min(arm, solids[static_cast<std::size_t>(b)].radius_m);
+  for (const bool is_lower : {true, false}) {
+    rigid::Stop stop{.turns = j.kind == joints::Kind::kHinge, .at_a = get_place(a), .at_b = get_place(b), .axis = get_turn(b) * j.axis};
+    stop.lever_a = get_turn(a) * lever;
+    stop.lever_b = get_turn(b) * lever;
+    stop.arm_m = arm;
+    stop.is_lower = is_lower;
+    stop.most = turned ? -(*j.limits)[is_lower ? 1 : 0] : (*j.limits)[is_lower ? 0 : 1];
+    links.cords.push_back({.a = a, .b = b, .restitution = j.stop_restitution, .stop = stop});
+  }
+}
+
 rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states) {
   using impact::operator-;
   using rigid::operator*;
   rigid::Links links;
-  for (const JointSpec& j : spec.joints) links.joints.push_back({j.kind, j.body, j.to, j.at_m, j.axis, j.second_axis, j.damping});
+  for (const JointSpec& j : spec.joints) {
+    links.joints.push_back({j.kind, j.body, j.to, j.at_m, j.axis, j.second_axis, j.damping});
+    if (j.limits) add_stops(j, solids, states, links);
+  }
   for (const CordSpec& c : spec.cords) {
     const auto tie = [&](int body, const Vec3& where) {
       if (body < 0) return where;
@@ -145,8 +175,7 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
                        {.step_s = options.contact_step_s, .islands = options.islands, .joint_tolerance = options.joint_tolerance}, links);
     check_start(spec, space);
     return space;
-  } catch (const std::runtime_error& error) {
-    if (spec.joints.empty()) throw;
+  } catch (const std::invalid_argument& error) {  // joints that make no tree
     throw InputError(error.what());
   }
 }

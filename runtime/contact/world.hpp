@@ -1,6 +1,7 @@
 // The rigid-body world: bodies that fall and shelves that stand, out of which comes what they do to each other.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -43,10 +44,12 @@ struct JointSpec {
   joints::Kind kind = joints::Kind::kHinge;
   int body = 0, to = -1;  // in the list of bodies; -1, or a fixed one: the world
   Vec3 at_m{};
-  Vec3 axis{};           // of a hinge, a slider; the first of a universal joint, fixed in `to`
-  Vec3 second_axis{};    // of a universal joint, at right angles to the first, fixed in `body`
-  double damping = 0.0;  // N m s per rad, of a slider N s/m; >= 0
-  std::string place{};   // where it comes from, for messages; may be empty
+  Vec3 axis{};                                    // of a hinge, a slider; the first of a universal joint, fixed in `to`
+  Vec3 second_axis{};                             // of a universal joint, at right angles to the first, fixed in `body`
+  double damping = 0.0;                           // N m s per rad, of a slider N s/m; >= 0
+  std::optional<std::array<double, 2>> limits{};  // of a hinge [rad], a slider [m]: how far `body` may go against `to`; <= 0, >= 0
+  double stop_restitution = 0.0;                  // there, 0..1
+  std::string place{};                            // where it comes from, for messages; may be empty
 };
 
 /// A string without mass that does not stretch. Its ends are places in the world at the start.

@@ -2,7 +2,8 @@
 //   and never pushes. In a step the normal is that of the middle of the step: with it a taut cord keeps its length and does no work while
 //   its body swings.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988).
-// Deviations: a cord has no mass, and what it does to its body's surface when it comes taut is not heard.
+// Deviations: a cord has no mass, and what it does to its body's surface when it comes taut is not heard. A stop of a joint is such a
+//   contact, too, with a normal along the way of its joint, and is not heard either.
 #include <algorithm>
 #include <cmath>
 
@@ -15,6 +16,30 @@ namespace {
 using impact::cross;
 using impact::dot;
 
+struct StopTouch {
+  double gap_m = 0.0;
+  Vec3 where_m{}, normal{};  // from b to a: a is pushed along it
+};
+
+struct Pose {
+  Vec3 centre{};
+  Mat3 rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+};
+Pose get_pose(const State& state) { return {state.centre, make_rotation(state.rotation)}; }
+
+/// Where a stop pushes and what is left of the way to it, the bodies being there.
+StopTouch calc_stop_touch(const Stop& stop, const Pose& a, const Pose& b) {
+  const Vec3 axis = b.rotation * stop.axis, at_a = a.centre + a.rotation * stop.at_a;
+  const double sign = stop.is_lower ? 1.0 : -1.0;
+  if (!stop.turns) {
+    const double way = dot(axis, at_a - (b.centre + b.rotation * stop.at_b));
+    return {-sign * (stop.most - way), at_a, sign * axis};
+  }
+  const Vec3 lever_a = a.rotation * stop.lever_a, lever_b = b.rotation * stop.lever_b;
+  const double angle = std::atan2(dot(axis, cross(lever_b, lever_a)), dot(lever_b, lever_a));
+  return {-sign * stop.arm_m * (stop.most - angle), at_a + stop.arm_m * lever_a, sign * cross(axis, lever_a)};
+}
+
 }  // namespace
 
 /// Where an end of a cord is in the world, its body being there.
@@ -24,6 +49,7 @@ Vec3 Space::calc_anchor(const Cord& cord, bool is_a, const State& state) const {
 }
 
 double Space::calc_cord_gap(const Cord& cord, const State& a, const State& b) const {
+  if (cord.stop) return calc_stop_touch(*cord.stop, get_pose(a), cord.b >= 0 ? get_pose(b) : Pose{}).gap_m;
   return cord.length_m - norm(calc_anchor(cord, true, a) - calc_anchor(cord, false, b));
 }
 
@@ -31,6 +57,22 @@ double Space::calc_cord_gap(const Cord& cord, const State& a, const State& b) co
 void Space::stretch(Pair& pair) const {
   const Cord& cord = cords_[static_cast<std::size_t>(pair.cord)];
   const State nowhere;
+  if (cord.stop) {
+    const StopTouch now = calc_stop_touch(*cord.stop, get_pose(state(cord.a)), cord.b >= 0 ? get_pose(state(cord.b)) : Pose{});
+    if (pair.contacts.empty()) {
+      Contact contact;
+      contact.a = cord.a;
+      contact.b = cord.b;
+      contact.cord = pair.cord;
+      contact.touching = now.gap_m <= kTouch;
+      pair.contacts.push_back(contact);
+    }
+    shape::Touch& touch = pair.contacts.front().touch;
+    touch.gap_m = now.gap_m;
+    touch.where_m = now.where_m;
+    touch.normal = now.normal;
+    return;
+  }
   const Vec3 a = calc_anchor(cord, true, state(cord.a)), b = calc_anchor(cord, false, cord.b >= 0 ? state(cord.b) : nowhere);
   const double distance = norm(b - a);
   if (pair.contacts.empty()) {
@@ -76,6 +118,7 @@ void Space::open_cords(std::vector<char>& active, double length_s) {
 /// The row of a cord in a step: along the cord half a step on.
 Point Space::make_cord_point(const Contact& c, double h) const {
   const Cord& cord = cords_[static_cast<std::size_t>(c.cord)];
+  if (cord.stop) return make_stop_point(c, h);
   Point p;
   p.a = find_index(c.a);
   p.b = find_index(c.b);
@@ -115,6 +158,29 @@ Point Space::make_cord_point(const Contact& c, double h) const {
     least += std::min(0.02 * (-kDeep - gap) / h, gap < -kFarTooDeep ? 5e-3 : paid);
   }
   p.wanted = least * p.normal - (a.beyond - b.beyond);
+  p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
+  return p;
+}
+
+/// The row of a stop in a step. Equal and opposite impulses at one place on two bodies that a joint connects move that joint alone.
+Point Space::make_stop_point(const Contact& c, double h) const {
+  const Stop& stop = *cords_[static_cast<std::size_t>(c.cord)].stop;
+  Point p;
+  p.a = find_index(c.a);
+  p.b = find_index(c.b);
+  // Impulses act where the mechanism is at the end of the step without them (linked.cpp).
+  const auto get_end = [&](int body, int index) {
+    if (index < 0) return body >= 0 ? get_pose(state(body)) : Pose{};
+    return Pose{free_centre_[static_cast<std::size_t>(index)], free_[static_cast<std::size_t>(index)].rotation};
+  };
+  const StopTouch end = calc_stop_touch(stop, get_end(c.a, p.a), get_end(c.b, p.b));
+  p.normal = end.normal;
+  if (p.a >= 0) p.arm_a = end.where_m - free_centre_[static_cast<std::size_t>(p.a)];
+  if (p.b >= 0) p.arm_b = end.where_m - free_centre_[static_cast<std::size_t>(p.b)];
+  const double approach = calc_approach(c), gap = c.touch.gap_m;
+  double least = c.touching && gap <= kTouch ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
+  if (gap < -kDeep) least += std::min(0.02 * (-kDeep - gap) / h, 5e-3);
+  p.wanted = least * p.normal;
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;
 }

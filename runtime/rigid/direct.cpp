@@ -38,68 +38,96 @@ Row6 make_row(const Vec3& linear, const Vec3& angular) {
   return r;
 }
 
-/// The system of one guess. Blocks by pairs of bodies.
+/// A couple, brought back to the bounds that the push of its point sets it.
+Vec3 clamp_couple(const Point& p, const Vec3& couple, double push) {
+  const double limit = p.rolling_m * push, twist = dot(couple, p.normal);
+  const Vec3 roll = couple - twist * p.normal;
+  const double size = norm(roll);
+  return (size > limit ? limit / size : 1.0) * roll + std::clamp(twist, -p.twisting_m * push, p.twisting_m * push) * p.normal;
+}
+
+/// The matrix of a guess: blocks of 6 x 6 for pairs of bodies that touch, lower triangle. Its pattern is the same for all guesses.
 class System {
  public:
-  explicit System(int bodies) : bodies_(bodies), diagonal_(static_cast<std::size_t>(bodies), Block::Zero()) {}
-  Block& diagonal(int body) { return diagonal_[static_cast<std::size_t>(body)]; }
+  System(int bodies, const std::vector<Point>& points) : bodies_(bodies) {
+    if (is_dense()) {
+      full_.resize(6 * bodies, 6 * bodies);
+      return;
+    }
+    below_.resize(static_cast<std::size_t>(bodies));
+    for (int i = 0; i < bodies; ++i) below_[static_cast<std::size_t>(i)].push_back(i);
+    for (const Point& p : points)
+      if (p.a >= 0 && p.b >= 0 && p.a != p.b) below_[static_cast<std::size_t>(std::min(p.a, p.b))].push_back(std::max(p.a, p.b));
+    std::vector<int> counts;
+    for (std::vector<int>& rows : below_) {
+      std::sort(rows.begin(), rows.end());
+      rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+      counts.insert(counts.end(), 6, 6 * static_cast<int>(rows.size()));
+    }
+    sparse_.resize(6 * bodies, 6 * bodies);
+    sparse_.reserve(counts);
+    for (int column = 0; column < 6 * bodies; ++column)
+      for (const int row : below_[static_cast<std::size_t>(column / 6)])
+        for (int i = 0; i < 6; ++i) sparse_.insert(6 * row + i, column) = 0.0;
+    sparse_.makeCompressed();
+    sparse_solver_.analyzePattern(sparse_);
+  }
 
+  void clear() {
+    if (is_dense())
+      full_.setZero();
+    else
+      std::fill_n(sparse_.valuePtr(), sparse_.nonZeros(), 0.0);
+  }
+  void add_inertia(int body, double mass_kg, const Eigen::Matrix3d& inertia) {
+    Block block = Block::Zero();
+    block.topLeftCorner<3, 3>().diagonal().setConstant(mass_kg);
+    block.bottomRightCorner<3, 3>() = inertia;
+    at(body, body) += block;
+  }
   /// A row with that stiffness.
   void add(int a, const Row6& ra, int b, const Row6& rb, double stiffness) {
-    if (a >= 0) diagonal(a).noalias() += stiffness * ra * ra.transpose();
-    if (b >= 0) diagonal(b).noalias() += stiffness * rb * rb.transpose();
+    if (a >= 0) at(a, a).noalias() += stiffness * ra * ra.transpose();
+    if (b >= 0) at(b, b).noalias() += stiffness * rb * rb.transpose();
     if (a < 0 || b < 0) return;
-    // Kept with the larger number first: the lower triangle.
     if (a > b)
-      off(a, b).noalias() += stiffness * ra * rb.transpose();
+      at(a, b).noalias() += stiffness * ra * rb.transpose();
     else
-      off(b, a).noalias() += stiffness * rb * ra.transpose();
+      at(b, a).noalias() += stiffness * rb * ra.transpose();
   }
 
   bool factorise() {
-    if (bodies_ <= kDense) {
-      Eigen::MatrixXd m = Eigen::MatrixXd::Zero(6 * bodies_, 6 * bodies_);
-      for (int i = 0; i < bodies_; ++i) m.block<6, 6>(6 * i, 6 * i) = diagonal_[static_cast<std::size_t>(i)];
-      for (const auto& [rows, columns, block] : off_) m.block<6, 6>(6 * rows, 6 * columns) = block;
-      dense_.compute(m);
-      return dense_.info() == Eigen::Success;
+    if (is_dense()) {
+      dense_solver_.compute(full_);
+      return dense_solver_.info() == Eigen::Success;
     }
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve((diagonal_.size() + off_.size()) * 36);
-    const auto add_block = [&](int r, int c, const Block& block) {
-      for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j)
-          if (r != c || i >= j) entries.emplace_back(6 * r + i, 6 * c + j, block(i, j));
-    };
-    for (int i = 0; i < bodies_; ++i) add_block(i, i, diagonal_[static_cast<std::size_t>(i)]);
-    for (const auto& [rows, columns, block] : off_) add_block(rows, columns, block);
-    Eigen::SparseMatrix<double> m(6 * bodies_, 6 * bodies_);
-    m.setFromTriplets(entries.begin(), entries.end());
-    sparse_.compute(m);
-    return sparse_.info() == Eigen::Success;
+    sparse_solver_.factorize(sparse_);
+    return sparse_solver_.info() == Eigen::Success;
   }
   Eigen::VectorXd solve(const Eigen::VectorXd& right) const {
-    if (bodies_ <= kDense) return dense_.solve(right);
-    return sparse_.solve(right);
+    if (is_dense()) return dense_solver_.solve(right);
+    return sparse_solver_.solve(right);
   }
 
  private:
-  struct Off {
-    int rows, columns;
-    Block block;
-  };
-  Block& off(int rows, int columns) {
-    const auto found = std::find_if(off_.rbegin(), off_.rend(), [&](const Off& o) { return o.rows == rows && o.columns == columns; });
-    if (found != off_.rend()) return found->block;
-    off_.push_back({rows, columns, Block::Zero()});
-    return off_.back().block;
+  using Place = Eigen::Map<Block, Eigen::Unaligned, Eigen::OuterStride<>>;
+
+  bool is_dense() const { return bodies_ <= kDense; }
+  /// The block (row, column), row >= column.
+  Place at(int row, int column) {
+    if (is_dense()) return Place(&full_(6 * row, 6 * column), Eigen::OuterStride<>(full_.outerStride()));
+    const std::vector<int>& rows = below_[static_cast<std::size_t>(column)];
+    const auto slot = std::lower_bound(rows.begin(), rows.end(), row) - rows.begin();
+    return Place(sparse_.valuePtr() + sparse_.outerIndexPtr()[6 * column] + 6 * slot,
+                 Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
   }
 
   int bodies_;
-  std::vector<Block> diagonal_;
-  std::vector<Off> off_;
-  Eigen::LDLT<Eigen::MatrixXd> dense_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_;
+  std::vector<std::vector<int>> below_;  // rows of the blocks of each column
+  Eigen::MatrixXd full_;
+  Eigen::SparseMatrix<double> sparse_;
+  Eigen::LDLT<Eigen::MatrixXd> dense_solver_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_solver_;
 };
 
 }  // namespace
@@ -107,6 +135,7 @@ class System {
 bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses, bool are_swept) {
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   prepare(movers, points);
+  const std::vector<sweeps::Row>& rows = problem_.rows;
   const int bodies = static_cast<int>(movers.size());
   const std::vector<Mover> free = movers;
   std::vector<Vec3> sliding(points.size()), impulses(points.size()), couples(points.size());
@@ -119,6 +148,11 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
     const bool slides = are_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
     if (slides) sliding[i] = across;
     holds.push_back(slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen);
+    if (get_turning_mass(rows[i]) > 0.0 && push > 0.0 &&
+        norm(clamp_couple(p, p.couple, kAtCone * push) - p.couple) > 1e-6 * norm(p.couple)) {
+      rolls[i] = 1;  // as in the step before
+      couples[i] = p.couple;
+    }
   }
   bool confirmed = false;
   std::vector<std::array<Vec3, 3>> axes;
@@ -129,16 +163,15 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
   double scale = 0.0;
   for (const Point& p : points) scale = std::max(scale, norm(p.wanted - calc_relative_velocity(free, p)));
   Eigen::VectorXd right(6 * bodies);
+  System system(bodies, points);
   for (int guess = 0; guess < most_guesses && !confirmed; ++guess) {
-    System system(bodies);
+    system.clear();
     for (int i = 0; i < bodies; ++i) {
       const Mover& m = free[static_cast<std::size_t>(i)];
       Eigen::Matrix3d inverse;
       for (int r = 0; r < 3; ++r)
         for (int c = 0; c < 3; ++c) inverse(r, c) = m.inverse_inertia[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
-      Block& block = system.diagonal(i);
-      block.topLeftCorner<3, 3>().diagonal().setConstant(1.0 / m.inverse_mass);
-      block.bottomRightCorner<3, 3>() = inverse.inverse();
+      system.add_inertia(i, 1.0 / m.inverse_mass, inverse.inverse());
     }
     movers = free;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -148,7 +181,7 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
         couples[i] = {};
         continue;
       }
-      const double stiffness = rows_[i].normal_mass / kCompliance;
+      const double stiffness = rows[i].normal_mass / kCompliance;
       for (std::size_t k = 0; k < (holds[i] == Hold::kSticks ? 3u : 1u); ++k)
         system.add(p.a, make_row(axes[i][k], cross(p.arm_a, axes[i][k])), p.b, -make_row(axes[i][k], cross(p.arm_b, axes[i][k])),
                    stiffness);
@@ -156,13 +189,13 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
         impulses[i] = sliding[i];
         apply(movers, p, sliding[i]);
       }
-      if (!(rows_[i].turning_mass > 0.0)) continue;
+      if (!(get_turning_mass(rows[i]) > 0.0)) continue;
       if (rolls[i]) {
         turn(movers, p, couples[i]);
       } else {
         couples[i] = {};
         for (std::size_t k = 0; k < 3; ++k)
-          system.add(p.a, make_row({}, axes[i][k]), p.b, -make_row({}, axes[i][k]), rows_[i].turning_mass / kCompliance);
+          system.add(p.a, make_row({}, axes[i][k]), p.b, -make_row({}, axes[i][k]), get_turning_mass(rows[i]) / kCompliance);
       }
     }
     if (!system.factorise()) return false;
@@ -179,12 +212,12 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
         left[i] = p.wanted - calc_relative_velocity(movers, p);
         if (holds[i] == Hold::kSlides) left[i] = dot(left[i], p.normal) * p.normal;
         largest = std::max(largest, norm(left[i]));
-        const Vec3 pull = (rows_[i].normal_mass / kCompliance) * left[i];
+        const Vec3 pull = (rows[i].normal_mass / kCompliance) * left[i];
         add(p.a, make_row(pull, cross(p.arm_a, pull)));
         add(p.b, -make_row(pull, cross(p.arm_b, pull)));
-        if (!(rows_[i].turning_mass > 0.0) || rolls[i]) continue;
+        if (!(get_turning_mass(rows[i]) > 0.0) || rolls[i]) continue;
         left_spin[i] = -1.0 * calc_relative_spin(movers, p);
-        const Vec3 couple = (rows_[i].turning_mass / kCompliance) * left_spin[i];
+        const Vec3 couple = (get_turning_mass(rows[i]) / kCompliance) * left_spin[i];
         add(p.a, make_row({}, couple));
         add(p.b, -make_row({}, couple));
       }
@@ -201,11 +234,11 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
         if (p.a >= 0) moved = get(p.a, 0) + cross(get(p.a, 3), p.arm_a), turned = get(p.a, 3);
         if (p.b >= 0) moved = moved - get(p.b, 0) - cross(get(p.b, 3), p.arm_b), turned = turned - get(p.b, 3);
         if (holds[i] == Hold::kSlides) moved = dot(moved, p.normal) * p.normal;
-        const Vec3 more = (rows_[i].normal_mass / kCompliance) * (left[i] - moved);
+        const Vec3 more = (rows[i].normal_mass / kCompliance) * (left[i] - moved);
         impulses[i] = impulses[i] + more;
         apply(movers, p, more);
-        if (!(rows_[i].turning_mass > 0.0) || rolls[i]) continue;
-        const Vec3 couple = (rows_[i].turning_mass / kCompliance) * (left_spin[i] - turned);
+        if (!(get_turning_mass(rows[i]) > 0.0) || rolls[i]) continue;
+        const Vec3 couple = (get_turning_mass(rows[i]) / kCompliance) * (left_spin[i] - turned);
         couples[i] = couples[i] + couple;
         turn(movers, p, couple);
       }
@@ -246,13 +279,24 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
           impulses[i] = push * p.normal + turned;
         }
       }
-      if (rows_[i].turning_mass > 0.0) {
-        const double most = std::max(push, 0.0), limit = p.rolling_m * most, twist = dot(couples[i], p.normal);
-        const Vec3 roll = couples[i] - twist * p.normal;
-        const double size = norm(roll), twisted = std::clamp(twist, -p.twisting_m * most, p.twisting_m * most);
-        const bool bound = size > limit * (1.0 + 1e-9) || twisted != twist;
-        if (bound) couples[i] = (size > 0.0 ? std::min(1.0, limit / size) : 0.0) * roll + twisted * p.normal;
-        if (bound && !rolls[i]) rolls[i] = 1, confirmed = false;
+      if (get_turning_mass(rows[i]) > 0.0) {
+        // A couple that sticks and would have to be above its bound rolls from now on. One that rolls is at its bound against the spin as
+        // it is now, and sticks again where less would stop that.
+        const double most = std::max(push, 0.0);
+        const Vec3 free_couple = rolls[i] ? couples[i] - get_turning_mass(rows[i]) * calc_relative_spin(movers, p) : couples[i];
+        const Vec3 bounded = clamp_couple(p, free_couple, most);
+        const bool is_bound = norm(bounded - free_couple) > 1e-9 * norm(bounded);
+        if (!rolls[i] && is_bound) {
+          rolls[i] = 1;
+          couples[i] = bounded;
+          confirmed = false;
+        } else if (rolls[i] && !is_bound && guess < most_guesses / 2) {
+          rolls[i] = 0;
+          confirmed = false;
+        } else if (rolls[i]) {
+          if (norm(bounded - couples[i]) > 1e-3 * (p.rolling_m + p.twisting_m) * most) confirmed = false;
+          couples[i] = bounded;
+        }
       }
       if (now != holds[i]) confirmed = false;
       holds[i] = now;
@@ -264,7 +308,7 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
     points[i].impulse = impulses[i];
     points[i].couple = couples[i];
     apply(movers, points[i], impulses[i]);
-    if (rows_[i].turning_mass > 0.0) turn(movers, points[i], couples[i]);
+    if (get_turning_mass(rows[i]) > 0.0) turn(movers, points[i], couples[i]);
   }
   return confirmed;
 }

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
+#include <utility>
 
 #include "runtime/impact/predict.hpp"
 #include "runtime/rigid/limits.hpp"
@@ -19,6 +21,7 @@ using impact::cross;
 using impact::dot;
 
 constexpr int kMostPresses = 8;     // of one impact
+constexpr int kMostTogether = 12;   // with those that rest
 constexpr double kLongest = 50e-3;  // s; what presses for longer rests
 
 /// (n) along a direction.
@@ -182,6 +185,42 @@ std::vector<double> Space::find_shape(int body, const std::vector<double>& shape
   return world;
 }
 
+/// Does it carry, or is it about to, outside of all impacts?
+bool Space::is_resting(const Contact& c) const { return !c.presses && c.cord < 0 && c.touch.gap_m <= kTouch; }
+
+/// What is struck and leans on something else is struck with what stands behind it: adds the contacts that rest on the bodies of `order`,
+/// and on the bodies that these lean on. False where they are too many, or bodies on joints or another impact are among them: the rigid
+/// impact stands.
+bool Space::add_resting(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s, std::vector<std::size_t>& order) const {
+  std::vector<char> is_taken(hits.size(), 0);
+  std::set<int> struck;
+  for (const std::size_t n : order) {
+    is_taken[n] = 1;
+    for (const int body : {hits[n].a, hits[n].b})
+      if (moves(body) && !has_impact(body)) struck.insert(body);
+  }
+  const std::size_t hit = order.size();
+  for (bool grows = true; std::exchange(grows, false);)
+    for (std::size_t n = 0; n < taken.size(); ++n) {
+      const Contact& c = taken[n].get();
+      if (is_taken[n] || !is_resting(c)) continue;
+      const bool leans =
+          std::any_of(struck.begin(), struck.end(), [&](int body) { return hang_together(body, c.a) || hang_together(body, c.b); });
+      if (!leans) continue;
+      for (const int body : {c.a, c.b}) {
+        if (body < 0) continue;
+        if (find_linked(body) != nullptr || in_ringing_[static_cast<std::size_t>(body)]) return false;
+        if (paces_[static_cast<std::size_t>(body)].crowded_until_s > time_s) return false;
+        if (moves(body)) struck.insert(body);
+      }
+      is_taken[n] = 1;
+      order.push_back(n);
+      grows = true;
+    }
+  std::sort(order.begin(), order.end());
+  return order.size() == hit || order.size() <= kMostTogether;
+}
+
 /// Begins an impact with modes, or lets the hits join one that is on its way. False where there are too many points: the rigid impact
 /// stands.
 bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s) {
@@ -189,14 +228,11 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
   for (std::size_t n = 0; n < hits.size(); ++n)
     if (hits[n].approach_m_s > kSlowest && !hits[n].is_cord) order.push_back(n);
   if (order.empty()) return false;
-  // What leans on something else is struck as a rigid body, with what stands behind it.
-  for (const Ref& ref : taken) {
-    const Contact& c = ref.get();
-    if (!c.touching || c.presses || c.cord >= 0 || c.touch.gap_m > kTouch) continue;
-    for (const std::size_t n : order)
-      for (const int body : {hits[n].a, hits[n].b})
-        if (moves(body) && (hang_together(body, c.a) || hang_together(body, c.b)) && !has_impact(body)) return false;
-  }
+  std::vector<std::size_t> resting = order;
+  if (!add_resting(taken, hits, time_s, resting)) return false;
+  std::vector<char> rests(hits.size(), 1);
+  for (const std::size_t n : order) rests[n] = 0;
+  order = std::move(resting);
   // Of bodies on the same joints one takes part.
   std::map<const Linked*, int> struck;
   for (const std::size_t n : order)
@@ -211,7 +247,7 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
   std::erase_if(order, [&](std::size_t n) {
     return find_own_ringing(hits[n]) == nullptr && (find_ringing(hits[n].a) != nullptr || find_ringing(hits[n].b) != nullptr);
   });
-  if (order.empty()) return false;
+  if (std::all_of(order.begin(), order.end(), [&](std::size_t n) { return rests[n] != 0; })) return false;  // all hits stay out
   for (const std::size_t n : order) {
     Ringing* found = find_own_ringing(hits[n]);
     if (found == nullptr || found == joined) continue;
@@ -220,7 +256,10 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
     else
       end_ringing(*found, time_s);  // what it has in its springs is lost
   }
-  if (order.size() + (joined != nullptr ? joined->presses.size() : 0) > kMostPresses) {
+  const bool leans = std::any_of(order.begin(), order.end(), [&](std::size_t n) { return rests[n] != 0; });
+  const std::size_t together = order.size() + (joined != nullptr ? joined->presses.size() : 0);
+  if (leans && together > kMostTogether) return false;
+  if (!leans && together > kMostPresses) {
     if (joined != nullptr) {
       end_ringing(*joined, time_s);
       joined = nullptr;
@@ -270,9 +309,11 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
     contact.where_m = hit.touch.where_m;
     contact.normal = hit.touch.normal;
     // Surfaces are where the motion of the rigid bodies has them; what modes lift or lower there is small, and must not press a spring.
-    contact.gap_m = std::max(hit.touch.gap_m, 0.0);
+    contact.rests = rests[n] != 0;
+    contact.gap_m = contact.rests ? 0.0 : std::max(hit.touch.gap_m, 0.0);
     contact.spring = make_spring(hit.touch, hit.a, hit.b);
     contact.restitution = calc_pair_restitution(hit.a, hit.b);
+    contact.is_limit = true;
     contact.friction = calc_pair_friction(hit.a, hit.b);
     if (rings(hit.a)) {
       press.place_a = find_place(hit.a, hit.touch, true);
@@ -322,7 +363,7 @@ void Space::release_what_rests(const Island& island) {
   if (ringings_.empty()) return;
   for (const Pair* pair : island.pairs)
     for (const Contact& c : pair->contacts) {
-      if (c.presses || c.cord >= 0 || c.touch.gap_m > kTouch) continue;
+      if (!is_resting(c)) continue;
       for (const int body : {pair->a, pair->b}) {
         Ringing* ringing = moves(body) ? find_ringing(body) : nullptr;
         if (ringing != nullptr && std::abs(calc_approach(c)) <= kSlowest) end_ringing(*ringing, time_s_);
@@ -504,7 +545,10 @@ void Space::release(Ringing& ringing, double time_s) {
     for (Contact& c : pair.contacts)
       for (const Press& press : ringing.presses) {
         const bool same = (press.a == key.first && press.b == key.second) || (press.b == key.first && press.a == key.second);
-        if (same && c.presses) c.presses = false, c.touching = false;
+        if (!same || !c.presses) continue;
+        c.presses = c.touching = false;
+        // Where its modes gave way the body stands lower than it would on what is rigid.
+        pair.sag_m = std::max(pair.sag_m, -c.touch.gap_m);
       }
   ringing.impact = nullptr;
   ringing.bodies.clear();

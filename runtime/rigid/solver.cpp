@@ -13,6 +13,8 @@
 #include <algorithm>
 #include <cmath>
 
+#pragma GCC diagnostic ignored "-Wpsabi"  // see sweeps.hpp
+
 namespace carillon::rigid {
 namespace {
 
@@ -23,6 +25,14 @@ using impact::calc_inverse;
 using impact::cross;
 using impact::dot;
 using impact::norm;
+using impact::transpose;
+using sweeps::combine;
+using sweeps::dot;
+using sweeps::Four;
+using sweeps::Locked;
+using sweeps::Response;
+using sweeps::Row;
+using sweeps::Turning;
 
 constexpr double kLocked = 1e-9;  // of the largest mobility at a point: what is less is a way that joints do not allow
 
@@ -131,6 +141,16 @@ void turn(std::vector<Mover>& movers, const Point& p, const Vec3& couple) {
   }
 }
 
+namespace {
+
+Four to_four(const Vec3& a) { return Four{a[0], a[1], a[2], 0.0}; }
+Vec3 to_vec(const Four& a) { return {a[0], a[1], a[2]}; }
+void set_columns(Four (&columns)[3], const Mat3& m) {
+  for (std::size_t c = 0; c < 3; ++c) columns[c] = Four{m[0][c], m[1][c], m[2][c], 0.0};
+}
+
+}  // namespace
+
 Vec3 calc_relative_spin(const std::vector<Mover>& movers, const Point& p) {
   Vec3 w{};
   if (p.a >= 0) w = w + movers[static_cast<std::size_t>(p.a)].spin;
@@ -171,158 +191,199 @@ Mat3 calc_mobility(const std::vector<Mover>& movers, const Point& p) {
 }
 
 void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>& points) {
-  rows_.assign(points.size(), {});
+  problem_.bodies.resize(movers.size() + 1);
+  for (std::size_t n = 0; n < movers.size(); ++n) problem_.bodies[n] = {to_four(movers[n].velocity), to_four(movers[n].spin)};
+  problem_.bodies.back() = {};
+  problem_.rows.resize(points.size());
+  problem_.changes.resize(points.size());
+  problem_.turnings.clear();
+  problem_.locked.clear();
+  problem_.responses.clear();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& p = points[i];
-    Row& row = rows_[i];
-    const Mat3 k = calc_mobility(movers, p);
-    const auto is_linked = [&](int body) { return body >= 0 && movers[static_cast<std::size_t>(body)].linkage != nullptr; };
-    row.locked = is_linked(p.a) || is_linked(p.b);
-    row.inverse = row.locked ? calc_pseudo_inverse(k, row.range, kLocked * (k[0][0] + k[1][1] + k[2][2])) : calc_inverse(k);
-    const double kn = dot(p.normal, k * p.normal), trace = k[0][0] + k[1][1] + k[2][2];
-    row.normal_mass = 1.0 / kn;
-    row.tangent_mass = 1.0 / (trace - kn);  // the sum of both eigenvalues across the normal
-    if (row.locked) {
-      row.normal_mass = kn > kLocked * trace ? 1.0 / kn : 0.0;
-      // Across, as far as joints leave it free once the motion along the normal is given.
-      row.by_push = k * p.normal - kn * p.normal;
-      Mat3 left = k, unused{};
-      for (std::size_t r = 0; r < 3; ++r)
-        for (std::size_t c = 0; c < 3; ++c) {
-          const double n = p.normal[r], m = p.normal[c];
-          left[r][c] -= n * (row.by_push[c] + kn * m) + row.by_push[r] * m + row.normal_mass * row.by_push[r] * row.by_push[c];
-        }
-      row.across = calc_pseudo_inverse(left, unused, kLocked * trace);
+    Row& row = problem_.rows[i];
+    row = {};
+    const Vec3 across = impact::find_across(p.normal);
+    const Mat3 axes{p.normal, across, cross(p.normal, across)};
+    for (std::size_t j = 0; j < 3; ++j) {
+      row.axis[j] = to_four(axes[j]);
+      for (std::size_t c = 0; c < 3; ++c) row.along[c][j] = axes[j][c];
     }
-    if (p.rolling_m > 0.0 || p.twisting_m > 0.0) {
-      double most = 0.0;
-      for (const int body : {p.a, p.b})
-        if (body >= 0) {
-          const Mover& m = movers[static_cast<std::size_t>(body)];
-          const Mat3& j = m.inverse_inertia;
-          most += j[0][0] + j[1][1] + j[2][2];  // on joints a body turns more slowly
-        }
-      row.turning_mass = 1.0 / most;
+    row.friction = p.friction;
+    row.wanted = to_four(axes * p.wanted);
+    row.impulse = to_four(axes * p.impulse);
+    const int still = static_cast<int>(movers.size());
+    row.a = p.a >= 0 ? p.a : still;
+    row.b = p.b >= 0 ? p.b : still;
+    bool is_linked = false;
+    const auto add = [&](int body, const Vec3& arm, double sign, double& mass, Four(&turning)[3], Four(&spun)[3]) {
+      if (body < 0) return;
+      const Mover& m = movers[static_cast<std::size_t>(body)];
+      is_linked = is_linked || m.linkage != nullptr;
+      mass = m.linkage == nullptr ? sign * m.inverse_mass : 0.0;
+      for (std::size_t j = 0; j < 3; ++j) {
+        const Vec3 couple = sign * cross(arm, axes[j]);
+        for (std::size_t c = 0; c < 3; ++c) turning[c][j] = couple[c];
+        if (m.linkage == nullptr) spun[j] = to_four(m.inverse_inertia * couple);
+      }
+    };
+    add(p.a, p.arm_a, 1.0, row.mass_a, row.turning_a, row.spun_a);
+    add(p.b, p.arm_b, -1.0, row.mass_b, row.turning_b, row.spun_b);
+    if (is_linked) {
+      lock(movers, p, axes, row);
+    } else {
+      Mat3 k{};  // mobility, axes of the point
+      for (std::size_t j = 0; j < 3; ++j) {
+        Four column = combine(row.turning_a, row.spun_a[j]) + combine(row.turning_b, row.spun_b[j]);
+        column[j] += row.mass_a - row.mass_b;
+        for (std::size_t c = 0; c < 3; ++c) k[c][j] = column[c];
+      }
+      set_columns(row.inverse, impact::calc_inverse(k));
+      row.mobility = k[0][0];
+      row.normal_mass = 1.0 / k[0][0];
+      row.tangent_mass = 1.0 / (k[1][1] + k[2][2]);  // the sum of both eigenvalues across the normal
     }
+    if (p.rolling_m > 0.0 || p.twisting_m > 0.0) add_turning(movers, p, axes, row);
   }
 }
 
-/// The impulse that the point ought to have, seeing the velocities as they are, a part of the way to it.
-Vec3 Solver::calc_impulse(const std::vector<Mover>& movers, const Point& p, const Row& row, double part) const {
-  const Vec3 short_of = p.wanted - calc_relative_velocity(movers, p);
-  // What joints do not allow no impulse brings about.
-  bool may_stick = part == 1.0;
-  if (row.locked && may_stick) {
-    const Vec3 beyond = short_of - row.range * short_of;
-    may_stick = dot(beyond, beyond) <= 1e-12 * dot(short_of, short_of);
-  }
-  if (may_stick) {
-    const Vec3 stuck = p.impulse + row.inverse * short_of;
-    const double push = dot(stuck, p.normal);
-    const Vec3 across = stuck - push * p.normal;
-    if (push > 0.0 && dot(across, across) <= p.friction * p.friction * push * push) return stuck;
-  }
-  const double old = dot(p.impulse, p.normal), missing = dot(short_of, p.normal);
-  const double push = std::max(0.0, old + part * row.normal_mass * missing);
-  Vec3 across = p.impulse - old * p.normal;
-  if (row.locked)
-    across = across + part * (row.across * (short_of - missing * p.normal - (push - old) * row.by_push));
-  else
-    across = across + (part * row.tangent_mass) * (short_of - missing * p.normal);
-  const double size = norm(across), limit = p.friction * push;
-  if (size > limit) across = (size > 0.0 ? limit / size : 0.0) * across;
-  return push * p.normal + across;
+/// A point on bodies on joints: an impulse moves all that hangs together, and not every way is free.
+void Solver::lock(const std::vector<Mover>& movers, const Point& p, const Mat3& axes, Row& row) {
+  row.locked = static_cast<int>(problem_.locked.size());
+  Locked& locked = problem_.locked.emplace_back();
+  const Mat3 k = axes * (calc_mobility(movers, p) * transpose(axes));
+  const double kn = k[0][0], trace = k[0][0] + k[1][1] + k[2][2];
+  Mat3 range{}, unused{};
+  set_columns(row.inverse, calc_pseudo_inverse(k, range, kLocked * trace));
+  set_columns(locked.allowed, range);
+  row.normal_mass = kn > kLocked * trace ? 1.0 / kn : 0.0;
+  row.mobility = row.normal_mass > 0.0 ? kn : 0.0;
+  // Across, as far as joints leave it free once the motion along the normal is given.
+  locked.by_push = Four{0.0, k[1][0], k[2][0], 0.0};
+  Mat3 left{};
+  for (std::size_t r = 1; r < 3; ++r)
+    for (std::size_t c = 1; c < 3; ++c) left[r][c] = k[r][c] - row.normal_mass * k[r][0] * k[c][0];
+  set_columns(locked.across, calc_pseudo_inverse(left, unused, kLocked * trace));
+  locked.pushed.begin = static_cast<int>(problem_.responses.size());
+  for (const bool is_a : {true, false}) add_responses(movers, is_a ? p.a : p.b, is_a ? p.arm_a : p.arm_b, is_a ? 1.0 : -1.0, true, axes);
+  locked.pushed.end = static_cast<int>(problem_.responses.size());
 }
 
-void Solver::share(std::vector<Mover>& movers, std::vector<Point>& points, int sweeps) {
-  prepare(movers, points);
-  std::vector<Vec3> next(points.size());
-  const double part = 1.0 / static_cast<double>(std::max<std::size_t>(points.size(), 2));
-  for (int sweep = 0; sweep < sweeps; ++sweep) {
-    for (std::size_t i = 0; i < points.size(); ++i) next[i] = calc_impulse(movers, points[i], rows_[i], part);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      apply(movers, points[i], next[i] - points[i].impulse);
-      points[i].impulse = next[i];
+/// What the bodies on the joints of one gain by impulses along the axes of a point, or by couples about them.
+void Solver::add_responses(const std::vector<Mover>& movers, int body, const Vec3& arm, double sign, bool are_impulses, const Mat3& axes) {
+  if (body < 0 || movers[static_cast<std::size_t>(body)].linkage == nullptr) return;
+  const Mover& on = movers[static_cast<std::size_t>(body)];
+  const double* rows = on.linkage->get_mobility(on.member).data();
+  for (const int index : on.linkage->movers) {
+    Response& response = problem_.responses.emplace_back();
+    response.body = index;
+    for (std::size_t j = 0; j < 3; ++j) {
+      const Vec3 impulse = are_impulses ? sign * axes[j] : Vec3{}, couple = are_impulses ? cross(arm, impulse) : sign * axes[j];
+      for (std::size_t r = 0; r < 6; ++r) {
+        double gained = 0.0;
+        for (std::size_t c = 0; c < 3; ++c) gained += rows[6 * r + c] * impulse[c] + rows[6 * r + 3 + c] * couple[c];
+        (r < 3 ? response.velocity : response.spin)[j][r % 3] = gained;
+      }
     }
+    rows += 36;
+  }
+}
+
+void Solver::add_turning(const std::vector<Mover>& movers, const Point& p, const Mat3& axes, Row& row) {
+  row.turning = static_cast<int>(problem_.turnings.size());
+  Turning& turning = problem_.turnings.emplace_back();
+  turning.rolling_m = p.rolling_m;
+  turning.twisting_m = p.twisting_m;
+  turning.arm_m = norm(p.a >= 0 ? p.arm_a : p.arm_b);
+  turning.couple = to_four(axes * p.couple);
+  turning.turned.begin = static_cast<int>(problem_.responses.size());
+  double most = 0.0;
+  const auto add = [&](int body, double sign, Four(&spun)[3]) {
+    if (body < 0) return;
+    const Mover& m = movers[static_cast<std::size_t>(body)];
+    most += m.inverse_inertia[0][0] + m.inverse_inertia[1][1] + m.inverse_inertia[2][2];  // on joints a body turns more slowly
+    for (std::size_t j = 0; j < 3 && m.linkage == nullptr; ++j) spun[j] = to_four(sign * (m.inverse_inertia * axes[j]));
+    add_responses(movers, body, {}, sign, false, axes);
+  };
+  add(p.a, 1.0, turning.spun_a);
+  add(p.b, -1.0, turning.spun_b);
+  turning.turned.end = static_cast<int>(problem_.responses.size());
+  turning.mass = 1.0 / most;
+}
+
+/// Writes the answer.
+void Solver::take(std::vector<Mover>& movers, std::vector<Point>& points) const {
+  for (std::size_t n = 0; n < movers.size(); ++n) {
+    movers[n].velocity = to_vec(problem_.bodies[n].velocity);
+    movers[n].spin = to_vec(problem_.bodies[n].spin);
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Row& row = problem_.rows[i];
+    points[i].impulse = to_vec(combine(row.axis, row.impulse));
+    points[i].couple =
+        row.turning >= 0 ? to_vec(combine(row.axis, problem_.turnings[static_cast<std::size_t>(row.turning)].couple)) : Vec3{};
   }
 }
 
 double Solver::solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int most_sweeps) {
   prepare(movers, points);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    Point& p = points[i];
+  for (Row& row : problem_.rows) {
     // The part of the old impulse along the normal of now stays normal.
-    const double old = std::max(0.0, dot(p.impulse, p.normal));
-    Vec3 across = p.impulse - dot(p.impulse, p.normal) * p.normal;
-    const double size = norm(across);
-    if (size > p.friction * old) across = (size > 0.0 ? p.friction * old / size : 0.0) * across;
-    p.impulse = old * p.normal + across;
-    apply(movers, p, p.impulse);
-    if (rows_[i].turning_mass > 0.0) turn(movers, p, p.couple);
+    Four& impulse = row.impulse;
+    impulse[0] = std::max(0.0, impulse[0]);
+    const double size = std::hypot(impulse[1], impulse[2]), limit = row.friction * impulse[0];
+    if (size > limit) impulse[1] *= limit / size, impulse[2] *= limit / size;
   }
-  return solve_on(movers, points, tolerance_m_s, most_sweeps);
+  functions_->begin(problem_);
+  const double left = run(tolerance_m_s, most_sweeps);
+  take(movers, points);
+  return left;
 }
 
-double Solver::sweep(std::vector<Mover>& movers, std::vector<Point>& points, bool forth) {
-  const int count = static_cast<int>(points.size());
-  double largest = 0.0;
-  ++sweeps_;
-  for (int n = 0; n < count; ++n) {
-    const auto i = static_cast<std::size_t>(forth ? n : count - 1 - n);
-    Point& p = points[i];
-    const Row& row = rows_[i];
-    const Vec3 wanted = calc_impulse(movers, p, row, 1.0), change = wanted - p.impulse;
-    if (change[0] != 0.0 || change[1] != 0.0 || change[2] != 0.0) {
-      if (row.normal_mass > 0.0) largest = std::max(largest, norm(change) / row.normal_mass);
-      apply(movers, p, change);
-      p.impulse = wanted;
-    }
-    if (!(row.turning_mass > 0.0)) continue;
-    const double push = dot(p.impulse, p.normal);
-    const Vec3 free = p.couple - row.turning_mass * calc_relative_spin(movers, p);
-    const double twist = dot(free, p.normal);
-    Vec3 roll = free - twist * p.normal;
-    const double size = norm(roll), limit = p.rolling_m * push;
-    if (size > limit) roll = (size > 0.0 ? limit / size : 0.0) * roll;
-    const Vec3 couple = roll + std::clamp(twist, -p.twisting_m * push, p.twisting_m * push) * p.normal, step = couple - p.couple;
-    turn(movers, p, step);
-    p.couple = couple;
-    largest = std::max(largest, norm(step) / row.turning_mass * norm(p.a >= 0 ? p.arm_a : p.arm_b));
-  }
-  return largest;
+double Solver::solve_evenly(std::vector<Mover>& movers, std::vector<Point>& points, int shares, double tolerance_m_s, int most_sweeps) {
+  for (Point& p : points) p.impulse = p.couple = {};
+  prepare(movers, points);
+  const double part = 1.0 / static_cast<double>(std::max<std::size_t>(points.size(), 2));
+  for (int n = 0; n < shares; ++n) functions_->share(problem_, part);
+  const double left = run(tolerance_m_s, most_sweeps);
+  take(movers, points);
+  return left;
 }
 
-double Solver::solve_on(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int most_sweeps) {
+double Solver::run(double tolerance_m_s, int most_sweeps) {
   sweeps_ = 0;
-  before_.resize(points.size());
-  way_.assign(points.size(), Vec3{});
+  std::vector<Row>& rows = problem_.rows;
+  before_.resize(rows.size());
+  way_.assign(rows.size(), {});
   double largest = 0.0, last = 0.0;
+  const auto sweep = [&](bool onward) {
+    ++sweeps_;
+    return std::sqrt(functions_->sweep(problem_, onward));
+  };
   while (sweeps_ < most_sweeps) {
-    for (std::size_t i = 0; i < points.size(); ++i) before_[i] = points[i].impulse;
-    largest = sweep(movers, points, true);
+    for (std::size_t i = 0; i < rows.size(); ++i) before_[i].by = rows[i].impulse;
+    largest = sweep(true);
     if (largest <= tolerance_m_s) break;
-    largest = sweep(movers, points, false);
+    largest = sweep(false);
     if (largest <= tolerance_m_s || sweeps_ >= most_sweeps) break;
     // What both sweeps changed is minus a gradient, conjugate to the one before.
     double now = 0.0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      before_[i] = points[i].impulse - before_[i];
-      now += dot(before_[i], before_[i]) / rows_[i].normal_mass;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      before_[i].by = rows[i].impulse - before_[i].by;
+      now += dot(before_[i].by, before_[i].by) * rows[i].mobility;
     }
     const double part = last > 0.0 ? now / last : 0.0;
     last = now;
     if (part >= 1.0) {
-      std::fill(way_.begin(), way_.end(), Vec3{});
+      std::fill(way_.begin(), way_.end(), sweeps::Change{});
       last = 0.0;
       continue;
     }
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Vec3 on = part * way_[i];
-      way_[i] = on + before_[i];
-      if (part == 0.0) continue;
-      apply(movers, points[i], on);
-      points[i].impulse = points[i].impulse + on;
+    if (part > 0.0) {
+      for (sweeps::Change& way : way_) way.by *= part;
+      functions_->add(problem_, way_);
     }
+    for (std::size_t i = 0; i < rows.size(); ++i) way_[i].by += before_[i].by;
   }
   return largest;
 }

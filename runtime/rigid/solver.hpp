@@ -5,6 +5,7 @@
 
 #include "runtime/impact/vector.hpp"
 #include "runtime/rigid/linkage.hpp"
+#include "runtime/rigid/sweeps.hpp"
 
 namespace carillon::rigid {
 
@@ -37,36 +38,33 @@ struct Point {
 /// tangential one is inside the cone, and couples are inside their bounds. Returns the change of the last sweep [m/s].
 class Solver {
  public:
+  explicit Solver(const sweeps::Functions& functions = sweeps::get_functions()) : functions_(&functions) {}
   double solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int most_sweeps);
-  /// Shares the load evenly between points that are redundant, from zero impulses: sweeps in which all points change at once, damped by
-  /// their number. A box that lands flat keeps its symmetry.
-  void share(std::vector<Mover>& movers, std::vector<Point>& points, int sweeps);
-  /// solve() from where share() ended.
-  double solve_on(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int most_sweeps);
+  /// The same from zero impulses, and the load shared evenly first between points that are redundant: `shares` times all points change at
+  /// once, damped by their number. A box that lands flat keeps its symmetry.
+  double solve_evenly(std::vector<Mover>& movers, std::vector<Point>& points, int shares, double tolerance_m_s, int most_sweeps);
   /// The same problem by factorisation, for what sweeps take too long for (towers, unequal masses): guesses which points carry and stick,
   /// solves, corrects the guess from the answer, in at most `most_guesses`. Redundant points share their load evenly. True where the guess
   /// was confirmed; the impulses obey all bounds in any case. False where bodies are on joints.
-  /// `are_swept`: the impulses given are an answer of sweeps, and points at their bound slide in the first guess; otherwise all that carry
-  /// stick in it.
+  /// `are_swept`: the impulses given are an answer of sweeps or of the step before, and points at their bound slide in the first guess;
+  /// otherwise all that carry stick in it.
   bool solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses, bool are_swept = false);
   int get_sweeps() const { return sweeps_; }
 
  private:
-  struct Row {
-    Mat3 inverse{};             // of the mobility at the point: impulse per velocity
-    double normal_mass = 0.0;   // 1 / (n . K n)
-    double tangent_mass = 0.0;  // 1 / the largest eigenvalue of K across n, or less
-    double turning_mass = 0.0;  // of the couple
-    bool locked = false;        // joints do not allow all ways
-    Mat3 range{};               // projects on those that they allow
-    Mat3 across{};              // impulse per velocity across the normal, the motion along it given
-    Vec3 by_push{};             // velocity across the normal per impulse along it
-  };
   void prepare(const std::vector<Mover>& movers, const std::vector<Point>& points);
-  Vec3 calc_impulse(const std::vector<Mover>& movers, const Point& point, const Row& row, double part) const;
-  double sweep(std::vector<Mover>& movers, std::vector<Point>& points, bool forth);
-  std::vector<Row> rows_;
-  std::vector<Vec3> before_, way_;
+  void lock(const std::vector<Mover>& movers, const Point& point, const Mat3& axes, sweeps::Row& row);
+  void add_turning(const std::vector<Mover>& movers, const Point& point, const Mat3& axes, sweeps::Row& row);
+  void add_responses(const std::vector<Mover>& movers, int body, const Vec3& arm, double sign, bool are_impulses, const Mat3& axes);
+  double run(double tolerance_m_s, int most_sweeps);
+  void take(std::vector<Mover>& movers, std::vector<Point>& points) const;
+  double get_turning_mass(const sweeps::Row& row) const {
+    return row.turning >= 0 ? problem_.turnings[static_cast<std::size_t>(row.turning)].mass : 0.0;
+  }
+
+  const sweeps::Functions* functions_;
+  sweeps::Problem problem_;
+  std::vector<sweeps::Change> before_, way_;
   int sweeps_ = 0;
 };
 

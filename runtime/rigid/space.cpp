@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <tuple>
 
@@ -20,8 +21,12 @@ namespace {
 using impact::cross;
 using impact::dot;
 
-constexpr double kReach = 0.3;       // of the size of the smaller body: from so far touches are found
-constexpr double kMostSteps = 1000;  // of a window
+constexpr double kReach = 0.3;            // of the size of the smaller body: from so far touches are found
+constexpr double kMostSteps = 1024;       // of a window
+constexpr double kThin = 0.15;            // of the thickness of the thinner body: what moves as far in a long step takes short ones
+constexpr double kSag = 5e-6;             // m; a point on an arc may leave its chord by this in a step,
+constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of its body
+constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
 
 }  // namespace
 
@@ -31,6 +36,7 @@ Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional
   placed_.resize(solids_.size());
   asleep_.assign(solids_.size(), 0);
   flying_.assign(solids_.size(), 0);
+  stride_.assign(solids_.size(), 1);
   in_ringing_.assign(solids_.size(), 0);
   paces_.resize(solids_.size());
   reach_m_s_.assign(solids_.size(), 0.0);
@@ -102,6 +108,11 @@ double Space::calc_pair_speed(int a, int b) const {
 double Space::calc_pair_size(int a, int b) const {
   const double size = solid(a).shape->get_size_m();
   return b >= 0 ? std::min(size, solid(b).shape->get_size_m()) : size;
+}
+
+double Space::calc_pair_thickness(int a, int b) const {
+  const double thickness = solid(a).shape->get_thickness_m();
+  return b >= 0 ? std::min(thickness, solid(b).shape->get_thickness_m()) : thickness;
 }
 
 shape::Box Space::calc_box(int body, double grown_m) const {
@@ -196,30 +207,61 @@ void Space::open_window(double end_s) {
     ++costs_.body_steps;
   }
   fly_windows_of_linked(active, length);
-  // What is fast for its size must not pass through another between two looks.
-  double steps = length / options_.step_s;
-  for (const Pair* pair : near_)
-    steps = std::max(steps, 2.0 * length * (calc_pair_speed(pair->a, pair->b) + g * length) / (kReach * calc_pair_size(pair->a, pair->b)));
-  steps_in_window_ = any_active_ ? std::max(1, static_cast<int>(std::ceil(std::min(steps, kMostSteps) - 1e-6))) : 1;
-  step_in_window_ = 0;
   if (any) ++costs_.steps;
-  count_islands();
+  choose_steps(length);
+}
+
+/// How finely each group of bodies that may meet in this window goes through it: some take several of the small steps at once.
+void Space::choose_steps(double length_s) {
+  const int count = static_cast<int>(solids_.size());
+  Groups groups(count);
+  for (const Pair* pair : near_)
+    if (moves(pair->a) && moves(pair->b)) groups.join(pair->a, pair->b);
+  islands_ = 0;
+  for (int i = 0; i < count; ++i)
+    if (!is_fixed(i) && groups.find(i) == i) ++islands_;
+  const double g = norm(gravity_);
+  std::vector<double> steps(solids_.size(), std::max(1.0, length_s / (kFlatSteps * options_.step_s)));
+  const auto ask = [&](int body, double asked) {
+    double& most = steps[static_cast<std::size_t>(groups.find(body))];
+    most = std::max(most, asked);
+  };
+  for (const Pair* pair : near_) {
+    const int body = moves(pair->a) ? pair->a : pair->b;
+    if (!moves(body)) continue;
+    // What is fast for its size must not pass through another between two looks, and what is thin must not sink in.
+    const double speed = calc_pair_speed(pair->a, pair->b) + g * length_s;
+    ask(body, 2.0 * length_s * speed / (kReach * calc_pair_size(pair->a, pair->b)));
+    const bool is_thin = kFlatSteps * options_.step_s * speed > kThin * calc_pair_thickness(pair->a, pair->b);
+    if (is_thin || pair->cord >= 0 || !is_flat(pair->a) || !is_flat(pair->b)) ask(body, length_s / options_.step_s);
+  }
+  for (int i = 0; i < count; ++i) {
+    if (!moves(i)) continue;
+    if (find_linked(i) != nullptr || has_impact(i)) ask(i, length_s / options_.step_s);
+    // The arc of what turns fast leaves its chord by r (w h)^2 / 2 within a step.
+    const auto n = static_cast<std::size_t>(i);
+    const double sag = std::max(kSag, kSagOfThickness * solids_[n].shape->get_thickness_m());
+    ask(i, length_s * norm(placed_[n].spin) * std::sqrt(solids_[n].radius_m / (2.0 * sag)));
+  }
+  // Powers of two: then the steps of a group are the same whatever others ask for.
+  const auto round = [](double n) {
+    return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::ceil(std::min(n, kMostSteps) - 1e-6))));
+  };
+  steps_in_window_ = 1;
+  for (int i = 0; i < count; ++i)
+    if (any_active_ && moves(i)) steps_in_window_ = std::max(steps_in_window_, round(steps[static_cast<std::size_t>(groups.find(i))]));
+  for (int i = 0; i < count; ++i) {
+    const auto n = static_cast<std::size_t>(i);
+    const int asked = round(options_.islands ? steps[static_cast<std::size_t>(groups.find(i))] : steps_in_window_);
+    stride_[n] = std::max(1, steps_in_window_ / asked);
+  }
+  step_in_window_ = 0;
 }
 
 void Space::skip_window(double end_s) {
   ++window_;
   near_.clear();
   time_s_ = window_start_s_ = window_end_s_ = std::min(static_cast<double>(window_) * kWindow, end_s);
-}
-
-/// Groups of bodies that may meet in this window.
-void Space::count_islands() {
-  Groups groups(static_cast<int>(solids_.size()));
-  for (const Pair* pair : near_)
-    if (moves(pair->a) && moves(pair->b)) groups.join(pair->a, pair->b);
-  islands_ = 0;
-  for (int i = 0; i < static_cast<int>(solids_.size()); ++i)
-    if (!is_fixed(i) && groups.find(i) == i) ++islands_;
 }
 
 void Space::check_finite(int body) const {
@@ -275,9 +317,14 @@ void Space::update(Pair& pair, double step_s) {
     search(pair, step_s);
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
     refresh(pair);
+  if (!(pair.sag_m > 0.0)) return;
+  double deepest = 0.0;
+  for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
+  pair.sag_m = std::min(pair.sag_m, deepest);
 }
 
-void Space::wake(int body) {
+/// Wakes a body and what it carries. They take the steps of the one that wakes them, which is due: so theirs do not depend on other groups.
+void Space::wake(int body, int by) {
   std::vector<int> woken{body};
   while (!woken.empty()) {
     const int i = woken.back();
@@ -287,6 +334,7 @@ void Space::wake(int body) {
     asleep_[n] = 0;
     paces_[n].slow_s = 0.0;
     flying_[n] = 0;
+    stride_[n] = stride_[static_cast<std::size_t>(by)];
     reach_m_s_[n] = norm(gravity_) * kWindow;
     for (auto& [key, pair] : pairs_) {
       if (key.first != i && key.second != i) continue;
@@ -305,18 +353,21 @@ void Space::wake(int body) {
   }
 }
 
-/// What flew to the end of the window, to where it is now.
-void Space::call_back(int body) {
+/// What flew to the end of the window, to the end of the present step of the one that may meet it, whose steps it takes from there on.
+void Space::call_back(int body, int by) {
   if (body < 0 || !flying_[static_cast<std::size_t>(body)]) return;
+  const int stride = stride_[static_cast<std::size_t>(by)];
+  const double flown_s = find_time(step_in_window_ + stride) - window_start_s_;
   if (Linked* linked = find_linked(body); linked != nullptr) {
-    linked->now = fly_linked(*linked, linked->flew_from, time_s_ - window_start_s_);
+    linked->now = fly_linked(*linked, linked->flew_from, flown_s);
     place_linked(*linked);
-    for (const int other : linked->bodies) flying_[static_cast<std::size_t>(other)] = 0;
+    for (const int other : linked->bodies) flying_[static_cast<std::size_t>(other)] = 0, stride_[static_cast<std::size_t>(other)] = stride;
     return;
   }
   const auto m = static_cast<std::size_t>(body);
   flying_[m] = 0;
-  states_[m] = fly(solids_[m], flew_from_[m], gravity_, time_s_ - window_start_s_);
+  stride_[m] = stride;
+  states_[m] = fly(solids_[m], flew_from_[m], gravity_, flown_s);
   place_body(body);
 }
 
@@ -324,6 +375,7 @@ void Space::call_back(int body) {
 void Space::reach_out(int body) {
   const auto n = static_cast<std::size_t>(body);
   const double left = window_end_s_ - time_s_;
+  const double others_left = window_end_s_ - find_time(step_in_window_);  // of groups whose step is still to be made
   const double speed = norm(states_[n].velocity) + norm(placed_[n].spin) * solids_[n].radius_m + norm(gravity_) * left;
   if (speed <= reach_m_s_[n]) return;
   reach_m_s_[n] = speed;
@@ -332,18 +384,18 @@ void Space::reach_out(int body) {
   for (int j = 0; j < static_cast<int>(solids_.size()); ++j) {
     if (j == body) continue;
     const auto m = static_cast<std::size_t>(j);
-    const shape::Box other = calc_box(j, moves(j) ? reach_m_s_[m] * (flying_[m] ? kWindow : left) + 1e-4 : 0.0);
+    const shape::Box other = calc_box(j, moves(j) ? reach_m_s_[m] * (flying_[m] ? kWindow : others_left) + 1e-4 : 0.0);
     bool apart = false;
     for (std::size_t k = 0; k < 3; ++k) apart = apart || other.low[k] > box.high[k] || box.low[k] > other.high[k];
     if (apart) continue;
     if (!joined_.empty() && is_joined(body, j)) continue;
-    call_back(j);
+    call_back(j, body);
     add_pair(body, j);
   }
   for (Pair& pair : cord_pairs_)
     if (pair.a == body || pair.b == body) {
-      call_back(pair.a);
-      call_back(pair.b);
+      call_back(pair.a, body);
+      call_back(pair.b, body);
       add_cord(pair);
     }
 }
@@ -351,7 +403,7 @@ void Space::reach_out(int body) {
 std::vector<Space::Island> Space::make_islands() {
   Groups groups(static_cast<int>(solids_.size()));
   for (const Pair* pair : near_)
-    if (!pair->contacts.empty() && moves(pair->a) && moves(pair->b)) groups.join(pair->a, pair->b);
+    if (!pair->contacts.empty() && moves(pair->a) && moves(pair->b) && is_due(pair->a) && is_due(pair->b)) groups.join(pair->a, pair->b);
   for (const Ringing& ringing : ringings_) {
     int first = -1;
     for (const int body : ringing.bodies) {
@@ -369,21 +421,31 @@ std::vector<Space::Island> Space::make_islands() {
   std::vector<Island> islands;
   std::vector<int> number(solids_.size(), -1);
   for (int i = 0; i < static_cast<int>(solids_.size()); ++i) {
-    if (!moves(i) || flying_[static_cast<std::size_t>(i)]) continue;
+    if (!moves(i) || flying_[static_cast<std::size_t>(i)] || !is_due(i)) continue;
     int& n = number[static_cast<std::size_t>(groups.find(i))];
     if (n < 0) {
       n = static_cast<int>(islands.size());
       islands.emplace_back();
     }
-    islands[static_cast<std::size_t>(n)].bodies.push_back(i);
+    Island& island = islands[static_cast<std::size_t>(n)];
+    island.stride =
+        island.bodies.empty() ? stride_[static_cast<std::size_t>(i)] : std::min(island.stride, stride_[static_cast<std::size_t>(i)]);
+    island.bodies.push_back(i);
   }
+  for (const Island& island : islands)
+    for (const int body : island.bodies) stride_[static_cast<std::size_t>(body)] = island.stride;
   for (Pair* pair : near_) {
     const int body = moves(pair->a) ? pair->a : pair->b;
-    if (!moves(body)) continue;
+    if (!moves(body) || !is_due(body)) continue;
     const int n = number[static_cast<std::size_t>(groups.find(body))];
     if (n >= 0) islands[static_cast<std::size_t>(n)].pairs.push_back(pair);
   }
   return islands;
+}
+
+/// When a small step of this window begins.
+double Space::find_time(int step) const {
+  return step >= steps_in_window_ ? window_end_s_ : window_start_s_ + (window_end_s_ - window_start_s_) * step / steps_in_window_;
 }
 
 void Space::step(double end_s) {
@@ -393,36 +455,36 @@ void Space::step(double end_s) {
   } else if (any_active_) {
     ++costs_.steps;
   }
-  const double from = window_start_s_ + (window_end_s_ - window_start_s_) * step_in_window_ / steps_in_window_;
-  const double to = step_in_window_ + 1 == steps_in_window_
-                        ? window_end_s_
-                        : window_start_s_ + (window_end_s_ - window_start_s_) * (step_in_window_ + 1) / steps_in_window_;
+  const double from = find_time(step_in_window_);
   time_s_ = from;
   if (any_active_) {
-    const double step_s = to - from;
     for (std::size_t n = 0; n < near_.size(); ++n) {  // waking adds pairs
       Pair& pair = *near_[n];
       const bool a_moves = moves(pair.a), b_moves = moves(pair.b);
-      if (!a_moves && !b_moves) continue;
+      if ((!a_moves && !b_moves) || (a_moves && !is_due(pair.a)) || (b_moves && !is_due(pair.b))) continue;
+      // Until both are due again.
+      const int stride =
+          std::max(a_moves ? stride_[static_cast<std::size_t>(pair.a)] : 1, b_moves ? stride_[static_cast<std::size_t>(pair.b)] : 1);
+      const double step_s = find_time(step_in_window_ + stride) - from;
       update(pair, step_s);
       if (pair.b < 0 || (a_moves && b_moves)) continue;
       for (const int body : {pair.a, pair.b}) {
         if (!asleep_[static_cast<std::size_t>(body)]) continue;
         for (const Contact& c : pair.contacts) {
           if (c.touch.gap_m - calc_approach(c) * step_s - 0.5 * norm(gravity_) * step_s * step_s > kTouch) continue;
-          wake(body);
+          wake(body, a_moves ? pair.a : pair.b);
           break;
         }
       }
     }
     sort_near();
     for (Island& island : make_islands()) {
-      step_island(island, from, step_s);
+      step_island(island, from, find_time(step_in_window_ + island.stride) - from);
       costs_.body_steps += static_cast<std::int64_t>(island.bodies.size());
     }
   }
-  time_s_ = to;
   ++step_in_window_;
+  time_s_ = find_time(step_in_window_);
   if (step_in_window_ == steps_in_window_) at_window_ = true;
 }
 

@@ -27,12 +27,24 @@
 
 namespace carillon::rigid {
 
+/// The end of the way of a hinge or a slider. Places and directions in the axes of the meshes, from the centres of mass, or in the world.
+struct Stop {
+  bool turns = true;          // a hinge; else a slider
+  Vec3 at_a{}, at_b{};        // the joint
+  Vec3 axis{};                // of b
+  Vec3 lever_a{}, lever_b{};  // across the axis, alike at the start; of a hinge
+  double arm_m = 0.0;         // of the lever at whose end the stop is; of a hinge
+  double most = 0.0;          // rad or m from the start that a may turn or move against b; negative where is_lower
+  bool is_lower = false;
+};
+
 /// A string without mass and stretch between two places, each in the axes of its body's mesh from the centre of mass, or in the world.
 struct Cord {
   int a = 0, b = -1;  // bodies; b may be -1: the world
   Vec3 at_a{}, at_b{};
   double length_m = 0.0;
-  double restitution = 0.0;  // when it comes taut
+  double restitution = 0.0;    // when it comes taut
+  std::optional<Stop> stop{};  // set: this is no cord but a stop of a joint, which pushes
 };
 
 /// What holds bodies together. Of a joint, `body` and `to` are bodies of the space, -1 or a fixed one: the world.
@@ -49,7 +61,7 @@ struct Ground {
 };
 
 struct Options {
-  double step_s = 2.5e-4;   // the longest small step; windows are cut into equal ones
+  double step_s = 2.5e-4;   // the longest small step where a curved surface may touch; flat ones take twice as long ones
   double tolerance = 1e-5;  // of gravity times the step: when the sweeps over the contacts end
   int most_sweeps = 30;
   int most_direct = 3;                          // bodies of a group whose problem is factorised in every step
@@ -63,11 +75,12 @@ struct Options {
 struct Contact {
   shape::Touch touch;
   int a = 0, b = -1;  // bodies; -1: the ground
-  int cord = -1;      // it is one: the gap is what it lacks to be taut, the normal points from a to b
+  int cord = -1;      // it is one: the gap is what it lacks to be taut, the normal points from a to b; or a stop
   bool touching = false;
   bool presses = false;      // in an impact that is on its way
   Vec3 impulse{}, couple{};  // of the last step, on a [N s, N m s]
   double step_s = 0.0;       // its length
+  double until_s = 0.0;      // its end
   double lost_j = 0.0;       // by it, in that step
 };
 
@@ -169,6 +182,7 @@ class Space {
     bool searched = false;
     std::int64_t window = -1;  // in which it was last near
     int cord = -1;             // it is one
+    double sag_m = 0.0;        // so deep an impact with modes left it: what it rests on has given way, and need not bring it up
   };
   /// Bodies on joints. What of it is of a step stands below the line.
   struct Linked {
@@ -185,6 +199,7 @@ class Space {
   struct Island {
     std::vector<int> bodies;
     std::vector<Pair*> pairs;
+    int stride = 1;  // small steps that it takes at once
   };
   /// What a body's group has done lately, and what it may try.
   struct Pace {
@@ -224,7 +239,7 @@ class Space {
 
   // space.cpp: windows, pairs, groups
   void open_window(double end_s);
-  void count_islands();
+  void choose_steps(double length_s);
   void add_pair(int a, int b);
   void sort_near();
   void search(Pair& pair, double step_s);
@@ -233,13 +248,15 @@ class Space {
   std::vector<Island> make_islands();
   void place_body(int body);
   void check_finite(int body) const;
-  void wake(int body);
+  void wake(int body, int by);
   void reach_out(int body);
-  void call_back(int body);
+  void call_back(int body, int by);
+  double find_time(int step) const;
   double calc_pair_friction(int a, int b) const;
   double calc_pair_restitution(int a, int b) const;
   double calc_pair_speed(int a, int b) const;
   double calc_pair_size(int a, int b) const;
+  double calc_pair_thickness(int a, int b) const;
   double calc_approach(const Contact& contact) const;
   shape::Box calc_box(int body, double grown_m) const;
 
@@ -279,6 +296,7 @@ class Space {
 
   // cords.cpp: cords as contacts that only pull
   Vec3 calc_anchor(const Cord& cord, bool is_a, const State& state) const;
+  Point make_stop_point(const Contact& contact, double h) const;
   void stretch(Pair& pair) const;
   double calc_cord_gap(const Cord& cord, const State& a, const State& b) const;
   void add_cord(Pair& pair);
@@ -322,6 +340,7 @@ class Space {
   // ringing.cpp: impacts with modes
   bool predict_hits(const std::vector<Ref>& taken, std::vector<Hit>& hits, std::vector<Point>& points);
   bool begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s);
+  bool add_resting(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s, std::vector<std::size_t>& order) const;
   void release_what_rests(const Island& island);
   void advance_ringings(const Island& island, double to_s, double part_s, double step_s);
   void take_pull_back(int body, const joints::Spatial& pull, double time_s, double step_s);
@@ -337,6 +356,7 @@ class Space {
   std::vector<double> find_shape(int body, const std::vector<double>& shape) const;
   Ringing* find_ringing(int body);
   Ringing* find_own_ringing(const Hit& hit);
+  bool is_resting(const Contact& contact) const;
   bool is_pressed(const Pair& pair, const Vec3& where) const;
 
   /// Does an impact with modes move this body at present, or one on the same joints?
@@ -349,6 +369,10 @@ class Space {
   /// -1 is the ground: fixed.
   bool is_fixed(int body) const { return body < 0 || solids_[static_cast<std::size_t>(body)].fixed; }
   bool moves(int body) const { return !is_fixed(body) && !asleep_[static_cast<std::size_t>(body)]; }
+  /// Does a step of it begin now?
+  bool is_due(int body) const { return step_in_window_ % stride_[static_cast<std::size_t>(body)] == 0; }
+  /// Has it no curved surface?
+  bool is_flat(int body) const { return body < 0 || solid(body).shape->is_polyhedron(); }
   /// In the group that is being stepped; -1: does not move.
   int find_index(int body) const { return moves(body) ? index_[static_cast<std::size_t>(body)] : -1; }
   const shape::Shape* get_shape(int body) const { return body >= 0 ? solid(body).shape.get() : nullptr; }
@@ -368,6 +392,7 @@ class Space {
   std::vector<Pair> cord_pairs_;  // one a cord
   std::vector<Placed> placed_;
   std::vector<char> asleep_, flying_, in_ringing_;
+  std::vector<int> stride_;  // small steps of the window that a body takes at once
   std::vector<Pace> paces_;
   std::vector<double> reach_m_s_;
   std::vector<State> flew_from_;
@@ -393,6 +418,7 @@ class Space {
   const std::vector<int>* stepped_ = nullptr;  // its bodies
   std::vector<Mover> movers_;
   std::vector<Vec3> free_spin_;
+  std::vector<State> free_state_;  // at the end of the step without contacts
   std::vector<Placed> free_;
   std::vector<Vec3> free_centre_, free_velocity_;  // of those on joints
   std::vector<Point> points_;

@@ -28,12 +28,16 @@ constexpr double kSlow = 5e-3;                               // m/s; of what may
 constexpr double kPatience = 0.02;                           // s; for so long
 constexpr double kLong = 0.3;                                // s; what was slow for so long is no faster than kSlow: less balance is enough
 constexpr int kMostAtOnce = 12;                              // bodies that are about to rest and are factorised without sweeps before
-constexpr double kLoose = 100.0;                             // times the tolerance
+constexpr double kLoose = 1000.0;                            // times the tolerance
 constexpr int kGuesses = 6;                                  // of a factorised problem in a step
 constexpr int kMostGuesses = 12;                             // where rest is to be proven
 constexpr double kRetry = 4e-3;                              // s; a group whose guesses failed goes by sweeps for so long
 constexpr int kMostMissed = 30;                              // in a step: instants at which nothing struck after all
 constexpr int kMostImpacts = 8;                              // of a group in a step, each at its instant; a group with more is crowded
+constexpr int kLeastImpacts = 2;                             // the same of the largest groups, each of whose impacts costs more
+constexpr int kStruckBodies = 96;                            // bodies of a group times its impacts in a step
+constexpr int kProofSweeps = 120;                            // that look for rest,
+constexpr int kMostProofSweeps = 1200;                       // of what was slow for kLong
 constexpr double kCrowded = 2e-3;                            // s; for so long after
 
 }  // namespace
@@ -47,9 +51,10 @@ void Space::step_island(Island& island, double start_s, double step_s) {
   const double g = norm(gravity_);
   const bool is_crowded = std::any_of(island.bodies.begin(), island.bodies.end(),
                                       [&](int body) { return paces_[static_cast<std::size_t>(body)].crowded_until_s > start_s; });
+  const int most_impacts = std::clamp(kStruckBodies / static_cast<int>(island.bodies.size()), kLeastImpacts, kMostImpacts);
   if (is_crowded) {
     strike_at_once(island, start_s, step_s);
-    impacts = kMostImpacts;
+    impacts = most_impacts;
   }
   while (step_s - done > kShortest) {
     const double h = step_s - done;
@@ -57,7 +62,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
     if (!std::exchange(begun, true) && may_rest(island, h) && rests(island, h)) break;
     release_what_rests(island);
     predict(island, h, false);
-    make_points(island, h, impacts < kMostImpacts);
+    make_points(island, h, impacts < most_impacts);
     const double tolerance = options_.tolerance * std::max(g, 1.0) * h;
     const double energy_before = calc_energy(island);
     solve(tolerance);
@@ -66,7 +71,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
     double at = h;
     std::vector<Ref> first;
     together_s_ = kTogether;
-    const bool struck = impacts < kMostImpacts && find_impact(island, h, at, first);
+    const bool struck = impacts < most_impacts && find_impact(island, h, at, first);
     keep_impulses(at, h);
     for (Pair* pair : island.pairs) pair->travelled_m += (calc_pair_speed(pair->a, pair->b) + g * h) * at + 1e-12;
     move_bodies(island, start_s + done + at, at, h, energy_before);
@@ -78,9 +83,9 @@ void Space::step_island(Island& island, double start_s, double step_s) {
       if (confirm_impact(first, step_s - done, kDeep * (1 + missed))) {
         strike(island, first, time_s_);
         ++costs_.impacts;
-        if (++impacts == kMostImpacts) note_crowd(island, start_s + step_s);
+        if (++impacts == most_impacts) note_crowd(island, start_s + step_s);
       } else if (++missed > kMostMissed) {
-        impacts = kMostImpacts;
+        impacts = most_impacts;
       }
     }
     if (step_s - done > kShortest)
@@ -112,6 +117,7 @@ void Space::predict(const Island& island, double h, bool at_rest) {
   movers_.resize(island.bodies.size());
   free_spin_.resize(island.bodies.size());
   free_.resize(island.bodies.size());
+  free_state_.resize(island.bodies.size());
   free_centre_.resize(island.bodies.size());
   free_velocity_.resize(island.bodies.size());
   for_linked(island, [&](Linked& linked) { predict_linked(linked, h, at_rest); });
@@ -125,6 +131,7 @@ void Space::predict(const Island& island, double h, bool at_rest) {
     movers_[n] = {1.0 / solids_[i].mass_kg, there.inverse_inertia, to.velocity, there.spin};
     free_spin_[n] = there.spin;
     free_[n] = there;
+    free_state_[n] = to;
     free_centre_[n] = to.centre;
   }
 }
@@ -210,13 +217,13 @@ Point Space::make_lasting_point(Pair& pair, const Contact& c, double h) const {
   // What is too deep comes up, at half the power that the contact loses, so that no energy comes of it.
   if (t.gap_m < -kDeep) {
     const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
-    const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep ? 0.005 : paid);
+    const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep - pair.sag_m ? 0.005 : paid);
     if (approach > -up) least = up;
   }
   p.wanted = least * t.normal - beyond;
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && curvature > 0.0) {
-    p.rolling_m = options_.rolling_resistance / curvature;
+    p.rolling_m = options_.rolling_resistance / std::max(curvature, t.steepest_per_m);
     p.twisting_m = kDrilling * p.friction * calc_patch_radius(c);
   }
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
@@ -245,10 +252,14 @@ void Space::make_points(Island& island, double h, bool leaves_impacts) {
   // From below to above, so that a sweep carries the weight down a pile.
   order_.resize(points_.size());
   std::iota(order_.begin(), order_.end(), std::size_t{0});
-  const auto height = [&](std::size_t n) { return -dot(rows_[n].get().touch.where_m, gravity_); };
-  std::stable_sort(order_.begin(), order_.end(), [&](std::size_t x, std::size_t y) { return height(x) < height(y); });
+  std::vector<double> heights;
+  heights.reserve(rows_.size());
+  for (const Ref& row : rows_) heights.push_back(-dot(row.get().touch.where_m, gravity_));
+  std::stable_sort(order_.begin(), order_.end(), [&](std::size_t x, std::size_t y) { return heights[x] < heights[y]; });
   std::vector<Point> points;
   std::vector<Ref> rows;
+  points.reserve(points_.size());
+  rows.reserve(rows_.size());
   for (const std::size_t n : order_) points.push_back(points_[n]), rows.push_back(rows_[n]);
   points_.swap(points);
   rows_.swap(rows);
@@ -294,7 +305,9 @@ void Space::solve(double tolerance_m_s) {
                                      [&](int body) { return time_s_ >= paces_[static_cast<std::size_t>(body)].next_guess_s; });
   const bool at_once = is_small || (settles && count <= kMostAtOnce);
   if (at_once && may_guess) {
-    if (factorise(false)) return;
+    // What slid in the last step is guessed to slide; what rolls is guessed anew.
+    const bool rolls = std::any_of(points_.begin(), points_.end(), [](const Point& p) { return p.rolling_m > 0.0; });
+    if (factorise(is_small && !rolls)) return;
     movers_ = free;
     points_ = begun;
   }
@@ -333,7 +346,7 @@ State Space::calc_moved(std::size_t n, double part_s, double step_s) const {
     linked->mechanism->find_motions(calc_linked_moved(*linked, part_s, step_s), motions);
     return make_state(solids_[i], motions[static_cast<std::size_t>(movers_[n].member)]);
   }
-  State to = fly(solids_[i], states_[i], gravity_, part_s);
+  State to = part_s == step_s ? free_state_[n] : fly(solids_[i], states_[i], gravity_, part_s);
   const Vec3 gained = (1.0 / step_s) * (movers_[n].velocity - (states_[i].velocity + step_s * gravity_));
   to.velocity = to.velocity + part_s * gained;
   to.centre = to.centre + (0.5 * part_s * part_s) * gained;
@@ -371,6 +384,7 @@ void Space::keep_impulses(double at_s, double h) {
     c.impulse = points_[n].impulse;
     c.couple = points_[n].couple;
     c.step_s = h;
+    c.until_s = time_s_ + at_s;
     c.lost_j = calc_loss(points_[n], 1.0);
     lost_j_ += at_s < h ? calc_loss(points_[n], at_s / h) : c.lost_j;
     c.touching = dot(c.impulse, c.touch.normal) > 0.0 || (c.touching && c.touch.gap_m <= kTouch);
@@ -481,8 +495,10 @@ bool Space::rests(Island& island, double h) {
   // A gap that roughness bridges is none: here all that is near is in touch.
   for (std::size_t n = 0; n < points_.size(); ++n) {
     if (rows_[n].get().touch.gap_m <= kDeep) points_[n].wanted = {};
-    points_[n].impulse = points_[n].couple = {};
   }
+  const std::vector<Point> moving = points_;
+  for (Point& p : points_) p.impulse = p.couple = {};
+  const std::vector<Point> unloaded = points_;
   const double g = std::max(norm(gravity_), 1e-9);
   const double bound = slow_s > kLong ? kSlow / (g * kLong) : kBalanced;
   const std::vector<Mover> free = movers_;
@@ -505,12 +521,15 @@ bool Space::rests(Island& island, double h) {
   };
   ++costs_.solves;
   bool balanced = solver_.solve_directly(movers_, points_, kMostGuesses) && is_balanced();
-  if (!balanced) {
+  // By sweeps from the impulses of the motion, and from none.
+  const auto sweep_from = [&](const std::vector<Point>& from, int most_sweeps) {
     movers_ = free;
-    solver_.solve(movers_, points_, 1e-2 * bound * g * h, (slow_s > kLong ? 40 : 4) * options_.most_sweeps);
+    points_ = from;
+    solver_.solve(movers_, points_, 1e-2 * bound * g * h, most_sweeps);
     costs_.sweeps += solver_.get_sweeps();
-    balanced = is_balanced();
-  }
+    return is_balanced();
+  };
+  balanced = balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLong ? kMostProofSweeps : kProofSweeps);
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     const auto i = static_cast<std::size_t>(island.bodies[n]);
     if (balanced) {

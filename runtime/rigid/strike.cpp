@@ -287,8 +287,8 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
       if (has_impact(body)) end_ringing(*find_ringing(body), time_s);
   const std::vector<Mover> before = movers_;
   const bool is_few = points.size() <= kFewPoints;
-  solver_.share(movers_, points, is_few ? static_cast<int>(20 * points.size()) : 0);
-  solver_.solve_on(movers_, points, (is_few ? 1e-9 : 1e-4) * scale, is_few ? 1000 : 60);
+  solver_.solve_evenly(movers_, points, is_few ? static_cast<int>(20 * points.size()) : 0, (is_few ? 1e-9 : 1e-4) * scale,
+                       is_few ? 1000 : 60);
   const double part = calc_conserving_part(before, points);
   for (std::size_t n = 0; n < points.size(); ++n) record.hits[n].impulse = part * points[n].impulse;
   give_to_modes(record, give_impulses(record, points));

@@ -71,7 +71,8 @@ void expect_same_bits(const std::vector<stream::Event>& a, const std::vector<str
     if (const auto* p = std::get_if<Impulse>(&a[i])) {
       const auto& q = std::get<Impulse>(b[i]);
       ASSERT_TRUE(p->body == q.body && p->triangle == q.triangle && p->impulse_n_s == q.impulse_n_s && p->barycentric == q.barycentric &&
-                  p->duration_s == q.duration_s);
+                  p->duration_s == q.duration_s)
+          << i << " at " << p->time_s << " of " << p->body << " and " << q.body << ": " << p->impulse_n_s[2] << " " << q.impulse_n_s[2];
     } else if (const auto* m = std::get_if<stream::Motion>(&a[i])) {
       const auto& n = std::get<stream::Motion>(b[i]);
       ASSERT_TRUE(m->body == n.body && m->position_m == n.position_m && m->velocity_m_s == n.velocity_m_s && m->rotation == n.rotation);
@@ -94,6 +95,36 @@ TEST(Islands, GiveTheFirstImpactsOfOneSystem) {
       EXPECT_LT(norm(a[hit].impulse_n_s - b[hit].impulse_n_s), 1e-4 * norm(b[hit].impulse_n_s)) << body;
     }
   }
+}
+
+TEST(Islands, GoTheirWaysToTheBitWhateverElseThereIs) {
+  // A ball that rolls takes shorter steps than boxes do, and a ball that is fast still shorter ones.
+  const bank::Bank box = make_box({0.06, 0.05, 0.04}), ball = make_ball(0.03, 3), shot = make_ball(0.004, 3);
+  WorldSpec boxes = make_rain(box, 4);
+  for (int i = 0; i < 3; ++i) boxes.bodies.push_back(make_body("stack " + std::to_string(i), box, {0.02 * i, -2.0, 0.021 + 0.045 * i}));
+  // Boxes that sleep when a ball comes to them, each in another small step of its window.
+  for (int i = 0; i < 4; ++i) {
+    boxes.bodies.push_back(make_body("asleep " + std::to_string(i), box, {1.0 * i, -4.0, 0.02}));
+    boxes.bodies.push_back(make_body("falls " + std::to_string(i), ball, {i + 0.01, -4.0, 0.5 + 0.0007 * i}));
+  }
+  const auto count = static_cast<int>(boxes.bodies.size());
+  WorldSpec more = boxes;
+  more.bodies.push_back(make_body("rolls", ball, {0, 5, 0.03}));
+  more.bodies.back().velocity_m_s = {1.0, 0, 0};
+  more.bodies.back().angular_velocity_rad_s = {0, 1.0 / 0.03, 0};
+  more.bodies.push_back(make_body("fast", shot, {0, 8, 0.0041}));
+  more.bodies.back().velocity_m_s = {60.0, 0, 0};
+  const auto alone = run(boxes, 1.0, true, 1.0);
+  auto among = run(more, 1.0, true, 1.0);
+  const auto is_other = [&](const stream::Event& e) {
+    if (const auto* m = std::get_if<stream::Motion>(&e)) return m->body >= count;
+    if (const auto* p = std::get_if<Impulse>(&e)) return p->body >= count;
+    if (const auto* c = std::get_if<stream::Contact>(&e)) return c->body >= count;
+    return false;
+  };
+  EXPECT_TRUE(std::any_of(among.begin(), among.end(), is_other));
+  std::erase_if(among, is_other);
+  expect_same_bits(among, alone);
 }
 
 TEST(Islands, ThatMeetAreJoinedAndPart) {

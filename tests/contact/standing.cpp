@@ -65,5 +65,47 @@ TEST(Standing, OnASlopeThatFrictionHoldsNothingCreeps) {
   }
 }
 
+/// A card house of three storeys, of cards of 88 x 63 x 0.3 mm that lean by 20 degrees.
+WorldSpec build_card_house(const bank::Bank& card, double friction) {
+  const double thickness = 0.0003, length = 0.088, lean = 20.0 * M_PI / 180.0, c = std::cos(lean), s = std::sin(lean);
+  const double half = 0.5 * (length * c + thickness * s), side = 0.5 * (length * s + thickness * c), pitch = 4.0 * side;
+  WorldSpec w;
+  w.ground = GroundSpec{.friction = friction};
+  const auto add = [&](double x, double z, double angle) {
+    w.bodies.push_back(make_body("card", card, {x, 0, z}, 0.0));
+    w.bodies.back().friction = friction;
+    w.bodies.back().initial.rotation = {std::cos(angle / 2), 0, std::sin(angle / 2), 0};
+  };
+  double below = 0.0;
+  for (int frames = 3; frames > 0; --frames) {
+    const double first = -0.5 * (frames - 1) * pitch;
+    for (int i = 0; i < frames; ++i)
+      for (const int way : {-1, 1}) add(first + pitch * i + way * side, below + half, -way * lean);
+    below += 2.0 * half;
+    for (int i = 0; i + 1 < frames; ++i) add(first + pitch * (i + 0.5), below + 0.5 * thickness, 0.5 * M_PI);
+    below += thickness;
+  }
+  return w;
+}
+
+TEST(Standing, ACardHouseStandsByItsFriction) {
+  bank::Bank card = make_box({0.0003, 0.063, 0.088});
+  card.material = {3e9, 0.3, 900.0, 1e-6, 50.0};
+  set_rigid_of_solid(card);
+  for (const double friction : {0.5, 0.6}) {
+    const WorldSpec w = build_card_house(card, friction);
+    const Course course = run(w, 2.0, 12.0);
+    EXPECT_LT(calc_drift(course), 1e-6) << friction;
+    EXPECT_EQ(course.steps, 0) << "it does not sleep, " << friction;
+    // Its edges find each other by less than a card is thick.
+    for (std::size_t i = 0; i < w.bodies.size(); ++i)
+      EXPECT_LT(norm(course.at_end[i].position_m - w.bodies[i].initial.position_m), 3e-4) << friction << ", card " << i;
+  }
+  // A pair without load takes tan(20 degrees)/2 = 0.18.
+  const WorldSpec w = build_card_house(card, 0.1);
+  const Course course = run(w, 2.0, 2.1);
+  for (const stream::Motion& m : course.at_end) EXPECT_LT(m.position_m[2], 0.05);
+}
+
 }  // namespace
 }  // namespace carillon::contact::tests

@@ -76,6 +76,29 @@ TEST(solver, sliding_follows_coulomb_and_the_cone_is_never_left) {
   }
 }
 
+TEST(solver, couple_against_rolling_is_at_its_bound_while_a_ball_rolls) {
+  // The touch is a little before or behind the lowest place, so that friction that would stop the ball would lift it or press it down.
+  const double h = 1e-3, g = 9.81, radius = 0.03, inertia = 0.4 * radius * radius;
+  for (const double ahead : {-1e-3, 0.0, 1e-3}) {
+    for (const double speed : {0.5, -0.5}) {
+      std::vector<Mover> movers{{1.0, {}, {speed, 0, -g * h}, {0, speed / radius, 0}}};
+      for (std::size_t k = 0; k < 3; ++k) movers[0].inverse_inertia[k][k] = 1.0 / inertia;
+      Point p;
+      p.a = 0;
+      p.arm_a = {ahead * radius, 0, -radius};
+      p.normal = {0, 0, 1};
+      p.wanted = {0, 0, -speed * ahead};  // it keeps rolling
+      p.friction = 0.5;
+      p.rolling_m = 1e-3 * radius;
+      std::vector<Point> points{p};
+      Solver solver;
+      EXPECT_TRUE(solver.solve_directly(movers, points, 12));
+      EXPECT_NEAR(dot(points[0].impulse, p.normal), g * h, 2e-3 * g * h);
+      EXPECT_NEAR(points[0].couple[1], -std::copysign(p.rolling_m * dot(points[0].impulse, p.normal), speed), 1e-9 * p.rolling_m);
+    }
+  }
+}
+
 class Towers : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(MassOfTheUppermost, Towers, testing::Values(1.0, 1000.0, 1e-3));
 
@@ -147,6 +170,39 @@ TEST(solver, free_pairs_keep_momentum_and_angular_momentum_and_gain_no_energy) {
     EXPECT_LT(norm(l1 - l0), 1e-13);
     EXPECT_LE(e1, e0 + 1e-12);
   }
+}
+
+TEST(solver, all_sets_of_instructions_give_the_same_numbers) {
+#if defined(__x86_64__)
+  if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "this processor has no AVX2";
+  const double h = 1e-3, g = 9.81;
+  const Vec3 size{0.05, 0.04, 0.03};
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  std::vector<Mover> movers;
+  std::vector<Point> points;
+  for (int n = 0; n < 8; ++n) {
+    movers.push_back(make_block(1.0 + 0.5 * unit(random), size, {0.1 * unit(random), 0.1 * unit(random), -g * h}));
+    movers.back().spin = {unit(random), unit(random), unit(random)};
+    auto feet = make_feet(n, n - 1, size, 0.3, 0.5 * size[2]);
+    for (Point& p : feet) p.rolling_m = 1e-4, p.twisting_m = 1e-3;
+    points.insert(points.end(), feet.begin(), feet.end());
+  }
+  const auto run = [&](const sweeps::Functions& functions, bool evenly) {
+    Solver solver(functions);
+    std::vector<Mover> moved = movers;
+    std::vector<Point> pushed = points;
+    if (evenly)
+      solver.solve_evenly(moved, pushed, 5, 1e-9, 40);
+    else
+      solver.solve(moved, pushed, 1e-9, 40);
+    std::vector<double> all;
+    for (const Mover& m : moved) all.insert(all.end(), {m.velocity[0], m.velocity[1], m.velocity[2], m.spin[0], m.spin[1], m.spin[2]});
+    for (const Point& p : pushed) all.insert(all.end(), {p.impulse[0], p.impulse[1], p.impulse[2], p.couple[0], p.couple[1], p.couple[2]});
+    return all;
+  };
+  for (const bool evenly : {false, true}) EXPECT_EQ(run(sweeps::kPlain, evenly), run(sweeps::kAvx2, evenly));
+#endif
 }
 
 }  // namespace

@@ -1,0 +1,14 @@
+#include "runtime/rigid/sweeps.inl"
+
+namespace carillon::rigid::sweeps {
+
+const Functions kPlain{sweep, add, begin, share};
+
+const Functions& get_functions() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) return kAvx2;
+#endif
+  return kPlain;
+}
+
+}  // namespace carillon::rigid::sweeps
