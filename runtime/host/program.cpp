@@ -160,6 +160,7 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
                scene.bodies[i].spec.fixed ? "fixed, " : "", sound.body_peak_pa[i]);
     if (const std::string& text = scene.bodies[i].mounting.text; !text.empty())
       fmt::print(notes, "  {:<16} {}\n", "", config::printable(text));
+    if (const std::string text = describe_limited(scene.bodies[i]); !text.empty()) fmt::print(notes, "  {:<16} {}\n", "", text);
   }
   print_bands(notes, scene, sound.rate_hz);
   fmt::print(notes, "modes sounding     {}\n", figures.modes);
@@ -258,6 +259,7 @@ void run(const ProgramOptions& options) {
     fmt::print("{}", config::printable_lines(plan::format_plan(plan.planner, plan.facts)));
     for (const SceneBody& body : scene.bodies) {
       if (!body.mounting.text.empty()) fmt::print("{}: {}\n", config::printable(body.name), config::printable(body.mounting.text));
+      if (const std::string text = describe_limited(body); !text.empty()) fmt::print("{}: {}\n", config::printable(body.name), text);
     }
     return;
   }

@@ -136,7 +136,19 @@ std::string make_mounting_json(const Mounting& mounting) {
   return json + "},\n   ";
 }
 
+/// As a member of a JSON object with its comma; empty where there are none.
+std::string make_limited_json(const radiation::Limited& limited) {
+  if (limited.modes == 0) return {};
+  return fmt::format("\"limited_gains\": {{\"modes\": {}, \"most_db\": {:.4g}}},\n   ", limited.modes, limited.most_db);
+}
+
 }  // namespace
+
+std::string describe_limited(const SceneBody& body) {
+  if (body.limited.modes == 0) return {};
+  return fmt::format("{} of {} modes would radiate more than their damping takes: softer by up to {:.1f} dB", body.limited.modes,
+                     body.spec.bank->mode_count(), body.limited.most_db);
+}
 
 void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool,
                       const std::function<void(std::string_view)>& sink) {
@@ -236,9 +248,9 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
   json += "],\n \"per_body\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const std::int64_t played = i < f.tally.body_impulses.size() ? f.tally.body_impulses[i] : 0;
-    fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   {}\"effects\": {}}}",
+    fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   {}{}\"effects\": {}}}",
                    i == 0 ? "" : ",", config::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i],
-                   make_mounting_json(scene.bodies[i].mounting),
+                   make_mounting_json(scene.bodies[i].mounting), make_limited_json(scene.bodies[i].limited),
                    plan::make_plan_json(plan.planner, plan.facts, static_cast<int>(i), list_measured(sound, i, scene.duration_s)));
   }
   fmt::format_to(out, "\n ],\n \"changes\": {}\n}}\n", plan::make_changes_json(plan.changes, plan.facts, kMostReported));

@@ -24,6 +24,9 @@ struct EnergyBooks {
   double radiated_j = 0.0;      // Sound::radiated_j
 };
 
+/// One line about modes whose gains came down to what their damping takes; empty where there are none.
+std::string describe_limited(const SceneBody& body);
+
 /// The figures of one rendering.
 struct Figures {
   std::size_t bodies = 0;

@@ -5,11 +5,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
 #include <span>
+#include <utility>
 
 #include "runtime/config/solids.hpp"
 #include "runtime/config/supports.hpp"
@@ -29,6 +31,7 @@ constexpr std::size_t kMostWaypoints = 100000;
 constexpr std::size_t kMostMicrophones = 16;
 constexpr std::size_t kMostHolders = 1000;
 constexpr std::size_t kMostStrikes = 100000;
+constexpr double kWidestDeg = 175.0;   // of a hinge with stops; past 180 the angle wraps round to the other side
 constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
 constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body lasts as long as a person's step on less
@@ -280,6 +283,21 @@ contact::JointSpec parse_joint(config::Object& object, const Names& names) {
   } else {
     joint.damping = read_within(object, "damping", 0.0, 0.0, 1e6);
   }
+  const bool turns = joint.kind == joints::Kind::kHinge, slides = joint.kind == joints::Kind::kSlider;
+  for (const auto& [key, is_meant] : {std::pair{"limits_deg", turns}, {"limits_m", slides}}) {
+    if (!object.has(key)) continue;
+    if (!is_meant) object.fail(key, fmt::format("a {} has none; a hinge has \"limits_deg\", a slider \"limits_m\"", kind));
+    std::array<double, 2> limits = object.numbers<2>(key);
+    const double most = turns ? kWidestDeg : kFarthestM;
+    if (!(limits[0] <= 0.0 && limits[1] >= 0.0 && limits[0] >= -most && limits[1] <= most && limits[1] - limits[0] > 1e-3))
+      object.fail(key, fmt::format("must be [lowest, highest] with the start, 0, between them, within {:g}", most));
+    for (double& limit : limits) limit *= turns ? std::numbers::pi / 180.0 : 1.0;
+    joint.limits = limits;
+  }
+  if (joint.limits)
+    joint.stop_restitution = read_within(object, "stop_restitution", 0.0, 0.0, 1.0);
+  else if (object.has("stop_restitution"))
+    object.fail("stop_restitution", "belongs to \"limits_deg\" or \"limits_m\"; give them, too");
   object.finish();
   return joint;
 }

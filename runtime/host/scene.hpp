@@ -53,6 +53,7 @@ struct SceneBody {
   std::string support_place;     // "file:line" of the first of them, for messages
   Mounting mounting;             // what they, or the bank's own supports, take of its modes
   double sphere_radius_m = 0.0;  // of its bank, when that is read: radiation::calc_sphere_radius_m()
+  radiation::Limited limited;    // gains of its modes that its damping would not allow
   double variation = 0.0;        // its own key "variation", or the scene's: how much equal strikes differ, 0..1
 };
 

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <ctime>
 #include <deque>
 #include <limits>
 #include <map>
@@ -36,6 +38,14 @@ namespace {
 
 constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
 constexpr double kChangeS = 0.03;  // by which a change of effects is sent before the events that call for it
+
+/// CPU time of this thread.
+double get_cpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
 /// Physics and strikes of a scene as one stream, in order of time.
 class Course {
  public:
@@ -62,11 +72,16 @@ class Course {
   /// Goes on towards a time, for a slice of CPU time.
   void advance(double until_s) {
     if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return;
+    counted_s_ = get_cpu_s();
     time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) {
       waiting_.push_back(event);
       planner_->watch(event);
+      if (std::holds_alternative<stream::Mark>(event)) end_window();
     });
+    window_cpu_s_ += get_cpu_s() - counted_s_;
   }
+  /// The most CPU time that a window of the physics, 2 ms of the scene, has taken.
+  double get_worst_window_s() const { return worst_window_s_; }
   /// Up to where it is known what happens.
   double get_time_s() const { return world_ == nullptr || time_s_ >= end_s_ ? std::numeric_limits<double>::infinity() : time_s_; }
 
@@ -88,12 +103,21 @@ class Course {
   }
 
  private:
+  /// The physics marks the end of each window.
+  void end_window() {
+    const double now = get_cpu_s();
+    worst_window_s_ = std::max(worst_window_s_, window_cpu_s_ + now - counted_s_);
+    window_cpu_s_ = 0.0;
+    counted_s_ = now;
+  }
+
   std::vector<stream::Event> strikes_;
   plan::Planner* planner_;
   std::size_t next_ = 0;
   std::unique_ptr<contact::World> world_;
   std::deque<stream::Event> waiting_;
   double time_s_ = 0.0, end_s_ = 0.0, marked_s_ = -1.0;
+  double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
 /// The way of a listener that walks, as events.
@@ -168,9 +192,11 @@ void play(const PlayerOptions& options) {
   walk.hand_on(options.look_ahead_s, synthesiser);
   device.start();
   synth::LoadKeeper keeper;
+  double lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound, the least
   for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
     const double until = now + options.look_ahead_s;
     course.advance(until);
+    lead_s = std::min(lead_s, course.get_time_s() - synthesiser.get_time_s());
     change_effects(std::min(course.get_time_s(), until));
     course.hand_on(until - hold_back_s, synthesiser);
     walk.hand_on(until, synthesiser);
@@ -185,7 +211,11 @@ void play(const PlayerOptions& options) {
   fmt::print("played             {:.2f} s in {} blocks, {} underflows, latency {:.1f} ms\n", static_cast<double>(card.frames) / rate_hz,
              card.callbacks, card.underflows, 1e3 * card.latency_s);
   fmt::print("strikes            {}, {} late, {} refused\n", counters.strikes, counters.late, counters.refused);
-  fmt::print("physics            {} times behind the sound\n", counters.underruns);
+  fmt::print("physics            {} times behind the sound", counters.underruns);
+  if (std::isfinite(lead_s))
+    fmt::print(", {:.0f} ms {} at the worst; 2 ms of it took {:.1f} ms of CPU at most", 1e3 * std::abs(lead_s),
+               lead_s < 0.0 ? "behind" : "in front", 1e3 * course.get_worst_window_s());
+  fmt::print("\n");
   fmt::print("work               {:.1f} % of a core, {:.3g} mode-samples/s, {} groups of modes faded\n", 100.0 * card.busy_s / card_s,
              static_cast<double>(counters.mode_samples) / card_s, counters.faded);
 }

@@ -620,6 +620,29 @@ class RenderProgram(unittest.TestCase):
             quiet = np.abs(sound[int((last + 0.3) * 48000):]).max()
             self.assertLess(quiet, 1e-5 * np.abs(sound).max(), name)
 
+    def test_bodies_that_never_meet_sound_as_each_does_alone(self):
+        # Thrown along the floor, so that they slide, rattle and roll: with all effects, in either order.
+        cube = {"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.12], "rotation_deg": [20, 30, 0], "velocity_m_s": [0.3, 0, 0]}
+        other = {**cube, "name": "other", "position_m": [1, 0.3, 0.15], "rotation_deg": [10, 50, 40], "angular_velocity_rad_s": [2, 1, 0]}
+
+        def hear(*bodies):
+            scene = self.scene("apart.json", duration_s=1.0, bodies=bodies, output={"gain": 1e-3, "format": "float", "fade_end": False})
+            record = self.root / "apart.jsonl"
+            run = render(scene, "-o", self.root / "apart.wav", "--record", record, "-q")
+            self.assertEqual((run.returncode, run.stderr), (0, ""))
+            data = (self.root / "apart.wav").read_bytes()
+            kinds = [next(iter(json.loads(line))) for line in record.read_text().splitlines()]
+            return np.frombuffer(data[data.index(b"data") + 8:], dtype="<f4").astype(float), kinds.count("contact")
+
+        (one, contacts), (two, more), (both, together), (turned, _) = hear(cube), hear(other), hear(cube, other), hear(other, cube)
+        self.assertGreater(min(contacts, more), 50)
+        self.assertEqual(together, contacts + more)
+        whole = np.sum(both**2)
+        self.assertGreater(np.sum(one**2), 0.01 * whole)
+        self.assertGreater(np.sum(two**2), 0.01 * whole)
+        self.assertLess(np.sum((both - one - two) ** 2), 1e-13 * whole)  # -130 dB; what single precision rounds
+        self.assertLess(np.sum((both - turned) ** 2), 1e-13 * whole)
+
     def test_a_fall_of_half_a_millimetre_is_heard(self):
         scene = self.scene("slight.json", bodies=[{"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.0505]}], output={"gain": 1.0, "format": "float"})
         run = render(scene, "-o", self.root / "slight.wav", "--trajectory", self.root / "slight.json.path", "--report", self.root / "slight-report.json", "-q")

@@ -82,7 +82,7 @@ std::string with_cord(const std::string& keys) { return "{\"duration_s\": 1, " +
 
 TEST(Scene, JointsAndCordsAreRead) {
   const Scene scene = parse("{\"duration_s\": 2, " + kTwo + R"(, "joints": [
-    {"kind": "hinge", "body": "a", "to": "world", "at_m": [0, 0, 1], "axis": [0, 2, 0], "damping": 0.01},
+    {"kind": "hinge", "body": "a", "to": "world", "at_m": [0, 0, 1], "axis": [0, 2, 0], "damping": 0.01, "limits_deg": [-90, 45], "stop_restitution": 0.3},
     {"kind": "universal", "body": "b", "to": "a", "at_m": [0, 0, 2], "axis": [1, 0, 0], "second_axis": [0, 3, 0]}],
     "cords": [{"from": {"body": "b", "at_m": [0, 0, 1]}, "to": {"at_m": [0, 0, 3]}, "length_m": 2.5, "restitution": 0.2},
               {"from": {"body": "b", "at_m": [0, 0, 1]}, "to": {"body": "a", "at_m": [0, 0, 3]}}]})");
@@ -92,6 +92,11 @@ TEST(Scene, JointsAndCordsAreRead) {
   EXPECT_EQ(scene.joints[0].to, -1);
   EXPECT_EQ(scene.joints[0].axis, (Vec3{0, 1, 0}));
   EXPECT_EQ(scene.joints[0].damping, 0.01);
+  ASSERT_TRUE(scene.joints[0].limits);
+  EXPECT_DOUBLE_EQ((*scene.joints[0].limits)[0], -0.5 * M_PI);
+  EXPECT_DOUBLE_EQ((*scene.joints[0].limits)[1], 0.25 * M_PI);
+  EXPECT_EQ(scene.joints[0].stop_restitution, 0.3);
+  EXPECT_FALSE(scene.joints[1].limits);
   EXPECT_EQ(scene.joints[0].place, "/somewhere/scene.json:2");
   EXPECT_EQ(scene.joints[1].to, 0);
   EXPECT_EQ(scene.joints[1].second_axis, (Vec3{0, 1, 0}));
@@ -296,6 +301,15 @@ INSTANTIATE_TEST_SUITE_P(
             "universal_with_parallel_axes",
             with_joint(R"("kind": "universal", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "second_axis": [0, 0.1, 1])"),
             {":2:", "second_axis", "right angles"}},
+        BadScene{"slider_with_limits_of_a_hinge",
+                 with_joint(R"("kind": "slider", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "limits_deg": [-1, 1])"),
+                 {":2:", "limits_deg", "limits_m"}},
+        BadScene{"hinge_that_starts_beyond_its_stop",
+                 with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "limits_deg": [1, 2])"),
+                 {":2:", "limits_deg", "the start, 0, between them"}},
+        BadScene{"restitution_of_no_stop",
+                 with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "stop_restitution": 0.5)"),
+                 {":2:", "stop_restitution", "limits_deg"}},
         BadScene{"joint_that_drives",
                  with_joint(R"("kind": "ball", "body": "a", "to": "b", "at_m": [0, 0, 0], "damping": -1)"),
                  {":2:", "damping", "out of range"}},
