@@ -388,7 +388,8 @@ MendedSurface mend_surface(TriangleSurface surface, const SurfaceOptions& option
   std::erase_if(parts, [&](double part) { return 2 / part > options.close_holes.value_or(kLargestHole); });
   // What a wrap costs grows with the triangles of its own that cover the surface, and may grow with those of the file: a soup of few
   // triangles and much area has no detail that is worth a fine wrap. Bodies have an area of one or two squares of their diagonal.
-  const double most_area = (1.5 + 1e-3 * static_cast<double>(surface.triangles.size())) * diagonal * diagonal;  // for the finest
+  const auto count = static_cast<double>(surface.triangles.size());
+  const double most_area = std::min(0.2 + 2.5e-3 * count, 1.5 + 1e-3 * count) * diagonal * diagonal;  // for the finest
   std::erase_if(parts, [&](double part) { return part > kCoarsest && part * part * area > kFinest * kFinest * most_area; });
   const auto slips = [&](double part) {
     return calc_area(wrap(surface, diagonal / part, kProbeOffset * diagonal / part)) > kBothSidesOfProbe * area;

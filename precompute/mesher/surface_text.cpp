@@ -114,7 +114,7 @@ PolygonSoup parse_obj(std::string_view bytes, const std::string& name) {
       if (words.size() > 3) soup.counts.push_back(static_cast<std::int32_t>(words.size() - 1));
     }
   }
-  if (const auto vertices = static_cast<std::int64_t>(soup.points.size()); largest >= vertices && vertices > 0)
+  if (largest >= static_cast<std::int64_t>(soup.points.size()))
     text.refuse_line(line_of_largest, fmt::format("the face names vertex {}, but there are only {}; export the surface again", largest + 1,
                                                   soup.points.size()));
   return soup;

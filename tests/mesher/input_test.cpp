@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "precompute/mesher/surface.hpp"
+#include "precompute/mesher/triangle_surface.hpp"
 #include "runtime/config/error.hpp"
 #include "tests/mesher/surfaces.hpp"
 
@@ -258,6 +259,18 @@ TEST(input, boxes_with_one_corner_moved_hardly_or_kilometres_away_are_meshed_or_
   }
 }
 
+TEST(input, a_soup_of_few_triangles_is_wrapped_by_few) {
+  // A box of which four corners lie elsewhere than their triangles expect. Finer wraps of it have 25,000 triangles and take seconds.
+  const std::string soup =
+      "v 0.1 0 0\nv 0 0.05 0\nv 0.1 0.05 0\nv 0 0 0.03\nv 0.1 0 0.03\nv 0 0 0.03\nv 0 0.05 0.03\nv 0.1 0.05 0.03\n"
+      "f 1 4 2\nf 1 3 4\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n";
+  SurfaceReport report;
+  const MendedSurface mended = mend_surface(parse_surface(soup, "soup.obj", "obj"), {.surface = "soup.obj"}, report);
+  EXPECT_TRUE(report.wrapped);
+  EXPECT_LT(mended.surface.triangles.size(), 5000u);
+  EXPECT_GT(calc_volume(mended.surface), 0.0);
+}
+
 TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
   const std::string box = to_off(make_box(1, 1, 1));
   Polygons open = make_box(1, 1, 1);
@@ -318,6 +331,7 @@ TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
       {"nan.ply", replaced(to_ply(cube), "\n1 0 0", "\ninf 0 0"), plain, "nan.ply:11: the coordinate 'inf'"},
       {"nan.stl", replaced(to_stl(cube), "vertex 1 ", "vertex nan "), plain, "the coordinate 'nan'"},
       {"beyond.obj", to_obj(cube) + "f 1 2 99\n", plain, "beyond.obj:23: the face names vertex 99, but there are only 8"},
+      {"no_vertices.obj", "f 1 2 3\nf 3 2 4 1\n", plain, "no_vertices.obj:2: the face names vertex 4, but there are only 0"},
       {"huge_index.obj", to_obj(cube) + "f 1 2 99999999999999999999\n", plain, "names the vertex '99999999999999999999'"},
       {"zeroth.obj", to_obj(cube) + "f 0 1 2\n", plain, "names the vertex '0'"},
       {"negative.ply", replaced(to_ply(cube), "3 0 2 3", "3 0 2 -3"), plain, "names the vertex '-3'"},
