@@ -69,9 +69,10 @@ void guard_program(const char* program) {
   action.sa_flags = kSanitized ? 0 : SA_ONSTACK;
   action.sa_handler = end_by_time;
   ::sigaction(SIGXCPU, &action, nullptr);
-  if (kSanitized) return;
   action.sa_handler = end_by_crash;
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::sigaction(signal, &action, nullptr);
+  ::sigaction(SIGFPE, &action, nullptr);  // GMP raises it for what is not a number
+  if (kSanitized) return;                 // the other faults are for the sanitizer to report
+  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGABRT}) ::sigaction(signal, &action, nullptr);
 }
 
 void set_guarded_step(std::string_view file, std::string_view step) {

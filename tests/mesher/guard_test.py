@@ -39,7 +39,7 @@ class Guard(unittest.TestCase):
             return child.wait(), said
 
     def test_a_crash_names_the_file_and_the_step(self):
-        for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT):
+        for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT):
             code, said = self.send(number)
             self.assertEqual(code, 2, said)
             last = said.splitlines()[-1]
