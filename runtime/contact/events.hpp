@@ -28,6 +28,7 @@ struct WorldOptions {
   double end_s = std::numeric_limits<double>::infinity();  // the world stops there
   bool islands = true;                                     // false: all bodies in one problem, for comparison
   bool modes = true;                                       // false: impacts do not look at modes, as if banks had none
+  bool masks_hits = false;                                 // hits that are not heard after others are left out: Masks (pulses.hpp)
   bool lasting_contacts = true;                            // false: no stream::Contact records, and none of their cost
   bool audits_energy = false;                              // Statistics::energy
 };

@@ -21,7 +21,9 @@ using rigid::kSlowest;
 using rigid::norm;
 using stream::Vec3;
 
-constexpr double kMasked = 0.01;  // of the largest impulse of the same instant: 40 dB below it
+constexpr double kMasked = 0.01;       // of the largest impulse of the same instant: 40 dB below it
+constexpr double kMaskedAfter = 0.02;  // of what its body was struck with before; and that fades
+constexpr double kMaskTime = 0.05;     // s; to 1/e
 
 /// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
@@ -40,7 +42,7 @@ double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike,
 }
 
 void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std::vector<const rigid::Hit*>& hits, double touch_s,
-              double most_push, LastingContacts& lasting, std::vector<stream::Event>& events) {
+              double most_push, LastingContacts& lasting, Masks* masks, std::vector<stream::Event>& events) {
   const rigid::Hit& first = *hits.front();
   Vec3 impulse{}, where{}, normal{};
   double push = 0.0, approach = 0.0, curvature = 0.0;
@@ -70,7 +72,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   pulse.time_s = touch_s + 0.5 * pulse.duration_s;
   for (const int side : {0, 1}) {
     const int body = side == 0 ? first.a : first.b;
-    if (body < 0) continue;
+    if (body < 0 || (masks != nullptr && masks->take(body, strike.time_s, norm(impulse)))) continue;
     const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
     const rigid::State& state =
         at == strike.bodies.end() ? space.state(body) : strike.before[static_cast<std::size_t>(at - strike.bodies.begin())];
@@ -87,7 +89,15 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
 
 }  // namespace
 
-void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, std::vector<stream::Event>& events) {
+bool Masks::take(int body, double time_s, double impulse_n_s) {
+  Mask& mask = masks_[static_cast<std::size_t>(body)];
+  const double left = mask.impulse_n_s * std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
+  mask = {std::max(left, impulse_n_s), std::max(time_s, mask.time_s)};
+  return impulse_n_s < kMaskedAfter * left;
+}
+
+void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, Masks* masks,
+                std::vector<stream::Event>& events) {
   std::vector<const rigid::Hit*> order;
   for (const rigid::Hit& hit : strike.hits)
     if (!hit.is_cord && dot(hit.impulse, hit.touch.normal) > 0.0) order.push_back(&hit);
@@ -107,7 +117,8 @@ void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingC
       spot.push_back(&hit);
       wait_s = std::min(wait_s, hit.approach_m_s > kSlowest ? hit.touch.gap_m / hit.approach_m_s : 0.0);
     }
-    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kTogether, strike.together_s), most_push, lasting, events);
+    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kTogether, strike.together_s), most_push, lasting, masks,
+             events);
   }
 }
 

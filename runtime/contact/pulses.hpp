@@ -9,7 +9,25 @@
 
 namespace carillon::contact {
 
-/// Gathers the points of an impact into spots, strongest first, and appends one pulse a spot and body. `lasting` is told of it.
-void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, std::vector<stream::Event>& events);
+/// What each body was struck with lately, as it fades from hearing: a heap that settles taps its bodies thousands of times a second, most
+/// of them far below what rings there already.
+class Masks {
+ public:
+  explicit Masks(int bodies) : masks_(static_cast<std::size_t>(bodies)) {}
+  /// Takes note of an impulse on a body [N s]. True if it is so much weaker than those before it that it is not heard: 34 dB below one just
+  /// before, and 1 dB less for every 6 ms since. In order of time, but for the length of a step.
+  bool take(int body, double time_s, double impulse_n_s);
+
+ private:
+  struct Mask {
+    double impulse_n_s = 0.0, time_s = 0.0;
+  };
+  std::vector<Mask> masks_;
+};
+
+/// Gathers the points of an impact into spots, strongest first, and appends one pulse a spot and body; with masks only
+/// where it is heard. `lasting` is told of it.
+void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, Masks* masks,
+                std::vector<stream::Event>& events);
 
 }  // namespace carillon::contact

@@ -194,6 +194,7 @@ class World::Course {
  public:
   Course(const WorldSpec& spec, const WorldOptions& options)
       : options_(options), space_(make_space(spec, options)), lasting_(list_matter(spec)) {
+    if (options_.masks_hits) masks_.emplace(count());
     check_overlaps(spec);
     prepare_shapes(spec.ground.has_value());
     if (!options_.audits_energy) return;
@@ -275,7 +276,7 @@ class World::Course {
     for (std::size_t k = 0; k < strike.bodies.size(); ++k)
       events_.push_back(make_motion(strike.bodies[k], strike.before[k], strike.time_s));
     for (std::size_t k = 0; k < strike.bodies.size(); ++k) events_.push_back(make_motion(strike.bodies[k], strike.after[k], strike.time_s));
-    add_pulses(space_, strike, lasting_, events_);
+    add_pulses(space_, strike, lasting_, masks_ ? &*masks_ : nullptr, events_);
     if (!options_.audits_energy) return;
     double taken = 0.0;
     for (std::size_t k = 0; k < strike.bodies.size(); ++k)
@@ -291,6 +292,12 @@ class World::Course {
       const int body = side == 0 ? forces.a : forces.b;
       if (body < 0) continue;
       const shape::Place& place = side == 0 ? forces.place_a : forces.place_b;
+      const std::vector<Vec3>& impulses = side == 0 ? forces.on_a : forces.on_b;
+      if (masks_) {
+        Vec3 given{};
+        for (const Vec3& impulse : impulses) given = impact::operator+(given, impulse);
+        masks_->take(body, forces.time_s, rigid::norm(given));
+      }
       stream::Force first;
       first.time_s = forces.time_s;
       first.step_s = forces.step_s;
@@ -299,7 +306,7 @@ class World::Course {
       first.triangle = place.triangle;
       first.barycentric = place.barycentric;
       first.continues = forces.continues;
-      stream::split_force(first, side == 0 ? forces.on_a : forces.on_b, [&](const stream::Force& force) { events_.push_back(force); });
+      stream::split_force(first, impulses, [&](const stream::Force& force) { events_.push_back(force); });
     }
   }
 
@@ -339,6 +346,7 @@ class World::Course {
   WorldOptions options_;
   rigid::Space space_;
   LastingContacts lasting_;
+  std::optional<Masks> masks_;
   std::vector<stream::Event> events_;  // of this window
   std::vector<char> still_;
   bool begun_ = false;

@@ -105,6 +105,7 @@ void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::
                                            .joint_tolerance = scene.quality.joint_tolerance,
                                            .end_s = scene.duration_s,
                                            .modes = scene.quality.modes_in_impacts,
+                                           .masks_hits = scene.quality.masking,
                                            .lasting_contacts = has_contacts,
                                            .audits_energy = audits});
   constexpr int kParts = 100;

@@ -498,6 +498,7 @@ Quality parse_quality(config::Object& object) {
   quality.contact_step_s = read_within(object, "contact_step_s", quality.contact_step_s, 1e-5, 2e-3);
   quality.joint_tolerance = read_within(object, "joint_tolerance", quality.joint_tolerance, 1e-14, 1e-4);
   quality.modes_in_impacts = object.boolean_or("modes_in_impacts", quality.modes_in_impacts);
+  quality.masking = object.boolean_or("masking", quality.masking);
   quality.instructions = static_cast<synth::Isa>(read_name(object, "instructions", kInstructionNames, "best"));
   object.finish();
   return quality;

@@ -110,6 +110,7 @@ struct Quality {
   double contact_step_s = contact::WorldOptions{}.contact_step_s;
   double joint_tolerance = contact::WorldOptions{}.joint_tolerance;
   bool modes_in_impacts = true;  // impacts are solved with the modes of what rings
+  bool masking = true;           // hits far below those that a body had just before are left out
   synth::Isa instructions = synth::Isa::kBest;
 };
 

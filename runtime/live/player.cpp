@@ -38,6 +38,9 @@ namespace {
 
 constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
 constexpr double kChangeS = 0.03;  // by which a change of effects is sent before the events that call for it
+// Events are handed on so long before they are heard, however far physics is in front: the synthesiser has room for what waits so long.
+constexpr double kHandedS = 0.25;
+constexpr int kMostStrikes = 1024, kMostForces = 2048;  // of a body that wait or act
 
 /// CPU time of this thread.
 double get_cpu_s() {
@@ -62,6 +65,7 @@ class Course {
                                                                                           .joint_tolerance = scene.quality.joint_tolerance,
                                                                                           .end_s = scene.duration_s,
                                                                                           .modes = scene.quality.modes_in_impacts,
+                                                                                          .masks_hits = scene.quality.masking,
                                                                                           .lasting_contacts = planner.needs_contacts()});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
@@ -152,7 +156,8 @@ void play(const PlayerOptions& options) {
                                   .microphones_m = microphones.offset_m,
                                   .listener_m = microphones.centre.find(0.0).position_m,
                                   .max_bodies = static_cast<int>(scene.bodies.size()),
-                                  .max_forces = 2048,
+                                  .max_strikes = kMostStrikes,
+                                  .max_forces = kMostForces,
                                   .max_waypoints = 1024,
                                   .ring_events = 1 << 14,
                                   .budget = host::calc_budget(scene.quality, rate_hz),
@@ -183,13 +188,13 @@ void play(const PlayerOptions& options) {
       synthesiser.set_effects(change.body, host::find_effects(scene, static_cast<std::size_t>(change.body), change.effects));
     }
   };
-  const double hold_back_s = plans ? kChangeS : 0.0;
+  const double handed_s = std::min(kHandedS, plans ? options.look_ahead_s - kChangeS : options.look_ahead_s);
   Walk walk(microphones.centre);
   Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
   while (course.get_time_s() < options.look_ahead_s) course.advance(options.look_ahead_s);
   change_effects(options.look_ahead_s);
-  course.hand_on(options.look_ahead_s - hold_back_s, synthesiser);
-  walk.hand_on(options.look_ahead_s, synthesiser);
+  course.hand_on(handed_s, synthesiser);
+  walk.hand_on(kHandedS, synthesiser);
   device.start();
   synth::LoadKeeper keeper;
   double lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound, the least
@@ -198,8 +203,8 @@ void play(const PlayerOptions& options) {
     course.advance(until);
     lead_s = std::min(lead_s, course.get_time_s() - synthesiser.get_time_s());
     change_effects(std::min(course.get_time_s(), until));
-    course.hand_on(until - hold_back_s, synthesiser);
-    walk.hand_on(until, synthesiser);
+    course.hand_on(now + handed_s, synthesiser);
+    walk.hand_on(now + kHandedS, synthesiser);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
     if (course.get_time_s() >= until) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }

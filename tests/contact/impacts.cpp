@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "runtime/contact/pulses.hpp"
 #include "tests/contact/checks.hpp"
 #include "tests/contact/solids.hpp"
 
@@ -216,6 +217,19 @@ TEST(HollowBody, TouchesWithItsOuterWallOnly) {
   ASSERT_EQ(s.impulses.size(), 1U);
   EXPECT_LT(s.impulses[0].triangle, static_cast<std::int32_t>(inner.triangles.size()));
   EXPECT_NEAR(norm(point_on_body(shell, s.impulses[0])), 0.05, 1e-6);
+}
+
+TEST(Masks, HideWhatIsFarWeakerThanWhatTheBodyWasStruckWithJustBefore) {
+  Masks masks(2);
+  EXPECT_FALSE(masks.take(0, 1.0, 1.0));
+  EXPECT_TRUE(masks.take(0, 1.001, 0.019));
+  EXPECT_FALSE(masks.take(0, 1.001, 0.021));
+  EXPECT_FALSE(masks.take(1, 1.001, 0.001)) << "another body";
+  EXPECT_TRUE(masks.take(0, 1.001, 0.001));
+  // They fade by 60 dB in a third of a second, and what is hidden hides nothing else.
+  EXPECT_FALSE(masks.take(0, 1.35, 0.001));
+  // Of an impact that is given late by the length of a step, nothing grows.
+  EXPECT_TRUE(masks.take(0, 1.3495, 1e-5));
 }
 
 }  // namespace

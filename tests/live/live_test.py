@@ -107,6 +107,17 @@ class Live(unittest.TestCase):
         strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
         self.assertGreater(int(strikes[1]), 10)
         self.assertEqual(int(strikes[3]), 0)
+    def test_all_strikes_are_played_however_far_physics_is_in_front(self):
+        scene = {"duration_s": 1.5, "bodies": [{"name": "gong", "bank": "cube.h5", "position_m": [0, 0, 0.5], "fixed": True}], "listener": {"position_m": [0, -1, 0.5]},
+                 "strikes": [{"body": "gong", "time_s": 0.5 + 4e-4 * i, "triangle": 3, "impulse_n_s": [0, 0, 0.01], "duration_s": 1e-4} for i in range(2000)]}
+        path = self.root / "roll.json"
+        path.write_text(json.dumps(scene))
+        run = live(path, "--null", "--look-ahead", "1.4")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
+        self.assertEqual((int(strikes[1]), int(strikes[3])), (2000, 0))
+
+    def test_null_takes_no_device_and_says_nothing_when_quiet(self):
         run = live(self.scene, "--null", "--device", "system")
         self.assertEqual(run.returncode, 2)
         self.assertIn("--null", run.stderr)
