@@ -29,6 +29,7 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -79,6 +80,43 @@ class Watchdog {
   std::condition_variable wake_;
   bool done_ = false;
   std::thread thread_;
+};
+
+/// A domain of CGAL whose surface is asked only about what is finite: circumcentres of nearly flat tetrahedra may not be, and GMP ends the
+/// process where it is to compute exactly with what is not a number.
+template <class Base>
+class FiniteQueries : public Base {
+ public:
+  using Base::Base;
+  explicit FiniteQueries(Base base) : Base(std::move(base)) {}
+
+  struct Do_intersect_surface {
+    const Base& domain;
+    template <class Query>
+    typename Base::Surface_patch operator()(const Query& query) const {
+      return is_finite(query) ? domain.do_intersect_surface_object()(query) : typename Base::Surface_patch();
+    }
+  };
+  Do_intersect_surface do_intersect_surface_object() const { return {*this}; }
+
+  struct Construct_intersection {
+    const Base& domain;
+    template <class Query>
+    typename Base::Intersection operator()(const Query& query) const {
+      return is_finite(query) ? domain.construct_intersection_object()(query) : typename Base::Intersection();
+    }
+  };
+  Construct_intersection construct_intersection_object() const { return {*this}; }
+
+ private:
+  /// A segment, a ray or a line, by two of its points.
+  template <class Query>
+  static bool is_finite(const Query& query) {
+    double sum = 0;
+    for (int n = 0; n < 2; ++n)
+      for (int c = 0; c < 3; ++c) sum += query.point(n)[c];
+    return std::isfinite(sum);
+  }
 };
 
 /// A domain of CGAL with a bound on the balls that are placed on its curves: where curves cannot be parted, CGAL places ever smaller ones,

@@ -13,7 +13,7 @@ namespace carillon::mesher {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Domain = BoundedCurves<CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_domain_3<Kernel>>>;
+using Domain = BoundedCurves<FiniteQueries<CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_domain_3<Kernel>>>>;
 
 class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
  public:

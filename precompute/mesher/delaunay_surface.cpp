@@ -16,7 +16,7 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
-using Domain = BoundedCurves<CGAL::Mesh_domain_with_polyline_features_3<CGAL::Polyhedral_mesh_domain_3<Mesh, Kernel>>>;
+using Domain = BoundedCurves<FiniteQueries<CGAL::Mesh_domain_with_polyline_features_3<CGAL::Polyhedral_mesh_domain_3<Mesh, Kernel>>>>;
 
 class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
  public:
