@@ -21,9 +21,8 @@ using rigid::kSlowest;
 using rigid::norm;
 using stream::Vec3;
 
-constexpr double kMasked = 0.01;       // of the largest impulse of the same instant: 40 dB below it
-constexpr double kMaskedAfter = 0.02;  // of what its body was struck with before; and that fades
-constexpr double kMaskTime = 0.05;     // s; to 1/e
+constexpr double kMasked = 0.01;    // of the largest impulse of the same instant, or of the same body before: 40 dB below it
+constexpr double kMaskTime = 0.05;  // s; in which the latter fades to 1/e
 
 /// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
 double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike, const rigid::Hit& hit, const Vec3& where,
@@ -93,7 +92,7 @@ bool Masks::take(int body, double time_s, double impulse_n_s) {
   Mask& mask = masks_[static_cast<std::size_t>(body)];
   const double left = mask.impulse_n_s * std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
   mask = {std::max(left, impulse_n_s), std::max(time_s, mask.time_s)};
-  return impulse_n_s < kMaskedAfter * left;
+  return impulse_n_s < kMasked * left;
 }
 
 void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, Masks* masks,

@@ -14,7 +14,7 @@ namespace carillon::contact {
 class Masks {
  public:
   explicit Masks(int bodies) : masks_(static_cast<std::size_t>(bodies)) {}
-  /// Takes note of an impulse on a body [N s]. True if it is so much weaker than those before it that it is not heard: 34 dB below one just
+  /// Takes note of an impulse on a body [N s]. True if it is so much weaker than those before it that it is not heard: 40 dB below one just
   /// before, and 1 dB less for every 6 ms since. In order of time, but for the length of a step.
   bool take(int body, double time_s, double impulse_n_s);
 

@@ -222,8 +222,8 @@ TEST(HollowBody, TouchesWithItsOuterWallOnly) {
 TEST(Masks, HideWhatIsFarWeakerThanWhatTheBodyWasStruckWithJustBefore) {
   Masks masks(2);
   EXPECT_FALSE(masks.take(0, 1.0, 1.0));
-  EXPECT_TRUE(masks.take(0, 1.001, 0.019));
-  EXPECT_FALSE(masks.take(0, 1.001, 0.021));
+  EXPECT_TRUE(masks.take(0, 1.001, 0.009));
+  EXPECT_FALSE(masks.take(0, 1.001, 0.0101));
   EXPECT_FALSE(masks.take(1, 1.001, 0.001)) << "another body";
   EXPECT_TRUE(masks.take(0, 1.001, 0.001));
   // They fade by 60 dB in a third of a second, and what is hidden hides nothing else.
