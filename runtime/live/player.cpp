@@ -14,6 +14,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -124,6 +125,40 @@ class Course {
   double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
+/// The effects that bodies are to have, as they were planned: a body has all that it is to have within some time, so that what makes its
+/// sound is there before the events are, and stays until the last of them is heard.
+class Schedule {
+ public:
+  explicit Schedule(std::size_t bodies) : of_(bodies) {}
+
+  void add(const plan::Change& change) { of_[static_cast<std::size_t>(change.body)].steps.push_back({change.time_s, change.effects}); }
+
+  /// Calls `set(body, effects)` for each body whose effects from `now_s` to `until_s` are not what it was given last.
+  template <typename Set>
+  void apply(double now_s, double until_s, Set&& set) {
+    for (std::size_t body = 0; body < of_.size(); ++body) {
+      auto& [steps, given] = of_[body];
+      while (steps.size() > 1 && steps[1].time_s <= now_s) steps.pop_front();
+      synth::EffectSet wanted;
+      for (std::size_t n = 0; n < steps.size() && (n == 0 || steps[n].time_s <= until_s); ++n) wanted = wanted.with(steps[n].effects);
+      if (steps.empty() || wanted == given) continue;
+      given = wanted;
+      set(body, wanted);
+    }
+  }
+
+ private:
+  struct Step {
+    double time_s = 0.0;
+    synth::EffectSet effects;
+  };
+  struct OfBody {
+    std::deque<Step> steps;  // the first one is in force
+    std::optional<synth::EffectSet> given;
+  };
+  std::vector<OfBody> of_;
+};
+
 /// The way of a listener that walks, as events.
 class Walk {
  public:
@@ -152,6 +187,23 @@ void play(const PlayerOptions& options) {
   const double rate_hz = scene.sample_rate_hz;
 
   const host::Microphones microphones = host::make_microphones(scene);
+  plan::Planner planner(host::make_facts(scene, microphones, host::has_physics(scene)));
+  // Physics must be known so far ahead that the planner can decide.
+  const bool plans = options.look_ahead_s >= scene.quality.planner.lead_s + plan::kTickS + kChangeS;
+  Course course(scene, body_banks, planner);
+  while (course.get_time_s() < options.look_ahead_s) course.advance(options.look_ahead_s);
+  // An effect is planned lead_s before the events that call for it, and is there kChangeS before they are handed on.
+  const double lead_s = scene.quality.planner.lead_s;
+  const double changed_s = std::max(0.0, std::min(options.look_ahead_s - lead_s, kHandedS + kChangeS - lead_s));
+  const double handed_s = std::min(kHandedS, plans ? changed_s + lead_s - kChangeS : options.look_ahead_s);
+  Schedule schedule(scene.bodies.size());
+  const auto change_effects = [&](double now_s, double known_s, const auto& set) {
+    for (const plan::Change& change : planner.advance(known_s)) schedule.add(change);
+    schedule.apply(now_s, now_s + changed_s, set);
+  };
+  std::vector<synth::EffectSet> first;  // without time to plan, all that a body might call for
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) first.push_back(planner.get_possible(static_cast<int>(i)));
+  if (plans) change_effects(0.0, options.look_ahead_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
   synth::Synthesiser synthesiser({.rate_hz = rate_hz,
                                   .microphones_m = microphones.offset_m,
                                   .listener_m = microphones.centre.find(0.0).position_m,
@@ -163,46 +215,34 @@ void play(const PlayerOptions& options) {
                                   .budget = host::calc_budget(scene.quality, rate_hz),
                                   .ground = host::make_ground(scene)});
   synthesiser.set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
-  plan::Planner planner(host::make_facts(scene, microphones, host::has_physics(scene)));
-  // Physics must be known so far ahead that the planner can decide.
-  const bool plans = options.look_ahead_s >= scene.quality.planner.lead_s + plan::kTickS + kChangeS;
   std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const contact::BodySpec& spec = scene.bodies[i].spec;
     auto& model = models[spec.bank];
     if (model == nullptr) model = synth::Model::make(*spec.bank, {.rate_hz = rate_hz, .sphere_radius_m = scene.bodies[i].sphere_radius_m});
-    // Without time to plan a body has all that it might call for.
-    const synth::EffectSet effects = plans ? synth::EffectSet{} : planner.get_possible(static_cast<int>(i));
     synthesiser.add_body(model, {.position_m = host::calc_world_point(spec.initial, spec.bank->rigid.centre_m),
                                  .rotation = spec.initial.rotation,
-                                 .effects = host::find_effects(scene, i, effects),
+                                 .effects = host::find_effects(scene, i, first[i]),
                                  .silence_pa = scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa),
                                  .surface = host::make_surface(scene.bodies[i]),
                                  .isa = scene.quality.instructions});
   }
-  Course course(scene, body_banks, planner);
-  const auto change_effects = [&](double known_s) {
-    if (!plans) return;
-    synthesiser.collect();
-    for (const plan::Change& change : planner.advance(known_s)) {
-      synthesiser.set_effects(change.body, host::find_effects(scene, static_cast<std::size_t>(change.body), change.effects));
-    }
-  };
-  const double handed_s = std::min(kHandedS, plans ? options.look_ahead_s - kChangeS : options.look_ahead_s);
   Walk walk(microphones.centre);
   Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
-  while (course.get_time_s() < options.look_ahead_s) course.advance(options.look_ahead_s);
-  change_effects(options.look_ahead_s);
   course.hand_on(handed_s, synthesiser);
   walk.hand_on(kHandedS, synthesiser);
   device.start();
   synth::LoadKeeper keeper;
-  double lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound, the least
+  double least_lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound
   for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
     const double until = now + options.look_ahead_s;
     course.advance(until);
-    lead_s = std::min(lead_s, course.get_time_s() - synthesiser.get_time_s());
-    change_effects(std::min(course.get_time_s(), until));
+    least_lead_s = std::min(least_lead_s, course.get_time_s() - synthesiser.get_time_s());
+    synthesiser.collect();
+    if (plans)
+      change_effects(now, std::min(course.get_time_s(), until), [&](std::size_t body, synth::EffectSet effects) {
+        synthesiser.set_effects(static_cast<int>(body), host::find_effects(scene, body, effects));
+      });
     course.hand_on(now + handed_s, synthesiser);
     walk.hand_on(now + kHandedS, synthesiser);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
@@ -217,9 +257,9 @@ void play(const PlayerOptions& options) {
              card.callbacks, card.underflows, 1e3 * card.latency_s);
   fmt::print("strikes            {}, {} late, {} refused\n", counters.strikes, counters.late, counters.refused);
   fmt::print("physics            {} times behind the sound", counters.underruns);
-  if (std::isfinite(lead_s))
-    fmt::print(", {:.0f} ms {} at the worst; 2 ms of it took {:.1f} ms of CPU at most", 1e3 * std::abs(lead_s),
-               lead_s < 0.0 ? "behind" : "in front", 1e3 * course.get_worst_window_s());
+  if (std::isfinite(least_lead_s))
+    fmt::print(", {:.0f} ms {} at the worst; 2 ms of it took {:.1f} ms of CPU at most", 1e3 * std::abs(least_lead_s),
+               least_lead_s < 0.0 ? "behind" : "in front", 1e3 * course.get_worst_window_s());
   fmt::print("\n");
   fmt::print("work               {:.1f} % of a core, {:.3g} mode-samples/s, {} groups of modes faded\n", 100.0 * card.busy_s / card_s,
              static_cast<double>(counters.mode_samples) / card_s, counters.faded);

@@ -117,6 +117,17 @@ class Live(unittest.TestCase):
         strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
         self.assertEqual((int(strikes[1]), int(strikes[3])), (2000, 0))
 
+    def test_all_that_is_rendered_is_played_however_long_the_look_ahead(self):
+        # Effects are planned long before they change: what rests at the end of the look-ahead is still falling now.
+        subprocess.run([BIN / "carillon-render", self.scene, "-o", self.root / "scene.wav", "--report", self.root / "report.json", "-q"], check=True)
+        rendered = json.loads((self.root / "report.json").read_text())["impulses_played"]
+        for look_ahead in (0.2, 1.9):
+            run = live(self.scene, "--null", "--look-ahead", look_ahead)
+            strikes, refused = re.search(r"strikes +(\d+), \d+ late, (\d+) refused", run.stdout).groups()
+            self.assertEqual(refused, "0")
+            self.assertLessEqual(int(strikes), rendered)
+            self.assertGreaterEqual(int(strikes), rendered - 3, "a change of effects may come late on a busy machine, no more")
+
     def test_null_takes_no_device_and_says_nothing_when_quiet(self):
         run = live(self.scene, "--null", "--device", "system")
         self.assertEqual(run.returncode, 2)
