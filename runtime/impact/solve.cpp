@@ -50,9 +50,12 @@ void StepSolver::solve_one(const Touch& touch, double compliance, double free, d
   f = calc_normal_force(touch, y0 + m, h_s).force;
 }
 
-/// Fills law_ with the forces at `moved` (and slopes_); returns the largest.
+/// Fills law_ with the forces at `moved` (and slopes_), and pressing_ and pressed_ with the contacts that have any and their rows; returns
+/// the largest.
 double StepSolver::calc_law(const std::vector<Touch>& touches, const std::vector<double>& moved, double h_s, bool with_slopes) {
   double largest = 0.0;
+  pressing_.clear();
+  pressed_.clear();
   for (std::size_t c = 0; c < touches.size(); ++c) {
     const Touch& t = touches[c];
     const auto row = static_cast<std::size_t>(t.row);
@@ -62,6 +65,10 @@ double StepSolver::calc_law(const std::vector<Touch>& touches, const std::vector
     law_[row] = normal.force;
     if (with_slopes) slope[0][0] = -normal.slope;
     largest = std::max(largest, normal.force);
+    if (t.friction > 0.0) law_[row + 1] = law_[row + 2] = 0.0;
+    if (normal.force <= 0.0 && normal.slope <= 0.0) continue;
+    pressing_.push_back(c);
+    for (std::size_t i = 0; i < (t.friction > 0.0 ? 3u : 1u); ++i) pressed_.push_back(row + i);
     if (t.friction <= 0.0) continue;
     const double k = t.tangential_n_m, limit = t.friction * normal.force;
     const std::array<double, 2> middle{t.stretch[0] + 0.5 * moved[row + 1], t.stretch[1] + 0.5 * moved[row + 2]};
@@ -87,18 +94,33 @@ double StepSolver::calc_residual(const std::vector<Touch>& touches, const std::v
   double largest = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     double r = moved[i] - free[i];
-    for (std::size_t j = 0; j < n; ++j) r -= A[i * n + j] * law_[j];
+    for (const std::size_t j : pressed_) r -= A[i * n + j] * law_[j];
     residual_[i] = r;
     largest = std::max(largest, std::abs(r) / size_[i]);
   }
   return largest;
 }
 
-/// jacobian_ x = residual_ -> step_, by elimination with partial pivoting; false where it is singular.
-bool StepSolver::solve_linear() {
-  const std::size_t n = residual_.size();
-  step_ = residual_;
+/// The step of Newton, (1 - A law') step_ = residual_. Columns of what does not press are those of 1: the rows that press are solved by
+/// elimination with partial pivoting, the others follow from theirs. False where it is singular.
+bool StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<double>& A) {
+  const std::size_t rows = residual_.size(), n = pressed_.size();
+  const auto count = [&](std::size_t contact) -> std::size_t { return touches[contact].friction > 0.0 ? 3 : 1; };
   auto& J = jacobian_;
+  J.assign(n * n, 0.0);
+  step_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    J[i * n + i] = 1.0;
+    step_[i] = residual_[pressed_[i]];
+    std::size_t at = 0;
+    for (const std::size_t c : pressing_) {
+      for (std::size_t k = 0; k < count(c); ++k) {
+        const double gain = A[pressed_[i] * rows + pressed_[at + k]];
+        for (std::size_t j = 0; j < count(c); ++j) J[i * n + at + j] -= gain * slopes_[c][k][j];
+      }
+      at += count(c);
+    }
+  }
   for (std::size_t k = 0; k < n; ++k) {
     std::size_t pivot = k;
     for (std::size_t i = k + 1; i < n; ++i)
@@ -119,6 +141,17 @@ bool StepSolver::solve_linear() {
     for (std::size_t j = k + 1; j < n; ++j) step_[k] -= J[k * n + j] * step_[j];
     step_[k] /= J[k * n + k];
   }
+  // By what the forces change with that, the motions of all rows.
+  change_.assign(n, 0.0);
+  std::size_t at = 0;
+  for (const std::size_t c : pressing_) {
+    for (std::size_t k = 0; k < count(c); ++k)
+      for (std::size_t j = 0; j < count(c); ++j) change_[at + k] += slopes_[c][k][j] * step_[at + j];
+    at += count(c);
+  }
+  step_ = residual_;
+  for (std::size_t i = 0; i < rows; ++i)
+    for (std::size_t j = 0; j < n; ++j) step_[i] += A[i * rows + pressed_[j]] * change_[j];
   return std::all_of(step_.begin(), step_.end(), [](double x) { return std::isfinite(x); });
 }
 
@@ -200,18 +233,8 @@ bool StepSolver::solve(const std::vector<Touch>& touches, const std::vector<doub
   size_.assign(n, size_tangential);
   for (const Touch& t : touches) size_[static_cast<std::size_t>(t.row)] = size_normal;
   double error = calc_residual(touches, A, free, moved_, h_s, true);
-  for (int iteration = 0; iteration < 40 && error > 1e-16; ++iteration) {
-    // J = 1 - A law'.
-    jacobian_.assign(n * n, 0.0);
-    for (std::size_t i = 0; i < n; ++i) jacobian_[i * n + i] = 1.0;
-    for (std::size_t c = 0; c < touches.size(); ++c) {
-      const auto row = static_cast<std::size_t>(touches[c].row);
-      const std::size_t rows = touches[c].friction > 0.0 ? 3 : 1;
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t k = 0; k < rows; ++k)
-          for (std::size_t j = 0; j < rows; ++j) jacobian_[i * n + row + j] -= A[i * n + row + k] * slopes_[c][k][j];
-    }
-    if (!solve_linear()) break;
+  for (int iteration = 0; iteration < 40 && error > 1e-13; ++iteration) {
+    if (!find_step(touches, A)) break;
     double part = 1.0, next = error;
     for (int halving = 0; halving < 12; ++halving, part *= 0.5) {
       trial_ = moved_;

@@ -43,9 +43,10 @@ class StepSolver {
   static std::array<double, 2> solve_friction(const std::array<double, 3>& A, const std::array<double, 2>& c, double k, double limit);
   bool sweep(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free, double h_s, bool rubs,
              std::vector<double>& f) const;
-  bool solve_linear();
+  bool find_step(const std::vector<Touch>& touches, const std::vector<double>& A);
 
-  std::vector<double> law_, residual_, size_, moved_, trial_, jacobian_, step_;
+  std::vector<double> law_, residual_, size_, moved_, trial_, jacobian_, step_, change_;
+  std::vector<std::size_t> pressing_, pressed_;               // contacts, and rows
   std::vector<std::array<std::array<double, 3>, 3>> slopes_;  // per contact, of the forces by what moved
 };
 

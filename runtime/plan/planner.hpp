@@ -2,7 +2,8 @@
 //
 //   plan::Planner planner(facts);                           // bodies, listener, wishes of the scene
 //   for (const stream::Event& event : events) planner.watch(event);
-//   for (const plan::Change& change : planner.advance(known_until_s)) synthesiser.set_effects(change.body, change.effects);
+//   for (const plan::Change& change : planner.advance(known_until_s)) changes.push_back(change);
+//   ... synthesiser.set_effects(change.body, change.effects) when the sound gets to change.time_s
 //
 // One thread at a time, never an audio thread: it allocates.
 #pragma once

@@ -42,16 +42,19 @@ Space::Ringing* Space::find_ringing(int body) {
   return nullptr;
 }
 
-/// The impact with modes that a hit belongs to: one of its bodies is in it, and all that it moves are in the group that is being stepped.
+/// An impact with modes that a hit belongs to: one of its bodies is in it. None where either body is in one that moves bodies outside of the
+/// group that is being stepped.
 Space::Ringing* Space::find_own_ringing(const Hit& hit) {
+  Ringing* own = nullptr;
   for (const int body : {hit.a, hit.b}) {
     Ringing* ringing = find_ringing(body);
     if (ringing == nullptr) continue;
     const bool is_here = std::all_of(ringing->bodies.begin(), ringing->bodies.end(),
                                      [&](int other) { return !moves(other) || index_[static_cast<std::size_t>(other)] >= 0; });
-    if (is_here) return ringing;
+    if (!is_here) return nullptr;
+    if (own == nullptr) own = ringing;
   }
-  return nullptr;
+  return own;
 }
 
 /// Is there an impact on its way between the two, at that place? Points get other names while bodies roll.
@@ -243,19 +246,21 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
       if (struck.emplace(linked, first).first->second != body) return false;
     }
   Ringing* joined = nullptr;
-  // A hit on a shelf that an impact of another group has stays out of this one.
+  // A hit on what an impact of another group has, such as a shelf, stays out of this one.
   std::erase_if(order, [&](std::size_t n) {
     return find_own_ringing(hits[n]) == nullptr && (find_ringing(hits[n].a) != nullptr || find_ringing(hits[n].b) != nullptr);
   });
   if (std::all_of(order.begin(), order.end(), [&](std::size_t n) { return rests[n] != 0; })) return false;  // all hits stay out
-  for (const std::size_t n : order) {
-    Ringing* found = find_own_ringing(hits[n]);
-    if (found == nullptr || found == joined) continue;
-    if (joined == nullptr)
-      joined = found;
-    else
-      end_ringing(*found, time_s);  // what it has in its springs is lost
-  }
+  // A body is in one impact at a time: those of all that meet here become one.
+  for (const std::size_t n : order)
+    for (const int body : {hits[n].a, hits[n].b}) {
+      Ringing* found = find_ringing(body);
+      if (found == nullptr || found == joined) continue;
+      if (joined == nullptr)
+        joined = found;
+      else
+        end_ringing(*found, time_s);  // what it has in its springs is lost
+    }
   const bool leans = std::any_of(order.begin(), order.end(), [&](std::size_t n) { return rests[n] != 0; });
   const std::size_t together = order.size() + (joined != nullptr ? joined->presses.size() : 0);
   if (leans && together > kMostTogether) return false;

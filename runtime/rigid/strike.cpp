@@ -5,6 +5,7 @@
 // Deviations: impulses are scaled back where friction and restitution together would gain energy.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <tuple>
 
@@ -309,11 +310,8 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
 
 /// What the pulses of a rigid impact give the modes, at most what the motion lost; the rest of that is lost.
 void Space::give_to_modes(Strike& record, double taken_j) {
-  struct Share {
-    int body;
-    std::vector<double> kick;
-  };
-  std::vector<Share> shares;
+  std::map<int, Ring> before;  // of the bodies whose modes are struck
+  const double lost_before = lost_j_;
   double given = 0.0;
   for (const Hit& hit : record.hits) {
     if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kSlowest)) continue;
@@ -327,23 +325,20 @@ void Space::give_to_modes(Strike& record, double taken_j) {
       const double mass = push > 0.0 ? push / ((1.0 + hit.restitution) * hit.approach_m_s) : 0.0;
       if (!(mass > 0.0)) continue;
       const double length = calc_contact_time(hit, mass, hit.approach_m_s);
+      before.try_emplace(body, rings_[i]);
       Ring& ring = ring_until(body, std::max(record.time_s + 0.5 * length, rings_[i].time_s));
       const auto& omega = solids_[i].modes->get_omega();
-      Share share{body, std::vector<double>(omega.size())};
-      const double before = solids_[i].modes->calc_energy(ring.q, ring.q_dot);
-      for (std::size_t m = 0; m < omega.size(); ++m) {
-        share.kick[m] = (shape[3 * m] * impulse[0] + shape[3 * m + 1] * impulse[1] + shape[3 * m + 2] * impulse[2]) *
-                        std::sqrt(impact::calc_pulse_spectrum(omega[m] * length));
-        ring.q_dot[m] += share.kick[m];
-      }
-      given += solids_[i].modes->calc_energy(ring.q, ring.q_dot) - before;
-      shares.push_back(std::move(share));
+      const double energy = solids_[i].modes->calc_energy(ring.q, ring.q_dot);
+      for (std::size_t m = 0; m < omega.size(); ++m)
+        ring.q_dot[m] += (shape[3 * m] * impulse[0] + shape[3 * m + 1] * impulse[1] + shape[3 * m + 2] * impulse[2]) *
+                         std::sqrt(impact::calc_pulse_spectrum(omega[m] * length));
+      given += solids_[i].modes->calc_energy(ring.q, ring.q_dot) - energy;
     }
   }
-  if (given > std::max(taken_j, 0.0) && !shares.empty()) {
-    // More than there was: the pulses are given as far as it goes. A rigid impact is only taken where modes get next to nothing.
-    for (const Share& share : shares)
-      for (std::size_t m = 0; m < share.kick.size(); ++m) rings_[static_cast<std::size_t>(share.body)].q_dot[m] -= share.kick[m];
+  if (given > std::max(taken_j, 0.0)) {
+    // More than there was: they get none of it. A rigid impact is only taken where modes get next to nothing.
+    for (auto& [body, ring] : before) rings_[static_cast<std::size_t>(body)] = std::move(ring);
+    lost_j_ = lost_before;
     given = 0.0;
   }
   record.modes_j = given;

@@ -229,7 +229,7 @@ TEST(Masks, HideWhatIsFarWeakerThanWhatTheBodyWasStruckWithJustBefore) {
   // They fade by 60 dB in a third of a second, and what is hidden hides nothing else.
   EXPECT_FALSE(masks.take(0, 1.35, 0.001));
   // Of an impact that is given late by the length of a step, nothing grows.
-  EXPECT_TRUE(masks.take(0, 1.3495, 1e-5));
+  EXPECT_TRUE(masks.take(0, 1.3495, 5e-6));
 }
 
 }  // namespace
