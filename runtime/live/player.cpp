@@ -191,19 +191,22 @@ void play(const PlayerOptions& options) {
   // Physics must be known so far ahead that the planner can decide.
   const bool plans = options.look_ahead_s >= scene.quality.planner.lead_s + plan::kTickS + kChangeS;
   Course course(scene, body_banks, planner);
-  while (course.get_time_s() < options.look_ahead_s) course.advance(options.look_ahead_s);
   // An effect is planned lead_s before the events that call for it, and is there kChangeS before they are handed on.
   const double lead_s = scene.quality.planner.lead_s;
   const double changed_s = std::max(0.0, std::min(options.look_ahead_s - lead_s, kHandedS + kChangeS - lead_s));
   const double handed_s = std::min(kHandedS, plans ? changed_s + lead_s - kChangeS : options.look_ahead_s);
   Schedule schedule(scene.bodies.size());
-  const auto change_effects = [&](double now_s, double known_s, const auto& set) {
-    for (const plan::Change& change : planner.advance(known_s)) schedule.add(change);
-    schedule.apply(now_s, now_s + changed_s, set);
+  // As the physics goes on, so that the planner keeps few events.
+  const auto advance_to = [&](double until_s) {
+    course.advance(until_s);
+    if (!plans) return;
+    for (const plan::Change& change : planner.advance(std::min(course.get_time_s(), until_s))) schedule.add(change);
   };
+  do advance_to(options.look_ahead_s);
+  while (course.get_time_s() < options.look_ahead_s);
   std::vector<synth::EffectSet> first;  // without time to plan, all that a body might call for
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) first.push_back(planner.get_possible(static_cast<int>(i)));
-  if (plans) change_effects(0.0, options.look_ahead_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
+  if (plans) schedule.apply(0.0, changed_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
   synth::Synthesiser synthesiser({.rate_hz = rate_hz,
                                   .microphones_m = microphones.offset_m,
                                   .listener_m = microphones.centre.find(0.0).position_m,
@@ -236,11 +239,11 @@ void play(const PlayerOptions& options) {
   double least_lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound
   for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
     const double until = now + options.look_ahead_s;
-    course.advance(until);
+    advance_to(until);
     least_lead_s = std::min(least_lead_s, course.get_time_s() - synthesiser.get_time_s());
     synthesiser.collect();
     if (plans)
-      change_effects(now, std::min(course.get_time_s(), until), [&](std::size_t body, synth::EffectSet effects) {
+      schedule.apply(now, now + changed_s, [&](std::size_t body, synth::EffectSet effects) {
         synthesiser.set_effects(static_cast<int>(body), host::find_effects(scene, body, effects));
       });
     course.hand_on(now + handed_s, synthesiser);

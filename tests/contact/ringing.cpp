@@ -170,7 +170,7 @@ TEST(Ringing, HeapsOfAllKindsOfBodiesKeepTheBooks) {
       BodySpec& body = w.bodies.back();
       body.name += std::to_string(k);
       body.friction = draw(0.0, 1.0);
-      body.initial.rotation = rigid::normalise({draw(-1, 1), draw(-1, 1), draw(-1, 1), draw(-1, 1)});
+      body.initial.rotation = {draw(-1, 1), draw(-1, 1), draw(-1, 1), draw(-1, 1)};
       body.velocity_m_s = {draw(-0.3, 0.3), draw(-0.3, 0.3), draw(-2, 0)};
       body.angular_velocity_rad_s = {draw(-5, 5), draw(-5, 5), draw(-5, 5)};
     }
