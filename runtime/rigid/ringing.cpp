@@ -42,8 +42,8 @@ Space::Ringing* Space::find_ringing(int body) {
   return nullptr;
 }
 
-/// An impact with modes that a hit belongs to: one of its bodies is in it. None where either body is in one that moves bodies outside of the
-/// group that is being stepped.
+/// An impact with modes that a hit belongs to: one of its bodies is in it. None where either body is in one that moves bodies outside of
+/// the group that is being stepped.
 Space::Ringing* Space::find_own_ringing(const Hit& hit) {
   Ringing* own = nullptr;
   for (const int body : {hit.a, hit.b}) {
