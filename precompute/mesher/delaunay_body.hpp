@@ -82,13 +82,22 @@ class Watchdog {
   std::thread thread_;
 };
 
-/// A domain of CGAL whose surface is asked only about what is finite: circumcentres of nearly flat tetrahedra may not be, and GMP ends the
+/// A domain of CGAL that is asked only about what is finite: circumcentres of nearly flat tetrahedra may not be, and GMP ends the
 /// process where it is to compute exactly with what is not a number.
 template <class Base>
 class FiniteQueries : public Base {
  public:
   using Base::Base;
   explicit FiniteQueries(Base base) : Base(std::move(base)) {}
+
+  struct Is_in_domain {
+    const Base& domain;
+    typename Base::Subdomain operator()(const typename Base::Point_3& point) const {
+      const bool is_number = std::isfinite(point.x() + point.y() + point.z());
+      return is_number ? domain.is_in_domain_object()(point) : typename Base::Subdomain();
+    }
+  };
+  Is_in_domain is_in_domain_object() const { return {*this}; }
 
   struct Do_intersect_surface {
     const Base& domain;

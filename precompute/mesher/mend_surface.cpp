@@ -387,7 +387,8 @@ MendedSurface mend_surface(TriangleSurface surface, const SurfaceOptions& option
   std::vector<double> parts{kCoarsest, 25, kFinest};
   std::erase_if(parts, [&](double part) { return 2 / part > options.close_holes.value_or(kLargestHole); });
   // What a wrap costs grows with the triangles of its own that cover the surface, and may grow with those of the file: a soup of few
-  // triangles and much area has no detail that is worth a fine wrap. Bodies have an area of one or two squares of their diagonal.
+  // triangles and much area has no detail that is worth a fine wrap. Bodies have an area of one or two squares of their diagonal: above
+  // some 900 triangles they may have the finest wrap, below 200 the coarsest, which bridges gaps of a seventh of the diagonal.
   const auto count = static_cast<double>(surface.triangles.size());
   const double most_area = std::min(0.2 + 2.5e-3 * count, 1.5 + 1e-3 * count) * diagonal * diagonal;  // for the finest
   std::erase_if(parts, [&](double part) { return part > kCoarsest && part * part * area > kFinest * kFinest * most_area; });

@@ -71,7 +71,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   pulse.time_s = touch_s + 0.5 * pulse.duration_s;
   for (const int side : {0, 1}) {
     const int body = side == 0 ? first.a : first.b;
-    if (body < 0 || (masks != nullptr && masks->take(body, strike.time_s, norm(impulse)))) continue;
+    if (body < 0 || (masks != nullptr && masks->take(body, strike.time_s, norm(impulse), pulse.duration_s))) continue;
     const auto at = std::find(strike.bodies.begin(), strike.bodies.end(), body);
     const rigid::State& state =
         at == strike.bodies.end() ? space.state(body) : strike.before[static_cast<std::size_t>(at - strike.bodies.begin())];
@@ -88,11 +88,13 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
 
 }  // namespace
 
-bool Masks::take(int body, double time_s, double impulse_n_s) {
+bool Masks::take(int body, double time_s, double impulse_n_s, double duration_s) {
   Mask& mask = masks_[static_cast<std::size_t>(body)];
-  const double left = mask.impulse_n_s * std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
-  mask = {std::max(left, impulse_n_s), std::max(time_s, mask.time_s)};
-  return impulse_n_s < kMasked * left;
+  mask.impulse_n_s *= std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
+  mask.time_s = std::max(time_s, mask.time_s);
+  if (impulse_n_s < kMasked * mask.impulse_n_s && duration_s >= mask.duration_s) return true;
+  if (impulse_n_s >= mask.impulse_n_s) mask = {impulse_n_s, mask.time_s, duration_s};
+  return false;
 }
 
 void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, Masks* masks,

@@ -14,13 +14,13 @@ namespace carillon::contact {
 class Masks {
  public:
   explicit Masks(int bodies) : masks_(static_cast<std::size_t>(bodies)) {}
-  /// Takes note of an impulse on a body [N s]. True if it is so much weaker than those before it that it is not heard: 40 dB below one just
-  /// before, and 1 dB less for every 6 ms since. In order of time, but for the length of a step.
-  bool take(int body, double time_s, double impulse_n_s);
+  /// Takes note of a pulse on a body [N s, s]. True if one before it hides it: that one was no longer, so that its spectrum reaches as
+  /// high, and is 40 dB above it, 1 dB more for every 6 ms since. In order of time, but for the length of a window.
+  bool take(int body, double time_s, double impulse_n_s, double duration_s);
 
  private:
   struct Mask {
-    double impulse_n_s = 0.0, time_s = 0.0;
+    double impulse_n_s = 0.0, time_s = 0.0, duration_s = 0.0;
   };
   std::vector<Mask> masks_;
 };

@@ -296,7 +296,7 @@ class World::Course {
       if (masks_) {
         Vec3 given{};
         for (const Vec3& impulse : impulses) given = impact::operator+(given, impulse);
-        masks_->take(body, forces.time_s, rigid::norm(given));
+        masks_->take(body, forces.time_s, rigid::norm(given), forces.step_s * static_cast<double>(impulses.size()));
       }
       stream::Force first;
       first.time_s = forces.time_s;

@@ -149,9 +149,11 @@ bool StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<
       for (std::size_t j = 0; j < count(c); ++j) change_[at + k] += slopes_[c][k][j] * step_[at + j];
     at += count(c);
   }
+  solved_.swap(step_);
   step_ = residual_;
   for (std::size_t i = 0; i < rows; ++i)
     for (std::size_t j = 0; j < n; ++j) step_[i] += A[i * rows + pressed_[j]] * change_[j];
+  for (std::size_t j = 0; j < n; ++j) step_[pressed_[j]] = solved_[j];
   return std::all_of(step_.begin(), step_.end(), [](double x) { return std::isfinite(x); });
 }
 
@@ -244,9 +246,7 @@ bool StepSolver::solve(const std::vector<Touch>& touches, const std::vector<doub
     }
     if (!(next < error)) break;  // as near as rounding or a kink lets it
     moved_.swap(trial_);
-    const bool still = next > 0.5 * error && next < 1e-13;
     error = next;
-    if (still) break;
   }
   error = calc_residual(touches, A, free, moved_, h_s, false);
   f = law_;

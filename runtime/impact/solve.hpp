@@ -45,7 +45,7 @@ class StepSolver {
              std::vector<double>& f) const;
   bool find_step(const std::vector<Touch>& touches, const std::vector<double>& A);
 
-  std::vector<double> law_, residual_, size_, moved_, trial_, jacobian_, step_, change_;
+  std::vector<double> law_, residual_, size_, moved_, trial_, jacobian_, step_, solved_, change_;
   std::vector<std::size_t> pressing_, pressed_;               // contacts, and rows
   std::vector<std::array<std::array<double, 3>, 3>> slopes_;  // per contact, of the forces by what moved
 };

@@ -14,7 +14,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <optional>
 #include <thread>
 #include <vector>
 
@@ -29,6 +28,7 @@
 #include "runtime/host/scene.hpp"
 #include "runtime/host/strikes.hpp"
 #include "runtime/live/device.hpp"
+#include "runtime/live/schedule.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
@@ -39,7 +39,8 @@ namespace {
 
 constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
 constexpr double kChangeS = 0.03;  // by which a change of effects is sent before the events that call for it
-// Events are handed on so long before they are heard, however far physics is in front: the synthesiser has room for what waits so long.
+// Events are handed on at most this long before they are heard, however far physics is in front: the synthesiser has room for what waits so
+// long.
 constexpr double kHandedS = 0.25;
 constexpr int kMostStrikes = 1024, kMostForces = 2048;  // of a body that wait or act
 
@@ -125,40 +126,6 @@ class Course {
   double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
-/// The effects that bodies are to have, as they were planned: a body has all that it is to have within some time, so that what makes its
-/// sound is there before the events are, and stays until the last of them is heard.
-class Schedule {
- public:
-  explicit Schedule(std::size_t bodies) : of_(bodies) {}
-
-  void add(const plan::Change& change) { of_[static_cast<std::size_t>(change.body)].steps.push_back({change.time_s, change.effects}); }
-
-  /// Calls `set(body, effects)` for each body whose effects from `now_s` to `until_s` are not what it was given last.
-  template <typename Set>
-  void apply(double now_s, double until_s, Set&& set) {
-    for (std::size_t body = 0; body < of_.size(); ++body) {
-      auto& [steps, given] = of_[body];
-      while (steps.size() > 1 && steps[1].time_s <= now_s) steps.pop_front();
-      synth::EffectSet wanted;
-      for (std::size_t n = 0; n < steps.size() && (n == 0 || steps[n].time_s <= until_s); ++n) wanted = wanted.with(steps[n].effects);
-      if (steps.empty() || wanted == given) continue;
-      given = wanted;
-      set(body, wanted);
-    }
-  }
-
- private:
-  struct Step {
-    double time_s = 0.0;
-    synth::EffectSet effects;
-  };
-  struct OfBody {
-    std::deque<Step> steps;  // the first one is in force
-    std::optional<synth::EffectSet> given;
-  };
-  std::vector<OfBody> of_;
-};
-
 /// The way of a listener that walks, as events.
 class Walk {
  public:
@@ -187,6 +154,18 @@ void play(const PlayerOptions& options) {
   const double rate_hz = scene.sample_rate_hz;
 
   const host::Microphones microphones = host::make_microphones(scene);
+  synth::Synthesiser synthesiser({.rate_hz = rate_hz,
+                                  .microphones_m = microphones.offset_m,
+                                  .listener_m = microphones.centre.find(0.0).position_m,
+                                  .max_bodies = static_cast<int>(scene.bodies.size()),
+                                  .max_strikes = kMostStrikes,
+                                  .max_forces = kMostForces,
+                                  .max_waypoints = 1024,
+                                  .ring_events = 1 << 14,
+                                  .budget = host::calc_budget(scene.quality, rate_hz),
+                                  .ground = host::make_ground(scene)});
+  synthesiser.set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
+  Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
   plan::Planner planner(host::make_facts(scene, microphones, host::has_physics(scene)));
   // Physics must be known so far ahead that the planner can decide.
   const bool plans = options.look_ahead_s >= scene.quality.planner.lead_s + plan::kTickS + kChangeS;
@@ -207,17 +186,6 @@ void play(const PlayerOptions& options) {
   std::vector<synth::EffectSet> first;  // without time to plan, all that a body might call for
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) first.push_back(planner.get_possible(static_cast<int>(i)));
   if (plans) schedule.apply(0.0, changed_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
-  synth::Synthesiser synthesiser({.rate_hz = rate_hz,
-                                  .microphones_m = microphones.offset_m,
-                                  .listener_m = microphones.centre.find(0.0).position_m,
-                                  .max_bodies = static_cast<int>(scene.bodies.size()),
-                                  .max_strikes = kMostStrikes,
-                                  .max_forces = kMostForces,
-                                  .max_waypoints = 1024,
-                                  .ring_events = 1 << 14,
-                                  .budget = host::calc_budget(scene.quality, rate_hz),
-                                  .ground = host::make_ground(scene)});
-  synthesiser.set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
   std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const contact::BodySpec& spec = scene.bodies[i].spec;
@@ -231,7 +199,6 @@ void play(const PlayerOptions& options) {
                                  .isa = scene.quality.instructions});
   }
   Walk walk(microphones.centre);
-  Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
   course.hand_on(handed_s, synthesiser);
   walk.hand_on(kHandedS, synthesiser);
   device.start();

@@ -246,7 +246,7 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
       if (struck.emplace(linked, first).first->second != body) return false;
     }
   Ringing* joined = nullptr;
-  // A hit on what an impact of another group has, such as a shelf, stays out of this one.
+  // A hit on a body (such as a shelf) that is in an impact of another group stays out of this one.
   std::erase_if(order, [&](std::size_t n) {
     return find_own_ringing(hits[n]) == nullptr && (find_ringing(hits[n].a) != nullptr || find_ringing(hits[n].b) != nullptr);
   });

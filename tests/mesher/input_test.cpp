@@ -260,7 +260,7 @@ TEST(input, boxes_with_one_corner_moved_hardly_or_kilometres_away_are_meshed_or_
 }
 
 TEST(input, a_soup_of_few_triangles_is_wrapped_by_few) {
-  // A box of which four corners lie elsewhere than their triangles expect. Finer wraps of it have 25,000 triangles and take seconds.
+  // A box whose faces name the wrong corners. Finer wraps of it have 25,000 triangles and take seconds.
   const std::string soup =
       "v 0.1 0 0\nv 0 0.05 0\nv 0.1 0.05 0\nv 0 0 0.03\nv 0.1 0 0.03\nv 0 0 0.03\nv 0 0.05 0.03\nv 0.1 0.05 0.03\n"
       "f 1 4 2\nf 1 3 4\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n";
