@@ -213,7 +213,9 @@ Point Space::make_lasting_point(Pair& pair, const Contact& c, double h) const {
   }
   // What touches and is at rest stays so exactly: a picometre is no gap, and would be a force.
   const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
-  double least = rests ? 0.0 : std::min(0.0, approach - 2.0 * t.gap_m / h);
+  // What is too deep and parts may come back to where it is now: a push that ends its parting would do work.
+  const double free_way = t.gap_m < -kDeep ? 0.0 : t.gap_m;
+  double least = rests ? 0.0 : std::min(0.0, approach - 2.0 * free_way / h);
   // What is too deep comes up, at half the power that the contact loses, so that no energy comes of it.
   if (t.gap_m < -kDeep) {
     const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
