@@ -323,7 +323,6 @@ class World::Course {
     if (books.modes_j > 0.0) energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j - books.motion_j));
     energy_.lost_j = books.lost_j;
     energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
-    if (getenv("DBG") && now + taken_j_ - least_j_ > 1e-9 && now + taken_j_ - least_j_ > energy_.rise_j) fprintf(stderr, "RISE t %.4f %.4g kin %.4g motion %.10g modes %.4g springs %.4g lost %.10g z %.9f v %g\n", space_.get_time(), now + taken_j_ - least_j_, kinetic, books.motion_j, books.modes_j, books.springs_j, books.lost_j, space_.state(0).centre[2], space_.state(0).velocity[2]);
     energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - least_j_);
     energy_.kinetic_j = std::max(energy_.kinetic_j, kinetic);
     least_j_ = std::min(least_j_, now + taken_j_);
