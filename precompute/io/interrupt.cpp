@@ -1,7 +1,8 @@
-// Method: the handler only calls what POSIX allows in one (signal-safety(7)): kill, unlink, rmdir, write, _exit.
+// Method: the handler only calls what POSIX allows in one (signal-safety(7)): kill, unlink, rmdir, write, poll, _exit.
 // Source: POSIX.1-2008, 2.4.3. Deviations: none.
 #include "precompute/io/interrupt.hpp"
 
+#include <poll.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -13,6 +14,8 @@
 
 namespace carillon::io {
 namespace {
+
+constexpr int kFirstRankMs = 200;
 
 std::array<char, 4096> cleanup_file{}, cleanup_folder{};
 volatile sig_atomic_t has_cleanup = 0;
@@ -45,6 +48,8 @@ void handle(int signal) {
     say("carillon-precompute: stopped by ");
     say(find_name(signal));
     say(is_to_save ? "; what the checkpoint holds can be gone on from\n" : "; the bank was not touched, or it is whole\n");
+  } else {
+    poll(nullptr, 0, kFirstRankMs);  // mpirun ends all ranks with the first that ends, which is to be the one that speaks
   }
   _exit(is_to_save ? kExitCheckpointed : 128 + signal);
 }
