@@ -26,7 +26,7 @@ constexpr double kSameCurve = 0.01;
 }  // namespace
 
 DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m) {
-  const Vec3 extent = calc_box(body.mended.surface.points).extent();
+  const Vec3 extent = calc_box(body.repaired.surface.points).extent();
   const double diagonal = norm(extent);
   // Three samples an edge and eight through the wall, as far as sixty million samples reach.
   constexpr double kPleasantSamples = 6e7;
@@ -38,8 +38,8 @@ DistanceField make_field(const Body& body, const SurfaceOptions& options, double
   DistanceField field = [&] {
     try {
       // Outside, stuffing reads one edge away; the wrap's offset widens what is inside.
-      return calc_distance_field(body.mended.surface, voxel,
-                                 {std::max(4 * voxel, std::min(edge_m, diagonal / 20)), body.wall_m + 4 * voxel}, body.mended.offset_m);
+      return calc_distance_field(body.repaired.surface, voxel,
+                                 {std::max(4 * voxel, std::min(edge_m, diagonal / 20)), body.wall_m + 4 * voxel}, body.repaired.offset_m);
     } catch (const InputError& failure) {
       throw InputError(fmt::format("{}: {}", options.surface.string(), failure.what()));
     }
@@ -61,18 +61,18 @@ std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& op
   report.sharp_edges_m = 0;
   report.sharp_curves = 0;
   if (keep_sharp && !report.wrapped) {
-    const double diagonal = calc_box(body.mended.surface.points).diagonal();
-    curves = find_sharp_curves(body.mended.surface, options.sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m);
+    const double diagonal = calc_box(body.repaired.surface.points).diagonal();
+    curves = find_sharp_curves(body.repaired.surface, options.sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m);
     report.sharp_curves = static_cast<std::int64_t>(curves.size());
     for (const Polyline& curve : curves)
       for (std::size_t i = 1; i < curve.size(); ++i) report.sharp_edges_m += norm(curve[i] - curve[i - 1]);
     if (body.wall_m > 0 && !curves.empty()) {
-      const auto inset = make_inset_curves(body.mended.surface, curves, *body.nearest, body.wall_m, 0.5 * edge_m);
+      const auto inset = make_inset_curves(body.repaired.surface, curves, *body.nearest, body.wall_m, 0.5 * edge_m);
       curves.insert(curves.end(), inset.begin(), inset.end());
     }
   }
   curves = untangle_curves(std::move(curves), kSameCurve * edge_m);
-  return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.mended.surface, curves);
+  return body.field ? make_field_body(*body.field, body.wall_m, curves) : make_surface_body(body.repaired.surface, curves);
 }
 
 DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double edge_m) {
@@ -119,8 +119,8 @@ namespace {
 /// positive.
 double calc_signed(const Body& body, const Vec3& p) {
   const double way = norm(body.nearest->find(p) - p);
-  const bool inside = body.field && body.field->calc_distance(p) < body.mended.offset_m;
-  return (inside ? -way : way) + body.mended.offset_m;
+  const bool inside = body.field && body.field->calc_distance(p) < body.repaired.offset_m;
+  return (inside ? -way : way) + body.repaired.offset_m;
 }
 
 }  // namespace
@@ -128,7 +128,7 @@ double calc_signed(const Body& body, const Vec3& p) {
 double calc_outside(const Body& body, const Vec3& p) {
   const double d = calc_signed(body, p);
   if (!body.field)
-    return d > 1e-9 * calc_box(body.mended.surface.points).diagonal() && std::abs(calc_winding(body.mended.surface, p)) < 0.5 ? d : 0;
+    return d > 1e-9 * calc_box(body.repaired.surface.points).diagonal() && std::abs(calc_winding(body.repaired.surface, p)) < 0.5 ? d : 0;
   return std::max({0.0, d, body.wall_m > 0 ? -d - body.wall_m : 0.0});
 }
 

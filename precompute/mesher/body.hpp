@@ -21,9 +21,9 @@ constexpr double kMostNodes = 2e7;
 constexpr double kEdgePerThickness = 1.4;
 
 struct Body {
-  MendedSurface mended;
-  std::optional<RoundSurface> round;   // the smooth surface of which mended.surface is a cut
-  std::optional<DistanceField> field;  // of a shell, a mended surface, or for stuffing
+  RepairedSurface repaired;
+  std::optional<RoundSurface> round;   // the smooth surface of which repaired.surface is a cut
+  std::optional<DistanceField> field;  // of a shell, a repaired surface, or for stuffing
   std::optional<NearestPoint> nearest;
   std::vector<Polyline> curves;  // the sharp ones of both skins that the last mesh keeps
   double wall_m = 0;

@@ -90,7 +90,7 @@ Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, cons
 
 std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, const std::function<Vec3(const Vec3&)>& project,
                                 const std::function<bool(const Vec3&)>& is_on_skin) {
-  std::int64_t mended = 0;
+  std::int64_t repaired = 0;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const auto pinched = find_pinched(mesh);
     if (pinched.empty()) break;
@@ -105,7 +105,7 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
       for (const Fan& fan : fans)
         for (const auto& face : fan) wait = wait || touched[face[0]];
       if (wait) continue;
-      ++mended;
+      ++repaired;
       Place best;
       const Fan* over = nullptr;
       for (const Fan& fan : fans) {
@@ -134,7 +134,7 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
     if (std::find(remove.begin(), remove.end(), 1) != remove.end()) drop_elements(mesh, remove);
     make_manifold(mesh, components);
   }
-  return mended;
+  return repaired;
 }
 
 }  // namespace carillon::mesher

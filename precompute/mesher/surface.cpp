@@ -1,4 +1,4 @@
-// From a surface file to tetrahedra: reads, scales, mends, then makes meshes until the node count is met, and finishes the last one. One
+// From a surface file to tetrahedra: reads, scales, repairs, then makes meshes until the node count is met, and finishes the last one. One
 // file, because it is one path whose every step decides what the next one gets; the steps themselves live in the other files of this
 // folder.
 #include "precompute/mesher/surface.hpp"
@@ -107,17 +107,15 @@ void check_options(const SurfaceOptions& o) {
 
 /// Scales the surface to metres.
 void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, SurfaceReport& report) {
-  TriangleSurface used;  // points without a triangle do not count for the extent
-  for (const Triangle& t : surface.triangles)
-    for (const std::int32_t v : t) used.points.push_back(surface.points[static_cast<std::size_t>(v)]);
-  const Vec3 extent = calc_box(used.points).extent();
+  const Box box = calc_used_box(surface);
+  const Vec3 extent = box.extent();
   const int up = static_cast<int>(options.up);
   for (int c = 0; c < 3; ++c)
-    if (!(extent[c] > 1e-9 * calc_box(used.points).diagonal()))
+    if (!(extent[c] > 1e-9 * box.diagonal()))
       throw InputError(fmt::format("{}: the surface is flat: its extent along {} is {}; a closed surface that encloses a volume is needed",
                                    options.surface.string(), "xyz"[c], extent[c]));
   double farthest = 0;
-  for (const Vec3& p : used.points) farthest = std::max({farthest, std::abs(p[0]), std::abs(p[1]), std::abs(p[2])});
+  for (int c = 0; c < 3; ++c) farthest = std::max({farthest, std::abs(box.low[c]), std::abs(box.high[c])});
   if (std::max({extent[0], extent[1], extent[2]}) < 1e-10 * farthest)
     throw InputError(
         fmt::format("{}: the surface lies {:.3g} of its own lengths from the origin, so that its coordinates have lost their digits; "
@@ -138,20 +136,16 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
 
 /// Scales the surface once more where joining, wrapping or rounding has changed its extent, so that the body itself has the height asked
 /// for. Returns the factor.
-double fit_height(MendedSurface& mended, const SurfaceOptions& options, SurfaceReport& report) {
-  TriangleSurface used;
-  for (const Triangle& t : mended.surface.triangles)
-    for (const std::int32_t v : t) used.points.push_back(mended.surface.points[static_cast<std::size_t>(v)]);
-  const Box box = calc_box(used.points);
-  Vec3 extent = box.extent();
-  for (double& e : extent) e -= 2 * mended.offset_m;
+double fit_height(RepairedSurface& repaired, const SurfaceOptions& options, SurfaceReport& report) {
+  Vec3 extent = calc_used_box(repaired.surface).extent();
+  for (double& e : extent) e -= 2 * repaired.offset_m;
   double factor = 1;
   if (options.height_m) {
     factor = *options.height_m / extent[static_cast<int>(options.up)];
     // The offset of a wrap and what rounding adds are small; anything else would be no longer the same body.
     if (!(factor > 0.5 && factor < 2)) factor = 1;
-    for (Vec3& p : mended.surface.points) p = factor * p;
-    mended.offset_m *= factor;
+    for (Vec3& p : repaired.surface.points) p = factor * p;
+    repaired.offset_m *= factor;
     report.scale *= factor;
   }
   report.extent_m = factor * extent;
@@ -162,7 +156,7 @@ double fit_height(MendedSurface& mended, const SurfaceOptions& options, SurfaceR
 void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   const auto project_here = [&](const Vec3& p) { return project(body, p); };
   report.removed_tets = make_manifold(mesh, report.components);
-  const double close = body.field ? 0.25 * body.field->voxel_m : 1e-6 * calc_box(body.mended.surface.points).diagonal();
+  const double close = body.field ? 0.25 * body.field->voxel_m : 1e-6 * calc_box(body.repaired.surface.points).diagonal();
   const auto is_on_skin = [&](const Vec3& p) { return calc_off_skin(body, p) <= close; };
   report.parted_nodes = part_pinched_nodes(mesh, report.components, project_here, is_on_skin);
   better_flat_elements(mesh, kFlatDeg, project_here);
@@ -182,7 +176,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
       throw InputError(fmt::format("{}: edges of {:.3g} m are too long for the body; ask for shorter ones or more nodes",
                                    options.surface.string(), edge_m));
   };
-  const double longest = calc_box(body.mended.surface.points).diagonal();
+  const double longest = calc_box(body.repaired.surface.points).diagonal();
   // A finished mesh that is not the body is made anew with slightly shorter edges: which elements lie across a thin wall changes then.
   constexpr double kShorter = 0.97;
   Comparison comparison;
@@ -270,7 +264,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
     const auto refine = [&](double edge) { return delaunay->refine(calc_sizes(body, options, edge)); };
     const auto finish = [&](mesh::TetMesh& mesh) {
       if (options.sliver_deg > 0) mesh = phases.run("removing slivers", [&] { return delaunay->optimise(options.sliver_deg); });
-      phases.run("mending the mesh", [&] { return finish_mesh(mesh, body, report), 0; });
+      phases.run("repairing the mesh", [&] { return finish_mesh(mesh, body, report), 0; });
     };
     return meet_count(body, options, edge_m, report, phases, refine, finish);
   };
@@ -337,7 +331,7 @@ void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& 
   for (const std::int32_t v : skin) {
     const Vec3& p = linear.nodes[static_cast<std::size_t>(v)];
     if (body.field->calc_distance(p) > -0.5 * body.wall_m) continue;
-    const double depth = norm(body.nearest->find(p) - p) - body.mended.offset_m;
+    const double depth = norm(body.nearest->find(p) - p) - body.repaired.offset_m;
     sum += depth;
     low = std::min(low, depth);
     high = std::max(high, depth);
@@ -397,42 +391,42 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
 
 /// Takes the smooth surface through the corners in place of the facets, unless it runs through itself where they do not.
 void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
-  MendedSurface& mended = body.mended;
-  if (4 * mended.surface.triangles.size() > kMostRounded) return;
-  RoundSurface round(mended.surface, options.sharp_angle_deg);
-  const double diagonal = calc_box(mended.surface.points).diagonal();
-  const double thickness = 2 * std::abs(calc_volume(mended.surface)) / calc_area(mended.surface);
+  RepairedSurface& repaired = body.repaired;
+  if (4 * repaired.surface.triangles.size() > kMostRounded) return;
+  RoundSurface round(repaired.surface, options.sharp_angle_deg);
+  const double diagonal = calc_box(repaired.surface.points).diagonal();
+  const double thickness = 2 * std::abs(calc_volume(repaired.surface)) / calc_area(repaired.surface);
   if (!round.is_doubtful() && round.get_largest_bulge() < std::min(kRoundness * diagonal, kThinRoundness * thickness)) return;
   // So fine that the nodes hardly have to move from the cut to the smooth surface; for linear elements, that cannot tell, coarser.
   const double nodes = static_cast<double>(options.nodes.value_or(10000));
-  const double shortest = options.edge_m.value_or(std::sqrt(calc_area(mended.surface) / nodes));
+  const double shortest = options.edge_m.value_or(std::sqrt(calc_area(repaired.surface) / nodes));
   const double tolerance = options.order == 1 ? std::max(kRoundness * diagonal, kVisible * shortest) : kRoundness * diagonal;
   int pieces = std::max(1, static_cast<int>(std::ceil(std::sqrt(round.get_usual_bulge() / tolerance))));
-  while (pieces > 1 && mended.surface.triangles.size() * pieces * pieces > kMostRounded) --pieces;
+  while (pieces > 1 && repaired.surface.triangles.size() * pieces * pieces > kMostRounded) --pieces;
   TriangleSurface rounded = round.cut(pieces);
   report.facet_pieces = pieces;
-  if (mended.clean && pieces > 1 && !is_clean(rounded)) {
+  if (repaired.clean && pieces > 1 && !is_clean(rounded)) {
     report.facet_pieces = 1;
     report.notes.push_back("The smooth surface through the facets' corners would run through itself; the facets were taken as they are.");
     round.keep_facets();
     body.round = std::move(round);
     return;
   }
-  mended.surface = std::move(rounded);
+  repaired.surface = std::move(rounded);
   body.round = std::move(round);
 }
 
 /// The smooth surface of the height asked for. The patches keep the facets that they were made of, so those are scaled, and rounded again.
 void round_to_height(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   const bool is_rounded = !options.facets && !report.wrapped;
-  MendedSurface facets;
-  if (is_rounded && options.height_m) facets = body.mended;
+  RepairedSurface facets;
+  if (is_rounded && options.height_m) facets = body.repaired;
   if (is_rounded) round(body, options, report);
-  const double factor = fit_height(body.mended, options, report);
+  const double factor = fit_height(body.repaired, options, report);
   if (!body.round || factor == 1) return;
   for (Vec3& p : facets.surface.points) p = factor * p;
   facets.offset_m *= factor;
-  body.mended = std::move(facets);
+  body.repaired = std::move(facets);
   body.round.reset();
   round(body, options, report);
 }
@@ -482,11 +476,11 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
                                     kLeastCpu + kCpuPerTriangle * static_cast<double>(raw.triangles.size()) + kCpuPerNode * nodes_asked);
   scale_surface(raw, options, report);
   tell_roughly(raw, options, phases);
-  body.mended = phases.run("mending", [&] { return mend_surface(std::move(raw), options, report); });
+  body.repaired = phases.run("repairing", [&] { return repair_surface(std::move(raw), options, report); });
   phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
-  const TriangleSurface& surface = body.mended.surface;
+  const TriangleSurface& surface = body.repaired.surface;
   report.input_area_m2 = calc_area(surface);
-  report.input_volume_m3 = body.round ? body.round->calc_volume() : calc_volume(surface) - body.mended.offset_m * report.input_area_m2;
+  report.input_volume_m3 = body.round ? body.round->calc_volume() : calc_volume(surface) - body.repaired.offset_m * report.input_area_m2;
   set_model(body, options, report.input_volume_m3, report.input_area_m2);
   const double diagonal = calc_box(surface.points).diagonal();
   double edge = find_first_edge(body, options);
@@ -512,7 +506,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
 
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
   body.nearest.emplace(surface);
-  if (body.wall_m > 0 || !body.mended.clean || report.method == Method::kStuffing)
+  if (body.wall_m > 0 || !body.repaired.clean || report.method == Method::kStuffing)
     body.field = phases.run("computing distances", [&] { return make_field(body, options, edge); });
   report.expected_volume_m3 = body.field ? calc_volume(*body.field, body.wall_m) : report.input_volume_m3;
   if (body.wall_m > 0) {
@@ -552,7 +546,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   if (report.removed_tets > 0)
     report.notes.push_back(fmt::format("{} elements were removed where the body only touched itself or was cut off.", report.removed_tets));
   if (report.parted_nodes > 0)
-    report.notes.push_back(fmt::format("The mesh was mended at {} nodes where both skins of a thin part met.", report.parted_nodes));
+    report.notes.push_back(fmt::format("The mesh was repaired at {} nodes where both skins of a thin part met.", report.parted_nodes));
   measure_mesh(linear, body, report);
   report.edge_m = edge;
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);

@@ -49,7 +49,7 @@ struct SurfaceOptions {
 
 /// What came out, and what had to be done to the surface for it.
 struct SurfaceReport {
-  // The input surface as it was read and mended.
+  // The input surface as it was read and repaired.
   std::int64_t input_vertices = 0;
   std::int64_t input_triangles = 0;
   std::int64_t removed_triangles = 0;  // duplicate or degenerate ones
@@ -59,8 +59,8 @@ struct SurfaceReport {
   double largest_hole_part = 0, holes_area_part = 0;  // of all holes over that of the closed surface
   int facet_pieces = 1;              // into how many each facet's sides were cut to follow the smooth surface through its corners
   double doubt_m = 0;                // how far apart the facets and the smooth surface are where it cannot be told which is the body
-  bool wrapped = false;              // the surface could not be mended: its alpha wrap was meshed
-  std::int64_t components = 0;       // of the input surface after mending
+  bool wrapped = false;              // the surface could not be repaired: its alpha wrap was meshed
+  std::int64_t components = 0;       // of the input surface after repairing
   double scale = 1;                  // metres per unit of the file, as applied
   std::array<double, 3> extent_m{};  // of the scaled surface along x, y, z
   double input_volume_m3 = 0;        // enclosed by the scaled surface (with a wall: by the surface, not by the shell)
@@ -93,7 +93,7 @@ struct SurfaceReport {
   double farthest_outside_m = 0;          // a node's distance from the body
 
   std::vector<std::pair<std::string, double>> seconds;  // per phase, in the order they ran
-  std::vector<std::string> notes;                       // sentences for the user: what was mended, what fell short
+  std::vector<std::string> notes;                       // sentences for the user: what was repaired, what fell short
 };
 
 /// The count asked for cannot be met. `nodes` is what to ask for in its place: the fewest that the thickness allows, or the nearest.
@@ -117,7 +117,7 @@ mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report,
 /// For a program that meshes files of strangers: from now on a crash inside CGAL, or a mesh_surface that takes far more processor time than
 /// its size explains (12 s, and 2 ms a triangle, and 5 ms a node), ends the process with exit code kExitInput and one line that begins with
 /// `program` and says at which step; with kExitSystem where the process came with a tighter limit (ulimit -t). Under
-/// sanitizers crashes are left to them.
+/// sanitizers crashes are left to them, but for SIGFPE.
 void guard_program(const char* program);
 
 /// The report as lines for a person.

@@ -23,6 +23,14 @@ Box calc_box(const std::vector<Vec3>& points) {
   return box;
 }
 
+Box calc_used_box(const TriangleSurface& surface) {
+  std::vector<Vec3> used;
+  used.reserve(3 * surface.triangles.size());
+  for (const Triangle& t : surface.triangles)
+    for (const std::int32_t v : t) used.push_back(surface.points[static_cast<std::size_t>(v)]);
+  return calc_box(used);
+}
+
 double calc_volume(const TriangleSurface& surface) {
   // Relative to a point of the surface, so that a body far from the origin loses no digits.
   const Vec3 origin = surface.points.empty() ? Vec3{} : surface.points.front();

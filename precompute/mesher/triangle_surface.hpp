@@ -1,4 +1,4 @@
-// A triangle surface: read from a file, mended until it encloses a volume, and its sharp edges.
+// A triangle surface: read from a file, repaired until it encloses a volume, and its sharp edges.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ using Polyline = std::vector<Vec3>;
 
 struct TriangleSurface {
   std::vector<Vec3> points;         // (P)
-  std::vector<Triangle> triangles;  // (T), counter-clockwise seen from outside once mended
+  std::vector<Triangle> triangles;  // (T), counter-clockwise seen from outside once repaired
 };
 
 inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -42,6 +42,8 @@ struct Box {
 Box calc_box(const std::vector<Vec3>& points);
 
 /// The enclosed volume by the divergence theorem (signed: positive if the triangles face outward), and the area.
+/// Of the points that a triangle has.
+Box calc_used_box(const TriangleSurface& surface);
 double calc_volume(const TriangleSurface& surface);
 double calc_area(const TriangleSurface& surface);
 
@@ -66,14 +68,14 @@ TriangleSurface parse_surface(std::string_view bytes, const std::string& name, c
 /// closed manifold, wraps it (CGAL alpha wrap).
 /// `offset_m` is how far the returned surface lies outside the true one: 0 unless it was wrapped; the distance field adds it.
 /// `clean` is true if no two triangles of it intersect. Throws InputError if it encloses nothing or has too large a hole.
-struct MendedSurface {
+struct RepairedSurface {
   TriangleSurface surface;
   double offset_m = 0;
   bool clean = false;
 };
-MendedSurface mend_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report);
+RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report);
 
-/// The sharp edges of a mended surface, joined to curves. An edge is sharp if its two faces turn by more than
+/// The sharp edges of a repaired surface, joined to curves. An edge is sharp if its two faces turn by more than
 /// `sharp_angle_deg`, also when its sides are averaged over `radius`; curves shorter than `shortest_m` are left out
 /// unless they join the ends of longer ones.
 /// A closed curve repeats its first point.

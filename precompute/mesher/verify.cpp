@@ -122,7 +122,7 @@ std::int64_t count_parts(const std::vector<Triangle>& boundary, std::size_t node
 Shells count_shells(const Body& body, double edge_m) {
   Shells shells;
   if (!body.field) {
-    for (const TriangleSurface& part : split_parts(body.mended.surface)) {
+    for (const TriangleSurface& part : split_parts(body.repaired.surface)) {
       const double thickness = 2 * std::abs(calc_volume(part)) / calc_area(part);
       ++shells.most;
       shells.least += thickness >= kLeastThickness * edge_m && calc_box(part.points).diagonal() >= kLeastLength * edge_m;
@@ -169,7 +169,7 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
     }
 
   const double part =
-      0.1 * edge * (body.wall_m > 0 ? calc_area(body.mended.surface) / 3 : calc_area(body.mended.surface)) / expectation.volume_m3;
+      0.1 * edge * (body.wall_m > 0 ? calc_area(body.repaired.surface) / 3 : calc_area(body.repaired.surface)) / expectation.volume_m3;
   const double most_off = (body.wall_m > 0 ? 0.08 : 0.03) + part;
   const double off = result.volume_m3 / expectation.volume_m3 - 1;
   if (!(std::abs(off) <= most_off))
@@ -187,12 +187,9 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
   // Of a hollow that was filled where elements are as long as the wall is thick several times over.
   result.lacks_part =
       !result.fault.empty() && result.shells < expectation.shells.least && body.wall_m > 0 && edge > kHopelessWalls * body.wall_m;
-  TriangleSurface used;  // points without a triangle do not count for the extent
-  for (const Triangle& t : body.mended.surface.triangles)
-    for (const std::int32_t v : t) used.points.push_back(body.mended.surface.points[static_cast<std::size_t>(v)]);
-  const Vec3 wanted = calc_box(used.points).extent(), made = calc_box(linear.nodes).extent();
+  const Vec3 wanted = calc_used_box(body.repaired.surface).extent(), made = calc_box(linear.nodes).extent();
   for (int c = 0; c < 3; ++c) {
-    const double extent = wanted[c] - 2 * body.mended.offset_m, lost = extent - made[c];
+    const double extent = wanted[c] - 2 * body.repaired.offset_m, lost = extent - made[c];
     if (lost <= kMostLost * extent || lost <= kMostLostEdges * edge) continue;
     result.lacks_part = true;
     result.fault = fmt::format("is {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", made[c],

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "runtime/config/error.hpp"
 #include "runtime/rigid/groups.hpp"
@@ -12,7 +13,7 @@
 namespace carillon::contact {
 namespace {
 
-constexpr double kWidest = 3.06;  // rad, of a hinge with stops; past pi the angle wraps round to the other side
+constexpr double kWidest = kWidestHingeDeg * std::numbers::pi / 180.0 * (1.0 + 1e-12);  // rad; what was given in degrees is rounded
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <map>
 #include <utility>
 #include <variant>
 
+#include "runtime/config/cpu_clock.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/contact/check.hpp"
 #include "runtime/contact/lasting.hpp"
@@ -180,13 +180,6 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
   }
 }
 
-/// CPU time of this thread alone: sound rendered on another thread is not counted.
-double get_cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 }  // namespace
 
 /// The bodies on their way, and the window that is being made.
@@ -203,12 +196,12 @@ class World::Course {
   }
 
   double advance(double until_s, double cpu_s, const Sink& sink) {
-    const double started_s = get_cpu_s();
+    const double started_s = config::get_thread_cpu_s();
     while (!begun_ || (until_s - reached_s_ > kShortest && !is_over())) {
       step(sink);
-      if (std::isfinite(cpu_s) && get_cpu_s() - started_s >= cpu_s) break;
+      if (std::isfinite(cpu_s) && config::get_thread_cpu_s() - started_s >= cpu_s) break;
     }
-    seconds_cpu_ += get_cpu_s() - started_s;
+    seconds_cpu_ += config::get_thread_cpu_s() - started_s;
     return reached_s_;
   }
 

@@ -38,6 +38,9 @@ struct GroundSpec {
   double roughness_m = 20e-6;  // likewise; concrete, smoothly trowelled
 };
 
+/// Of a hinge with limits, from the start: past 180 degrees the angle wraps round to the other side.
+inline constexpr double kWidestHingeDeg = 175.0;
+
 /// Joins a body to another one, or to the world. Places and axes are in the world, as all bodies are placed at the start. Two bodies with a
 /// joint between them do not collide.
 struct JointSpec {

@@ -31,7 +31,6 @@ constexpr std::size_t kMostWaypoints = 100000;
 constexpr std::size_t kMostMicrophones = 16;
 constexpr std::size_t kMostHolders = 1000;
 constexpr std::size_t kMostStrikes = 100000;
-constexpr double kWidestDeg = 175.0;   // of a hinge with stops; past 180 the angle wraps round to the other side
 constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
 constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body lasts as long as a person's step on less
@@ -288,7 +287,7 @@ contact::JointSpec parse_joint(config::Object& object, const Names& names) {
     if (!object.has(key)) continue;
     if (!is_meant) object.fail(key, fmt::format("a {} has none; a hinge has \"limits_deg\", a slider \"limits_m\"", kind));
     std::array<double, 2> limits = object.numbers<2>(key);
-    const double most = turns ? kWidestDeg : kFarthestM;
+    const double most = turns ? contact::kWidestHingeDeg : kFarthestM;
     if (!(limits[0] <= 0.0 && limits[1] >= 0.0 && limits[0] >= -most && limits[1] <= most && limits[1] - limits[0] > 1e-3))
       object.fail(key, fmt::format("must be [lowest, highest] with the start, 0, between them, within {:g}", most));
     for (double& limit : limits) limit *= turns ? std::numbers::pi / 180.0 : 1.0;

@@ -186,7 +186,7 @@ void Impact::add_contact(const Contact& contact) {
   touch.friction = contact.friction;
   touch.compression_m = -contact.gap_m;
   touch.row = static_cast<int>(rows_.size());
-  rows_.resize(rows_.size() + (contact.friction > 0.0 ? 3 : 1));
+  rows_.resize(rows_.size() + touch.count_rows());
   force_.resize(rows_.size(), 0.0);
   place_contact(contact, static_cast<int>(contacts_.size()), touch.row);
   touches_.push_back(touch);

@@ -68,7 +68,7 @@ double StepSolver::calc_law(const std::vector<Touch>& touches, const std::vector
     if (t.friction > 0.0) law_[row + 1] = law_[row + 2] = 0.0;
     if (normal.force <= 0.0 && normal.slope <= 0.0) continue;
     pressing_.push_back(c);
-    for (std::size_t i = 0; i < (t.friction > 0.0 ? 3u : 1u); ++i) pressed_.push_back(row + i);
+    for (std::size_t i = 0; i < t.count_rows(); ++i) pressed_.push_back(row + i);
     if (t.friction <= 0.0) continue;
     const double k = t.tangential_n_m, limit = t.friction * normal.force;
     const std::array<double, 2> middle{t.stretch[0] + 0.5 * moved[row + 1], t.stretch[1] + 0.5 * moved[row + 2]};
@@ -105,7 +105,6 @@ double StepSolver::calc_residual(const std::vector<Touch>& touches, const std::v
 /// elimination with partial pivoting, the others follow from theirs. False where it is singular.
 bool StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<double>& A) {
   const std::size_t rows = residual_.size(), n = pressed_.size();
-  const auto count = [&](std::size_t contact) -> std::size_t { return touches[contact].friction > 0.0 ? 3 : 1; };
   auto& J = jacobian_;
   J.assign(n * n, 0.0);
   step_.resize(n);
@@ -114,11 +113,11 @@ bool StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<
     step_[i] = residual_[pressed_[i]];
     std::size_t at = 0;
     for (const std::size_t c : pressing_) {
-      for (std::size_t k = 0; k < count(c); ++k) {
+      for (std::size_t k = 0; k < touches[c].count_rows(); ++k) {
         const double gain = A[pressed_[i] * rows + pressed_[at + k]];
-        for (std::size_t j = 0; j < count(c); ++j) J[i * n + at + j] -= gain * slopes_[c][k][j];
+        for (std::size_t j = 0; j < touches[c].count_rows(); ++j) J[i * n + at + j] -= gain * slopes_[c][k][j];
       }
-      at += count(c);
+      at += touches[c].count_rows();
     }
   }
   for (std::size_t k = 0; k < n; ++k) {
@@ -145,9 +144,9 @@ bool StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<
   change_.assign(n, 0.0);
   std::size_t at = 0;
   for (const std::size_t c : pressing_) {
-    for (std::size_t k = 0; k < count(c); ++k)
-      for (std::size_t j = 0; j < count(c); ++j) change_[at + k] += slopes_[c][k][j] * step_[at + j];
-    at += count(c);
+    for (std::size_t k = 0; k < touches[c].count_rows(); ++k)
+      for (std::size_t j = 0; j < touches[c].count_rows(); ++j) change_[at + k] += slopes_[c][k][j] * step_[at + j];
+    at += touches[c].count_rows();
   }
   solved_.swap(step_);
   step_ = residual_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <limits>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct Touch {
   std::array<double, 2> stretch{};                          // u of the anchor spring [m]
   double most_n = std::numeric_limits<double>::infinity();  // that it may push with in this step: its spring lets go of the rest
   int row = 0;                                              // of the normal; the tangents follow
+  std::size_t count_rows() const { return friction > 0.0 ? 3 : 1; }
 };
 
 /// With friction the force of a step that stretches the spring from u0 to u = u0 + s (anchor at rest) is

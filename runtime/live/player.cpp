@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <deque>
 #include <limits>
 #include <map>
@@ -17,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "runtime/config/cpu_clock.hpp"
 #include "runtime/config/printable.hpp"
 #include "runtime/contact/world.hpp"
 #include "runtime/host/banks.hpp"
@@ -43,13 +43,6 @@ constexpr double kChangeS = 0.03;  // by which a change of effects is sent befor
 // long.
 constexpr double kHandedS = 0.25;
 constexpr int kMostStrikes = 1024, kMostForces = 2048;  // of a body that wait or act
-
-/// CPU time of this thread.
-double get_cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// Physics and strikes of a scene as one stream, in order of time.
 class Course {
@@ -78,13 +71,13 @@ class Course {
   /// Goes on towards a time, for a slice of CPU time.
   void advance(double until_s) {
     if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return;
-    counted_s_ = get_cpu_s();
+    counted_s_ = config::get_thread_cpu_s();
     time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) {
       waiting_.push_back(event);
       planner_->watch(event);
       if (std::holds_alternative<stream::Mark>(event)) end_window();
     });
-    window_cpu_s_ += get_cpu_s() - counted_s_;
+    window_cpu_s_ += config::get_thread_cpu_s() - counted_s_;
   }
   /// The most CPU time that a window of the physics, 2 ms of the scene, has taken.
   double get_worst_window_s() const { return worst_window_s_; }
@@ -111,7 +104,7 @@ class Course {
  private:
   /// The physics marks the end of each window.
   void end_window() {
-    const double now = get_cpu_s();
+    const double now = config::get_thread_cpu_s();
     worst_window_s_ = std::max(worst_window_s_, window_cpu_s_ + now - counted_s_);
     window_cpu_s_ = 0.0;
     counted_s_ = now;

@@ -1,3 +1,4 @@
+// Impacts with modes from their prediction to their end, all of it on the same Ringings; longer than most files.
 // Method: an impact whose bodies ring is integrated with their modes inside (runtime/impact), over as many small steps as it takes. Its
 // bodies take
 //   their motion from it; what gravity and other contacts do to them enters it as accelerations, a small step at a time. Where the modes

@@ -7,14 +7,10 @@
 #include <algorithm>
 #include <ctime>
 
+#include "runtime/config/cpu_clock.hpp"
+
 namespace carillon::synth {
 namespace {
-
-std::uint64_t read_clock() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<std::uint64_t>(now.tv_sec) * 1'000'000'000U + static_cast<std::uint64_t>(now.tv_nsec);
-}
 
 struct Cost {
   std::uint64_t one_ns = 0;  // of a call
@@ -23,9 +19,9 @@ struct Cost {
     constexpr int kCalls = 20, kRounds = 5;
     std::uint64_t least = ~std::uint64_t{0};
     for (int round = 0; round < kRounds; ++round) {
-      const std::uint64_t begin = read_clock();
+      const std::uint64_t begin = config::get_thread_cpu_ns();
       std::uint64_t end = begin;
-      for (int i = 0; i < kCalls; ++i) end = read_clock();
+      for (int i = 0; i < kCalls; ++i) end = config::get_thread_cpu_ns();
       least = std::min(least, end - begin);
     }
     one_ns = least / kCalls;
@@ -42,7 +38,7 @@ Cost& get_cost() noexcept {
 std::uint64_t get_cpu_ticks() noexcept {
   Cost& cost = get_cost();
   cost.all_ns += cost.one_ns;
-  return read_clock() - cost.all_ns;
+  return config::get_thread_cpu_ns() - cost.all_ns;
 }
 
 std::uint64_t get_cpu_ticks_cost_ns() noexcept { return get_cost().all_ns; }

@@ -77,6 +77,16 @@ TEST(Limit, OfABallOnASupportedPlateIsTheRestitutionGiven) {
   EXPECT_GT(limited, 8);
 }
 
+/// A bar that flies, with its modes.
+Body make_free(const Bar& bar, const Modes& modes) {
+  Body body;
+  body.modes = &modes;
+  body.mass_kg = bar.mass;
+  const double across = bar.mass * bar.length * bar.length / 12.0;
+  body.inertia_kg_m2 = {{{0.01 * across, 0, 0}, {0, across, 0}, {0, 0, across}}};
+  return body;
+}
+
 TEST(Limit, OfABallOnAFreeBarIsTheRestitutionGiven) {
   int limited = 0;
   for (const double x : {0.0, 0.03, 0.07, 0.1})
@@ -84,11 +94,7 @@ TEST(Limit, OfABallOnAFreeBarIsTheRestitutionGiven) {
       for (const double friction : {0.0, 0.3}) {
         const Bar bar = make_bar(0.2, 0.03, 0.006, x, 20e3);
         const Modes modes(bar.omega, std::vector<double>(bar.omega.size(), 2.0), 2.0 * kPi * 20e3);
-        Body below;
-        below.modes = &modes;
-        below.mass_kg = bar.mass;
-        const double across = bar.mass * bar.length * bar.length / 12.0;
-        below.inertia_kg_m2 = {{{0.01 * across, 0, 0}, {0, across, 0}, {0, 0, across}}};
+        const Body below = make_free(bar, modes);
         for (const double e : {0.1, 0.5, 0.8}) expect_limited(calc_rebound(below, bar.shape, radius, 1.0, x, e, friction), e, limited);
       }
   EXPECT_GT(limited, 8);
@@ -113,11 +119,7 @@ TEST(Limit, OfTwoContactsThatShareABarHoldsForBoth) {
   for (const double e : {0.2, 0.6}) {
     const Bar left = make_bar(0.2, 0.03, 0.006, -0.05, 20e3), right = make_bar(0.2, 0.03, 0.006, 0.08, 20e3);
     const Modes modes(left.omega, std::vector<double>(left.omega.size(), 2.0), 2.0 * kPi * 20e3);
-    Body below;
-    below.modes = &modes;
-    below.mass_kg = left.mass;
-    const double across = left.mass * left.length * left.length / 12.0;
-    below.inertia_kg_m2 = {{{0.01 * across, 0, 0}, {0, across, 0}, {0, 0, across}}};
+    const Body below = make_free(left, modes);
     std::vector<Body> bodies{make_ball(0.012, {0, 0, -1.0}), make_ball(0.02, {0, 0, -0.8}), below};
     bodies[0].centre_m[0] = -0.05;
     bodies[1].centre_m[0] = 0.08;

@@ -77,6 +77,16 @@ void run(Space& space, double until_s) {
   while (space.get_time() < until_s - 1e-9) space.step(until_s);
 }
 
+/// Steps until something strikes, or to a time.
+std::vector<Strike> step_to_first_strikes(Space& space, double end_s) {
+  std::vector<Strike> strikes;
+  while (strikes.empty() && space.get_time() < end_s) {
+    space.step(end_s);
+    strikes = space.take_strikes();
+  }
+  return strikes;
+}
+
 TEST(joints, bob_strikes_a_wall) {
   // A ball of 3 cm that hangs 0.4 m below a hinge is let go at 0.6 rad and meets a wall at the bottom.
   const double r = 0.03, arm = 0.4, mass = 0.5, a = 0.6, e = 0.7;
@@ -85,11 +95,7 @@ TEST(joints, bob_strikes_a_wall) {
   Space space(std::move(solids), std::move(states), std::nullopt, kGravity, {}, {.joints = {hinge(0, -1, {})}, .cords = {}});
   const double before = calc_sum(space.calc_books());
   const double inertia = mass * arm * arm + 0.4 * mass * r * r, gained = mass * kG * arm * (1.0 - std::cos(a));
-  std::vector<Strike> strikes;
-  while (strikes.empty() && space.get_time() < 2.0) {
-    space.step(2.0);
-    for (Strike& s : space.take_strikes()) strikes.push_back(std::move(s));
-  }
+  const std::vector<Strike> strikes = step_to_first_strikes(space, 2.0);
   ASSERT_EQ(strikes.size(), 1u);
   const Strike& hit = strikes.front();
   ASSERT_EQ(hit.bodies, std::vector<int>{0});
@@ -347,11 +353,7 @@ TEST(stops, pendulum_is_thrown_back_by_a_stop) {
     Space space({make_ball_solid(mass, r)}, {at(centre)}, std::nullopt, kGravity, {}, links);
     const double inertia = mass * arm * arm + 0.4 * mass * r * r, gained = mass * kG * arm * (std::cos(past) - std::cos(a));
     const double before = calc_sum(space.calc_books());
-    std::vector<Strike> strikes;
-    while (strikes.empty() && space.get_time() < 2.0) {
-      space.step(2.0);
-      for (Strike& s : space.take_strikes()) strikes.push_back(std::move(s));
-    }
+    const std::vector<Strike> strikes = step_to_first_strikes(space, 2.0);
     ASSERT_EQ(strikes.size(), 1u);
     const Strike& hit = strikes.front();
     const double speed = arm * std::sqrt(2.0 * gained / inertia);
@@ -429,11 +431,7 @@ TEST(stops, of_two_free_bars_keep_momentum_and_angular_momentum) {
     };
     const Vec3 p = calc_momentum(), m = calc_spin();
     const double before = space.calc_books().motion_j;
-    std::vector<Strike> strikes;
-    while (strikes.empty() && space.get_time() < 3.0) {
-      space.step(3.0);
-      for (Strike& s : space.take_strikes()) strikes.push_back(std::move(s));
-    }
+    const std::vector<Strike> strikes = step_to_first_strikes(space, 3.0);
     ASSERT_EQ(strikes.size(), 1u);
     const auto calc_opening = [&](const std::vector<State>& s) {  // of the hinge
       return s[0].momentum[1] / bar.inertia_kg_m2[1][1] - s[1].momentum[1] / bar.inertia_kg_m2[1][1];

@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     // What repair costs grows with the triangles; the readers have been through by now.
     if (surface.triangles.size() > 300) return 0;
     mesher::SurfaceReport report;
-    mesher::mend_surface(std::move(surface), {.surface = "fuzz"}, report);
+    mesher::repair_surface(std::move(surface), {.surface = "fuzz"}, report);
   } catch (const InputError&) {
   }
   return 0;

@@ -1,4 +1,4 @@
-// What the mesher reads, mends and refuses.
+// What the mesher reads, repairs and refuses.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -112,7 +112,7 @@ TEST(input, the_body_as_meshed_has_the_height_asked_for) {
   }
 }
 
-TEST(input, mixed_orientation_duplicate_and_degenerate_triangles_are_mended) {
+TEST(input, mixed_orientation_duplicate_and_degenerate_triangles_are_repaired) {
   Polygons box = make_box(1, 1, 1);
   for (const int f : {1, 4, 9}) std::swap(box.faces[f][0], box.faces[f][1]);
   box.faces.push_back(box.faces[0]);
@@ -265,10 +265,10 @@ TEST(input, a_soup_of_few_triangles_is_wrapped_by_few) {
       "v 0.1 0 0\nv 0 0.05 0\nv 0.1 0.05 0\nv 0 0 0.03\nv 0.1 0 0.03\nv 0 0 0.03\nv 0 0.05 0.03\nv 0.1 0.05 0.03\n"
       "f 1 4 2\nf 1 3 4\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n";
   SurfaceReport report;
-  const MendedSurface mended = mend_surface(parse_surface(soup, "soup.obj", "obj"), {.surface = "soup.obj"}, report);
+  const RepairedSurface repaired = repair_surface(parse_surface(soup, "soup.obj", "obj"), {.surface = "soup.obj"}, report);
   EXPECT_TRUE(report.wrapped);
-  EXPECT_LT(mended.surface.triangles.size(), 5000u);
-  EXPECT_GT(calc_volume(mended.surface), 0.0);
+  EXPECT_LT(repaired.surface.triangles.size(), 5000u);
+  EXPECT_GT(calc_volume(repaired.surface), 0.0);
 }
 
 TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <string>
 #include <vector>
 
+#include "runtime/config/cpu_clock.hpp"
 #include "runtime/impact/predict.hpp"
 #include "tests/impact/free_plate.hpp"
 #include "tests/impact/scenes.hpp"
@@ -20,21 +20,15 @@ namespace {
 
 bool quick = false;
 
-double get_cpu_us() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e6 * static_cast<double>(now.tv_sec) + 1e-3 * static_cast<double>(now.tv_nsec);
-}
-
 /// The least mean of several rounds [us].
 template <class Work>
 double time_us(Work&& work) {
   const int rounds = quick ? 1 : 15, repeats = quick ? 1 : 40;
   double least = 1e300;
   for (int round = 0; round < rounds; ++round) {
-    const double begin = get_cpu_us();
+    const double begin = 1e6 * config::get_thread_cpu_s();
     for (int i = 0; i < repeats; ++i) work();
-    least = std::min(least, (get_cpu_us() - begin) / repeats);
+    least = std::min(least, (1e6 * config::get_thread_cpu_s() - begin) / repeats);
   }
   return least;
 }

@@ -24,6 +24,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/config/cpu_clock.hpp"
 #include "runtime/synth/driven_bank.hpp"
 #include "tests/bench/runtime/fma_limit.hpp"
 #include "tests/synth/cube_bank.hpp"
@@ -150,12 +151,12 @@ int main(int argc, char** argv) {
   std::vector<float> out(kFrames);
   for (int round = 0; round < kRounds; ++round) {
     for (Player& player : players) {
-      const double started = bench::get_cpu_seconds();
+      const double started = config::get_thread_cpu_s();
       double spent = 0.0;
       long blocks = 0;
       while (spent < seconds) {
         for (std::size_t n = 0; n < noise.size(); n += kFrames, ++blocks) player.process(&noise[n], out.data());
-        spent = bench::get_cpu_seconds() - started;
+        spent = config::get_thread_cpu_s() - started;
       }
       player.seconds.push_back(spent / static_cast<double>(blocks));
     }

@@ -6,7 +6,8 @@
 #include <immintrin.h>
 
 #include <algorithm>
-#include <ctime>
+
+#include "runtime/config/cpu_clock.hpp"
 
 namespace carillon::bench {
 namespace {
@@ -60,17 +61,11 @@ float run_sse2(float start) {
 
 }  // namespace
 
-double get_cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 double measure_fma_lanes_per_s(synth::Isa isa, double seconds) {
   volatile float keep = 1.0F;
   double best = 0.0;
-  const double until = get_cpu_seconds() + seconds;
-  double now = get_cpu_seconds();
+  const double until = config::get_thread_cpu_s() + seconds;
+  double now = config::get_thread_cpu_s();
   while (now < until) {
     double lanes = 0.0;
     if (isa == synth::Isa::kAvx512) {
@@ -83,7 +78,7 @@ double measure_fma_lanes_per_s(synth::Isa isa, double seconds) {
       keep = run_sse2(keep);
       lanes = 4.0 * 12.0;
     }
-    const double later = get_cpu_seconds();
+    const double later = config::get_thread_cpu_s();
     best = std::max(best, lanes * static_cast<double>(kTurns) / (later - now));
     now = later;
     keep = 1.0F;

@@ -6,8 +6,6 @@
 //             medians of rounds that alternate.
 // Source:     none.
 // Deviations: none.
-#include <time.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/config/cpu_clock.hpp"
 #include "runtime/synth/voice.hpp"
 #include "tests/synth/cube_bank.hpp"
 
@@ -27,12 +26,6 @@ using namespace carillon;
 
 constexpr double kRate = 48000.0;
 constexpr std::int64_t kFrames = 128;
-
-double get_cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 using Strike = std::function<void(synth::Voice&, double)>;
 
@@ -45,12 +38,12 @@ double measure(int modes, const Strike& strike, double length_s, int blocks, int
   std::array<float, kFrames> block{};
   const auto gap = static_cast<std::int64_t>(std::ceil((length_s * kRate + 1.0) / kFrames));  // blocks from pulse to pulse
   const auto play = [&](bool strikes) {
-    const double started = get_cpu_seconds();
+    const double started = config::get_thread_cpu_s();
     for (std::int64_t b = 0; b < blocks; ++b) {
       if (strikes && b % gap == 0) strike(voice, (static_cast<double>(voice.get_horizon()) + 3.3) / kRate);
       voice.process(block);
     }
-    return get_cpu_seconds() - started;
+    return config::get_thread_cpu_s() - started;
   };
   play(true);
   std::vector<double> differences;

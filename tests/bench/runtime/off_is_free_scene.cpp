@@ -1,7 +1,5 @@
 // A scene of struck bodies that ring and no more, as a library that bench_off_is_free loads twice: once with every effect compiled in, once
 // with only these two.
-#include <time.h>
-
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -11,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/config/cpu_clock.hpp"
 #include "runtime/config/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/synth/cube_bank.hpp"
@@ -24,12 +23,6 @@ constexpr int kFrames = 128;
 constexpr int kBodies = 20, kModes = 100;
 constexpr double kStrikesPerS = 10.0;
 constexpr synth::EffectSet kCalledFor{synth::Effect::kModal, synth::Effect::kHertzPulse};
-
-double get_cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 struct Scene {
   synth::Synthesiser synthesiser{{.rate_hz = kRate, .max_bodies = kBodies, .longest_m = 10.0}};
@@ -68,9 +61,9 @@ CARILLON_VISIBLE double carillon_bench_play(int blocks, std::uint64_t* sum) {
                                              .impulse_n_s = {0.0, 1e-4, 1e-3 * scene.unit(scene.random)},
                                              .duration_s = 5e-5 + 2e-4 * scene.unit(scene.random)});
     }
-    const double started = get_cpu_seconds();
+    const double started = config::get_thread_cpu_s();
     scene.synthesiser.process(out.data(), 2, kFrames);
-    spent += get_cpu_seconds() - started;
+    spent += config::get_thread_cpu_s() - started;
     for (const float x : left) {
       std::uint32_t bits = 0;
       std::memcpy(&bits, &x, sizeof bits);

@@ -6,11 +6,11 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
-#include <ctime>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "runtime/config/cpu_clock.hpp"
 #include "tests/hard/contact_course.hpp"
 
 namespace {
@@ -18,20 +18,14 @@ namespace {
 using namespace carillon;
 using namespace carillon::hard;
 
-double get_cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 void print_row(const std::string& what, const WorldSpec& spec, double seconds) {
   std::vector<double> costs;
   contact::Statistics cost;
   for (int round = 0; round < 5; ++round) {
     World world(spec, {.end_s = seconds});
-    const double begin = get_cpu_s();
+    const double begin = config::get_thread_cpu_s();
     world.advance(seconds, std::numeric_limits<double>::infinity(), [](const stream::Event&) {});
-    costs.push_back(get_cpu_s() - begin);
+    costs.push_back(config::get_thread_cpu_s() - begin);
     cost = world.get_statistics();
   }
   std::sort(costs.begin(), costs.end());

@@ -138,7 +138,7 @@ std::int64_t orient_patches(std::vector<Triangle>& triangles) {
 }
 
 /// The boundary of the triangles with their signs, as loops that run so that a triangle over one of them closes it.
-/// Empty if the surface is closed. `whole` is false where an edge is left more than once over, which no simple fill mends.
+/// Empty if the surface is closed. `whole` is false where an edge is left more than once over, which no simple fill repairs.
 std::vector<std::vector<std::int32_t>> find_loops(const std::vector<Triangle>& triangles, bool& whole) {
   whole = true;
   std::map<std::int32_t, std::vector<std::int32_t>> next;  // ordered, so that the loops come in a fixed order
@@ -340,7 +340,7 @@ std::string describe_hole(double across_m, double part, double area_part) {
 
 }  // namespace
 
-MendedSurface mend_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report) {
+RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report) {
   const double diagonal = calc_box(surface.points).diagonal();
   const auto refuse_open = [&](const std::string& what) {
     throw InputError(fmt::format("{}: {}; a closed surface is needed: close its openings, or give the sheet a thickness, in a modeller",
