@@ -21,7 +21,8 @@ using rigid::kSlowest;
 using rigid::norm;
 using stream::Vec3;
 
-constexpr double kMasked = 0.01;    // of the largest impulse of the same instant, or of the same body before: 40 dB below it
+constexpr double kMasked = 0.01;    // of the largest impulse of the same instant: 40 dB below it
+constexpr double kHidden = 0.005;   // of an impulse of the same body before: 46 dB below it
 constexpr double kMaskTime = 0.05;  // s; in which the latter fades to 1/e
 
 /// 1/m_eff of the contact along the normal [1/kg], of the bodies as they were.
@@ -92,7 +93,7 @@ bool Masks::take(int body, double time_s, double impulse_n_s, double duration_s)
   Mask& mask = masks_[static_cast<std::size_t>(body)];
   mask.impulse_n_s *= std::exp(-std::max(time_s - mask.time_s, 0.0) / kMaskTime);
   mask.time_s = std::max(time_s, mask.time_s);
-  if (impulse_n_s < kMasked * mask.impulse_n_s && duration_s >= mask.duration_s) return true;
+  if (impulse_n_s < kHidden * mask.impulse_n_s && duration_s >= mask.duration_s) return true;
   if (impulse_n_s >= mask.impulse_n_s) mask = {impulse_n_s, mask.time_s, duration_s};
   return false;
 }

@@ -15,7 +15,7 @@ class Masks {
  public:
   explicit Masks(int bodies) : masks_(static_cast<std::size_t>(bodies)) {}
   /// Takes note of a pulse on a body [N s, s]. True if one before it hides it: that one was no longer, so that its spectrum reaches as
-  /// high, and is 40 dB above it, 1 dB more for every 6 ms since. In order of time, but for the length of a window.
+  /// high, and is 46 dB above it, 1 dB more for every 6 ms since. In order of time, but for the length of a window.
   bool take(int body, double time_s, double impulse_n_s, double duration_s);
 
  private:

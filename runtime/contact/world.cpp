@@ -324,11 +324,18 @@ class World::Course {
   /// What is earlier than any that may still come, in order of time; a Mark at the end.
   void emit(const Sink& sink) {
     const double mark_s = is_over() ? options_.end_s : std::max(0.0, reached_s_ - kEarliest);
-    std::stable_sort(events_.begin(), events_.end(),
-                     [](const auto& x, const auto& y) { return stream::get_time_s(x) < stream::get_time_s(y); });
-    std::size_t n = 0;
-    for (; n < events_.size() && (is_over() || stream::get_time_s(events_[n]) <= mark_s); ++n) sink(events_[n]);
-    events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(n));
+    // Events are large: their order is found by times and places alone.
+    order_.clear();
+    for (std::size_t n = 0; n < events_.size(); ++n) order_.emplace_back(stream::get_time_s(events_[n]), n);
+    std::sort(order_.begin(), order_.end());
+    later_.clear();
+    for (const auto& [time_s, n] : order_) {
+      if (is_over() || time_s <= mark_s)
+        sink(events_[n]);
+      else
+        later_.push_back(events_[n]);
+    }
+    events_.swap(later_);
     sink(stream::Mark{mark_s});
   }
 
@@ -340,7 +347,8 @@ class World::Course {
   rigid::Space space_;
   LastingContacts lasting_;
   std::optional<Masks> masks_;
-  std::vector<stream::Event> events_;  // of this window
+  std::vector<stream::Event> events_, later_;  // of this window; of those, what is not told yet
+  std::vector<std::pair<double, std::size_t>> order_;
   std::vector<char> still_;
   bool begun_ = false;
   double reached_s_ = 0.0, seconds_cpu_ = 0.0;

@@ -194,63 +194,52 @@ void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>&
   problem_.bodies.resize(movers.size() + 1);
   for (std::size_t n = 0; n < movers.size(); ++n) problem_.bodies[n] = {to_four(movers[n].velocity), to_four(movers[n].spin)};
   problem_.bodies.back() = {};
+  problem_.inertias.assign(movers.size() + 1, {});
+  for (std::size_t n = 0; n < movers.size(); ++n) {
+    if (movers[n].linkage != nullptr) continue;
+    problem_.inertias[n].inverse_mass = movers[n].inverse_mass;
+    set_columns(problem_.inertias[n].columns, movers[n].inverse_inertia);
+  }
   problem_.rows.resize(points.size());
+  problem_.arms.assign(points.size(), {});
   problem_.changes.resize(points.size());
   problem_.turnings.clear();
   problem_.locked.clear();
   problem_.responses.clear();
+  const int still = static_cast<int>(movers.size());
+  const auto is_linked = [&](int body) { return body >= 0 && movers[static_cast<std::size_t>(body)].linkage != nullptr; };
+  const auto get_axes = [](const Point& p) {
+    const Vec3 across = impact::find_across(p.normal);
+    return Mat3{p.normal, across, cross(p.normal, across)};
+  };
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& p = points[i];
     Row& row = problem_.rows[i];
-    row = {};
-    const Vec3 across = impact::find_across(p.normal);
-    const Mat3 axes{p.normal, across, cross(p.normal, across)};
-    for (std::size_t j = 0; j < 3; ++j) {
-      row.axis[j] = to_four(axes[j]);
-      for (std::size_t c = 0; c < 3; ++c) row.along[c][j] = axes[j][c];
-    }
+    const Mat3 axes = get_axes(p);
+    for (std::size_t j = 0; j < 3; ++j) row.axis[j] = to_four(axes[j]);
+    row.turning = -1;
+    row.locked = is_linked(p.a) || is_linked(p.b) ? static_cast<int>(problem_.locked.size()) : -1;
+    if (row.locked >= 0) problem_.locked.emplace_back();
     row.friction = p.friction;
     row.wanted = to_four(axes * p.wanted);
     row.impulse = to_four(axes * p.impulse);
-    const int still = static_cast<int>(movers.size());
     row.a = p.a >= 0 ? p.a : still;
     row.b = p.b >= 0 ? p.b : still;
-    bool is_linked = false;
-    const auto add = [&](int body, const Vec3& arm, double sign, double& mass, Four(&turning)[3], Four(&spun)[3]) {
-      if (body < 0) return;
-      const Mover& m = movers[static_cast<std::size_t>(body)];
-      is_linked = is_linked || m.linkage != nullptr;
-      mass = m.linkage == nullptr ? sign * m.inverse_mass : 0.0;
-      for (std::size_t j = 0; j < 3; ++j) {
-        const Vec3 couple = sign * cross(arm, axes[j]);
-        for (std::size_t c = 0; c < 3; ++c) turning[c][j] = couple[c];
-        if (m.linkage == nullptr) spun[j] = to_four(m.inverse_inertia * couple);
-      }
-    };
-    add(p.a, p.arm_a, 1.0, row.mass_a, row.turning_a, row.spun_a);
-    add(p.b, p.arm_b, -1.0, row.mass_b, row.turning_b, row.spun_b);
-    if (is_linked) {
-      lock(movers, p, axes, row);
-    } else {
-      Mat3 k{};  // mobility, axes of the point
-      for (std::size_t j = 0; j < 3; ++j) {
-        Four column = combine(row.turning_a, row.spun_a[j]) + combine(row.turning_b, row.spun_b[j]);
-        column[j] += row.mass_a - row.mass_b;
-        for (std::size_t c = 0; c < 3; ++c) k[c][j] = column[c];
-      }
-      set_columns(row.inverse, impact::calc_inverse(k));
-      row.mobility = k[0][0];
-      row.normal_mass = 1.0 / k[0][0];
-      row.tangent_mass = 1.0 / (k[1][1] + k[2][2]);  // the sum of both eigenvalues across the normal
-    }
-    if (p.rolling_m > 0.0 || p.twisting_m > 0.0) add_turning(movers, p, axes, row);
+    if (p.a >= 0) problem_.arms[i].a = to_four(p.arm_a);
+    if (p.b >= 0) problem_.arms[i].b = to_four(p.arm_b);
+  }
+  functions_->prepare(problem_);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point& p = points[i];
+    Row& row = problem_.rows[i];
+    if (row.locked >= 0) lock(movers, p, get_axes(p), row);
+    if (p.rolling_m > 0.0 || p.twisting_m > 0.0) add_turning(movers, p, get_axes(p), row);
   }
 }
 
 /// A point on bodies on joints: an impulse moves all that hangs together, and not every way is free.
 void Solver::lock(const std::vector<Mover>& movers, const Point& p, const Mat3& axes, Row& row) {
-  row.locked = static_cast<int>(problem_.locked.size());
-  Locked& locked = problem_.locked.emplace_back();
+  Locked& locked = problem_.locked[static_cast<std::size_t>(row.locked)];
   const Mat3 k = axes * (calc_mobility(movers, p) * transpose(axes));
   const double kn = k[0][0], trace = k[0][0] + k[1][1] + k[2][2];
   Mat3 range{}, unused{};

@@ -66,6 +66,7 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
   struct Candidate {
     Ref ref;
     double at;
+    double apex;  // until when it parts
   };
   std::vector<Candidate> candidates;
   for (Pair* pair : island.pairs)
@@ -79,7 +80,7 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
       if (root < 0.0) continue;
       if (approach <= 0.0 && rate <= 0.0) continue;
       const double at = approach > 0.0 ? 2.0 * gap / (approach + std::sqrt(root)) : (std::sqrt(root) - approach) / rate;
-      if (at <= h) candidates.push_back({{pair, k}, at});
+      if (at <= h) candidates.push_back({{pair, k}, at, approach < 0.0 ? -approach / rate : 0.0});
     }
   if (candidates.empty()) return false;
   const auto earliest = std::min_element(candidates.begin(), candidates.end(), [](const auto& x, const auto& y) { return x.at < y.at; });
@@ -104,9 +105,11 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
     return touch.gap_m;
   };
   if (at > 0.0) {
-    double s0 = 0.0, g0 = now.gap_m, s1 = at, g1 = look(s1);
+    // What parts and comes back closes after its apex: before it lies the end of its last touch.
+    const double apex = earliest->apex;
+    double s0 = apex, g0 = apex > 0.0 ? look(apex) : now.gap_m, s1 = at, g1 = look(s1);
     for (int n = 0; n < 8 && std::abs(g1) > kInstant && s1 != s0 && g1 != g0; ++n) {
-      const double s2 = std::clamp(s1 - g1 * (s1 - s0) / (g1 - g0), 0.0, h);
+      const double s2 = std::clamp(s1 - g1 * (s1 - s0) / (g1 - g0), apex, h);
       s0 = s1;
       g0 = g1;
       s1 = s2;

@@ -68,14 +68,27 @@ struct Row {
   Four wanted{}, impulse{};                      // see Point
 };
 
+/// What impulses and couples do to a body, world axes. Zeros for what does not move, or is on joints.
+struct Inertia {
+  double inverse_mass = 0.0;  // 1/kg
+  Four columns[3]{};          // of the inverse of the inertia [1/(kg m^2)]
+};
+
+/// From the centres of both bodies to a point, world axes [m]; 0 for what does not move.
+struct Arms {
+  Four a{}, b{};
+};
+
 /// Of the impulse of one point.
 struct Change {
   Four by{};
 };
 
 struct Problem {
-  std::vector<Body> bodies;  // the last one does not move
+  std::vector<Body> bodies;       // the last one does not move
+  std::vector<Inertia> inertias;  // of the bodies
   std::vector<Row> rows;
+  std::vector<Arms> arms;  // of the rows
   std::vector<Turning> turnings;
   std::vector<Locked> locked;
   std::vector<Response> responses;
@@ -84,6 +97,9 @@ struct Problem {
 
 /// One set of instructions. All give the same numbers.
 struct Functions {
+  /// Fills in the rows, of which bodies, axes, friction, wanted and impulse are there; of those that are locked, what bodies on joints gain
+  /// is not in them.
+  void (*prepare)(Problem&);
   /// All points, in their order or against it. Returns the square of the largest change of a velocity [m^2/s^2].
   double (*sweep)(Problem&, bool onward);
   /// Adds impulses to all points.

@@ -23,6 +23,48 @@ inline Four calc_velocity(const Problem& problem, const Row& row) {
   return combine(row.along, a.velocity - b.velocity) + (combine(row.turning_a, a.spin) + combine(row.turning_b, b.spin));
 }
 
+inline Four cross(const Four& a, const Four& b) {
+  return Four{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0.0};
+}
+
+inline void transpose(const Four (&rows)[3], Four (&columns)[3]) {
+  for (int c = 0; c < 3; ++c) columns[c] = Four{rows[0][c], rows[1][c], rows[2][c], 0.0};
+}
+
+void prepare(Problem& problem) {
+  for (std::size_t n = 0; n < problem.rows.size(); ++n) {
+    Row& row = problem.rows[n];
+    const Arms& arms = problem.arms[n];
+    const Inertia &a = problem.inertias[static_cast<std::size_t>(row.a)], &b = problem.inertias[static_cast<std::size_t>(row.b)];
+    transpose(row.axis, row.along);
+    Four couples_a[3], couples_b[3];
+    for (int j = 0; j < 3; ++j) {
+      couples_a[j] = cross(arms.a, row.axis[j]);
+      couples_b[j] = cross(row.axis[j], arms.b);
+      row.spun_a[j] = combine(a.columns, couples_a[j]);
+      row.spun_b[j] = combine(b.columns, couples_b[j]);
+    }
+    transpose(couples_a, row.turning_a);
+    transpose(couples_b, row.turning_b);
+    row.mass_a = a.inverse_mass;
+    row.mass_b = -b.inverse_mass;
+    if (row.locked >= 0) continue;
+    Four k[3];  // mobility, axes of the point, by columns
+    for (int j = 0; j < 3; ++j) {
+      k[j] = combine(row.turning_a, row.spun_a[j]) + combine(row.turning_b, row.spun_b[j]);
+      k[j][j] += row.mass_a - row.mass_b;
+    }
+    const Four x = cross(k[1], k[2]), y = cross(k[2], k[0]), z = cross(k[0], k[1]);
+    const Four rows[3] = {x, y, z};
+    transpose(rows, row.inverse);
+    const double part = 1.0 / dot(k[0], x);
+    for (Four& column : row.inverse) column *= part;
+    row.mobility = k[0][0];
+    row.normal_mass = 1.0 / k[0][0];
+    row.tangent_mass = 1.0 / (k[1][1] + k[2][2]);  // the sum of both eigenvalues across the normal
+  }
+}
+
 inline void respond(Problem& problem, const Range& range, const Four& by) {
   for (int n = range.begin; n < range.end; ++n) {
     const Response& r = problem.responses[static_cast<std::size_t>(n)];

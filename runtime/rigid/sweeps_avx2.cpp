@@ -2,6 +2,6 @@
 
 namespace carillon::rigid::sweeps {
 
-const Functions kAvx2{sweep, add, begin, share};
+const Functions kAvx2{prepare, sweep, add, begin, share};
 
 }  // namespace carillon::rigid::sweeps

@@ -2,7 +2,7 @@
 
 namespace carillon::rigid::sweeps {
 
-const Functions kPlain{sweep, add, begin, share};
+const Functions kPlain{prepare, sweep, add, begin, share};
 
 const Functions& get_functions() {
 #if defined(__x86_64__)

@@ -223,8 +223,8 @@ TEST(Masks, HideWhatIsFarWeakerThanWhatTheBodyWasStruckWithJustBefore) {
   constexpr double kLength = 5e-4;
   Masks masks(2);
   EXPECT_FALSE(masks.take(0, 1.0, 1.0, kLength));
-  EXPECT_TRUE(masks.take(0, 1.001, 0.009, kLength));
-  EXPECT_FALSE(masks.take(0, 1.001, 0.0101, kLength));
+  EXPECT_TRUE(masks.take(0, 1.001, 0.0045, kLength));
+  EXPECT_FALSE(masks.take(0, 1.001, 0.0051, kLength));
   EXPECT_FALSE(masks.take(1, 1.001, 0.001, kLength)) << "another body";
   EXPECT_TRUE(masks.take(0, 1.001, 0.001, 2.0 * kLength));
   // A hard tap is heard above a soft blow, whose spectrum ends below it.
@@ -232,7 +232,7 @@ TEST(Masks, HideWhatIsFarWeakerThanWhatTheBodyWasStruckWithJustBefore) {
   // They fade by 60 dB in a third of a second, and what is hidden hides nothing else.
   EXPECT_FALSE(masks.take(0, 1.35, 0.001, kLength));
   // Of an impact that is given late by the length of a step, nothing grows.
-  EXPECT_TRUE(masks.take(0, 1.3495, 5e-6, kLength));
+  EXPECT_TRUE(masks.take(0, 1.3495, 4e-6, kLength));
 }
 
 }  // namespace
