@@ -329,6 +329,7 @@ class Space {
   double calc_contact_radius(const shape::Touch& touch, int a, int b) const;
   bool is_fast(const Contact& contact, double h) const;
   bool find_impact(const Island& island, double h, double& at_s, std::vector<Ref>& first);
+  std::optional<double> find_instant(const Ref& ref, double apex_s, double guess_s, double h);
   bool confirm_impact(std::vector<Ref>& first, double step_s, double near_m);
   std::vector<Ref> gather_points(const Island& island, const std::vector<Ref>& first) const;
   Hit make_hit(const Contact& contact, Point& point) const;

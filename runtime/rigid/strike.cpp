@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <tuple>
 
@@ -19,7 +20,8 @@ namespace {
 using impact::cross;
 using impact::dot;
 
-constexpr double kInstant = 1e-9;      // m; how well an instant of impact is found
+constexpr double kInstant = 1e-9;      // m; how well an instant of impact is found,
+constexpr double kNear = 1e-6;         // m; and how near it must come
 constexpr std::size_t kFewPoints = 8;  // of an impact that is solved to rounding, its load shared evenly
 constexpr double kLongestHertz = 20e-3;
 
@@ -82,12 +84,24 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
       const double at = approach > 0.0 ? 2.0 * gap / (approach + std::sqrt(root)) : (std::sqrt(root) - approach) / rate;
       if (at <= h) candidates.push_back({{pair, k}, at, approach < 0.0 ? -approach / rate : 0.0});
     }
-  if (candidates.empty()) return false;
-  const auto earliest = std::min_element(candidates.begin(), candidates.end(), [](const auto& x, const auto& y) { return x.at < y.at; });
-  // The path is not quite straight: the instant of the first is looked for on it.
-  double at = earliest->at;
-  Pair& pair = *earliest->ref.pair;
-  const shape::Touch now = earliest->ref.get().touch;
+  std::stable_sort(candidates.begin(), candidates.end(), [](const auto& x, const auto& y) { return x.at < y.at; });
+  // Paths are not quite straight: the instant of the first is looked for on its path. One that does not come so far after all is none.
+  const auto earliest = std::find_if(candidates.begin(), candidates.end(), [&](Candidate& c) {
+    const std::optional<double> instant = find_instant(c.ref, c.apex, c.at, h);
+    c.at = instant.value_or(c.at);
+    return instant.has_value();
+  });
+  if (earliest == candidates.end()) return false;
+  at_s = earliest->at;
+  for (const Candidate& c : candidates)
+    if (c.at <= at_s + together_s_) first.push_back(c.ref);
+  return true;
+}
+
+/// When a touch that closes at about `guess_s`, and not before `apex_s`, does so on the path of the step; none if it does not.
+std::optional<double> Space::find_instant(const Ref& ref, double apex_s, double guess_s, double h) {
+  Pair& pair = *ref.pair;
+  const shape::Touch now = ref.get().touch;
   const auto look = [&](double s) {
     const auto get_frame = [&](int body) {
       if (body < 0) return shape::Frame{};
@@ -104,24 +118,18 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
     shape::refresh(touch, *solid(pair.a).shape, get_frame(pair.a), get_shape(pair.b), get_frame(pair.b), pair.memory);
     return touch.gap_m;
   };
-  if (at > 0.0) {
-    // What parts and comes back closes after its apex: before it lies the end of its last touch.
-    const double apex = earliest->apex;
-    double s0 = apex, g0 = apex > 0.0 ? look(apex) : now.gap_m, s1 = at, g1 = look(s1);
-    for (int n = 0; n < 8 && std::abs(g1) > kInstant && s1 != s0 && g1 != g0; ++n) {
-      const double s2 = std::clamp(s1 - g1 * (s1 - s0) / (g1 - g0), apex, h);
-      s0 = s1;
-      g0 = g1;
-      s1 = s2;
-      g1 = look(s1);
-    }
-    at = s1;
-    if (g1 > 1e-6) return false;  // it does not come so far within the step after all
+  if (!(guess_s > 0.0)) return guess_s;
+  double s0 = apex_s, g0 = apex_s > 0.0 ? look(apex_s) : now.gap_m, s1 = guess_s, g1 = look(s1);
+  for (int n = 0; n < 8 && std::abs(g1) > kInstant && s1 != s0 && g1 != g0; ++n) {
+    const double s2 = std::clamp(s1 - g1 * (s1 - s0) / (g1 - g0), apex_s, h);
+    s0 = s1;
+    g0 = g1;
+    s1 = s2;
+    g1 = look(s1);
   }
-  at_s = at;
-  for (const Candidate& c : candidates)
-    if (c.at <= earliest->at + together_s_) first.push_back(c.ref);
-  return true;
+  // A search that ends where the touch parts, or is nearest to its last one, has found that.
+  if (g1 > kNear || (s1 <= apex_s && g1 > kInstant)) return std::nullopt;
+  return s1;
 }
 
 /// Looks at the pairs of an impact again, as they are at its instant: an edge that passes another one close by was taken for a plane until
