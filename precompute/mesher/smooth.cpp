@@ -15,6 +15,7 @@ namespace carillon::mesher {
 namespace {
 
 constexpr int kMostPasses = 12;
+constexpr std::size_t kMany = 100;
 // A boundary node whose faces turn away from their mean by more than this lies on an edge (cosine of 25 degrees).
 constexpr double kSmooth = 0.906;
 
@@ -50,9 +51,13 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
   std::vector<std::vector<std::int32_t>> around(mesh.nodes.size());
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
-  const auto calc_worst = [&](std::int32_t v) {
+  // Of the elements around a node; one that is not above `least` is enough to know.
+  const auto calc_worst = [&](std::int32_t v, double least) {
     double worst = 180;
-    for (const std::int32_t e : around[v]) worst = std::min(worst, calc_element_flatness(mesh, e));
+    for (const std::int32_t e : around[v]) {
+      worst = std::min(worst, calc_element_flatness(mesh, e));
+      if (worst <= least) break;
+    }
     return worst;
   };
   const auto climb = [&](std::int32_t v) {
@@ -61,7 +66,7 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
     for (const std::int32_t e : around[v])
       for (const std::int32_t w : mesh.tet(e))
         if (w != v) length = std::min(length, norm(mesh.nodes[w] - start));
-    const double before = calc_worst(v);
+    const double before = calc_worst(v, -1e9);
     double best = before + 0.01;
     Vec3 best_place = start;
     for (const double step : {0.3, 0.15, 0.07, 0.03})
@@ -72,21 +77,37 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
         if (places[v] == Place::kSkin) place = project(place);
         if (norm(place - start) > 0.5 * length) continue;
         mesh.nodes[v] = place;
-        if (const double worst = calc_worst(v); worst > best) best = worst, best_place = place;
+        if (const double worst = calc_worst(v, best); worst > best) best = worst, best_place = place;
       }
     mesh.nodes[v] = best_place;
     return best_place != start;
   };
+  // A node that found no better place finds none until one next to it has moved.
+  std::vector<char> is_stuck(mesh.nodes.size(), 0);
+  const auto move = [&](std::int32_t v) {
+    if (is_stuck[v]) return false;
+    if (!climb(v)) {
+      is_stuck[v] = 1;
+      return false;
+    }
+    for (const std::int32_t e : around[v])
+      for (const std::int32_t w : mesh.tet(e)) is_stuck[w] = 0;
+    return true;
+  };
   std::int64_t moved = 0;
+  std::size_t last = mesh.tets.size();
   for (int pass = 0; pass < kMostPasses; ++pass) {
     std::vector<std::pair<double, std::int32_t>> flat;
     for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
       if (const double angle = calc_element_flatness(mesh, e); angle < angle_deg) flat.emplace_back(angle, e);
+    // Where many do not become fewer it is the body that is flat there.
+    if (flat.size() > kMany && flat.size() >= last) break;
+    last = flat.size();
     std::sort(flat.begin(), flat.end());
     std::int64_t moves = 0;
     for (const auto& [angle, e] : flat)
       for (const std::int32_t v : mesh.tet(e))
-        if (places[v] != Place::kEdge && calc_element_flatness(mesh, e) < angle_deg && climb(v)) ++moves;
+        if (places[v] != Place::kEdge && calc_element_flatness(mesh, e) < angle_deg && move(v)) ++moves;
     moved += moves;
     if (moves == 0) break;
   }

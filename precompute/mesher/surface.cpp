@@ -42,8 +42,9 @@ constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
 constexpr std::size_t kMostRounded = 100'000;  // triangles
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
-// Processor seconds after which the program gives up (guard_program). The hollow bunny of 37,000 nodes takes 7 s and is given 336 s.
-constexpr double kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
+// Processor seconds after which the program gives up (guard_program), of the repair and of what follows. The hollow bunny of 37,000 nodes
+// takes 7 s and is given 657 s.
+constexpr double kLeastCpuOfRepair = 5, kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
 constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
 /// Tells the user of a phase and keeps its time.
@@ -471,9 +472,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   Body body;
   TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
   report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
-  const double nodes_asked = static_cast<double>(options.nodes.value_or(30000));
-  std::optional<CpuLimit> cpu_limit(std::in_place,
-                                    kLeastCpu + kCpuPerTriangle * static_cast<double>(raw.triangles.size()) + kCpuPerNode * nodes_asked);
+  std::optional<CpuLimit> cpu_limit(std::in_place, kLeastCpuOfRepair + kCpuPerTriangle * static_cast<double>(raw.triangles.size()) +
+                                                       kCpuPerNode * static_cast<double>(options.nodes.value_or(0)));
   scale_surface(raw, options, report);
   tell_roughly(raw, options, phases);
   body.repaired = phases.run("repairing", [&] { return repair_surface(std::move(raw), options, report); });
@@ -491,11 +491,9 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
                                  options.surface.string(), edge, nodes, kMostNodes));
   const double least = calc_least_nodes(body);
-  if (!options.nodes) {
-    cpu_limit.reset();
-    cpu_limit.emplace(kLeastCpu + kCpuPerTriangle * static_cast<double>(report.input_triangles) +
-                      kCpuPerNode * std::max(body.model.calc_nodes(edge), least));
-  }
+  cpu_limit.reset();
+  cpu_limit.emplace(kLeastCpu + kCpuPerTriangle * static_cast<double>(report.input_triangles) +
+                    kCpuPerNode * (options.nodes ? static_cast<double>(*options.nodes) : std::max(body.model.calc_nodes(edge), least)));
   if (!options.nodes && least > 1.5 * kMostNodes) throw_count(options, CountError("", least, least));
   if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * least)
     throw_count(options, CountError("", least, least));
@@ -508,6 +506,9 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   body.nearest.emplace(surface);
   if (body.wall_m > 0 || !body.repaired.clean || report.method == Method::kStuffing)
     body.field = phases.run("computing distances", [&] { return make_field(body, options, edge); });
+  // Refinement of what is too thin for its elements takes long, and would fall short of it in the end.
+  if (body.field)
+    if (const std::string lost = find_lost(body, edge); !lost.empty()) throw_wrong(options, body, WrongMesh(lost, edge));
   report.expected_volume_m3 = body.field ? calc_volume(*body.field, body.wall_m) : report.input_volume_m3;
   if (body.wall_m > 0) {
     body.model.volume_m3 = report.expected_volume_m3;

@@ -117,7 +117,37 @@ std::int64_t count_parts(const std::vector<Triangle>& boundary, std::size_t node
   return static_cast<std::int64_t>(split_parts(skin).size());
 }
 
+/// Where a mesh of this extent falls short of the body by more than coarse elements explain; empty if nowhere.
+std::string describe_lost(const Body& body, const Vec3& made, double edge_m) {
+  const Vec3 wanted = calc_used_box(body.repaired.surface).extent();
+  std::string text;
+  for (int c = 0; c < 3; ++c) {
+    const double extent = wanted[c] - 2 * body.repaired.offset_m, lost = extent - made[c];
+    if (lost > kMostLost * extent && lost > kMostLostEdges * edge_m)
+      text = fmt::format("is {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", made[c],
+                         "xyz"[c], extent);
+  }
+  return text;
+}
+
 }  // namespace
+
+std::string find_lost(const Body& body, double edge_m) {
+  const DistanceField& field = *body.field;
+  std::array<std::int32_t, 3> low = field.size, high{-1, -1, -1};
+  std::size_t n = 0;
+  for (std::int32_t k = 0; k < field.size[2]; ++k)
+    for (std::int32_t j = 0; j < field.size[1]; ++j)
+      for (std::int32_t i = 0; i < field.size[0]; ++i, ++n) {
+        if (!(field.samples[n] < 0)) continue;
+        const std::array<std::int32_t, 3> at{i, j, k};
+        for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], at[c]), high[c] = std::max(high[c], at[c]);
+      }
+  // The skin is less than a sample beyond the last one inside.
+  Vec3 made{};
+  for (int c = 0; c < 3; ++c) made[c] = high[c] < 0 ? 0 : field.voxel_m * (high[c] - low[c] + 2);
+  return describe_lost(body, made, edge_m);
+}
 
 Shells count_shells(const Body& body, double edge_m) {
   Shells shells;
@@ -187,13 +217,9 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
   // Of a hollow that was filled where elements are as long as the wall is thick several times over.
   result.lacks_part =
       !result.fault.empty() && result.shells < expectation.shells.least && body.wall_m > 0 && edge > kHopelessWalls * body.wall_m;
-  const Vec3 wanted = calc_used_box(body.repaired.surface).extent(), made = calc_box(linear.nodes).extent();
-  for (int c = 0; c < 3; ++c) {
-    const double extent = wanted[c] - 2 * body.repaired.offset_m, lost = extent - made[c];
-    if (lost <= kMostLost * extent || lost <= kMostLostEdges * edge) continue;
+  if (std::string lost = describe_lost(body, calc_box(linear.nodes).extent(), edge); !lost.empty()) {
     result.lacks_part = true;
-    result.fault = fmt::format("is {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", made[c],
-                               "xyz"[c], extent);
+    result.fault = std::move(lost);
   }
   return result;
 }

@@ -14,6 +14,10 @@ struct Shells {
 };
 Shells count_shells(const Body& body, double edge_m);
 
+/// Of a body that is known by its distance field alone: what its elements cannot show, since not even the field does, as the end of a
+/// sentence "the mesh ...". Empty if there is nothing.
+std::string find_lost(const Body& body, double edge_m);
+
 /// What the mesh is compared with, beyond the body.
 struct Expectation {
   double edge_m = 0;

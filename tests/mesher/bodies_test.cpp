@@ -8,7 +8,9 @@
 #include <set>
 
 #include "precompute/mesh/check.hpp"
+#include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/surface.hpp"
+#include "precompute/mesher/tet_quality.hpp"
 #include "runtime/config/error.hpp"
 #include "tests/mesher/surfaces.hpp"
 
@@ -313,11 +315,14 @@ TEST(bodies, a_part_that_elements_are_too_coarse_for_is_not_left_out_in_silence)
                {12, 13, 15, 14}};
     SurfaceOptions options{.surface = write_text("fin.off", to_off(s)), .edge_m = 0.012, .facets = true, .method = Method::kStuffing};
     SurfaceReport report;
+    std::vector<std::string> phases;
     if (thickness < 0.001) {
       try {
-        mesh_surface(options, report);
+        mesh_surface(options, report, [&](std::string_view phase) { phases.emplace_back(phase); });
         ADD_FAILURE() << "was meshed without its fin: " << report.mesh_extent_m[0] << " m";
       } catch (const InputError& error) {
+        EXPECT_EQ(std::count(phases.begin(), phases.end(), "computing distances"), 1);
+        EXPECT_EQ(std::count(phases.begin(), phases.end(), "refining"), 0) << "the field shows already that it is too thin";
         EXPECT_NE(
             std::string(error.what()).find("long along x where the body is 0.15 m: parts thinner than its elements are missing; ask for"),
             std::string::npos)
@@ -329,6 +334,33 @@ TEST(bodies, a_part_that_elements_are_too_coarse_for_is_not_left_out_in_silence)
       EXPECT_NEAR(report.mesh_extent_m[0], 0.15, 0.003);
     }
   }
+}
+
+TEST(bodies, elements_of_what_is_flat_itself_are_not_improved_for_long) {
+  // A sheet of one layer, a hundred times as wide as it is thick in each element: no place of its nodes makes an element less flat by much.
+  constexpr int kCells = 20;
+  mesh::TetMesh sheet;
+  const auto at = [](int i, int j, int k) { return static_cast<std::int32_t>((k * (kCells + 1) + j) * (kCells + 1) + i); };
+  for (int k = 0; k < 2; ++k)
+    for (int j = 0; j <= kCells; ++j)
+      for (int i = 0; i <= kCells; ++i)
+        sheet.nodes.push_back({0.1 * i + 0.02 * std::sin(7.0 * j), 0.1 * j + 0.02 * std::sin(5.0 * i), 0.001 * k});
+  for (int j = 0; j < kCells; ++j)
+    for (int i = 0; i < kCells; ++i) {
+      std::array<int, 3> order{0, 1, 2};
+      do {  // six elements of a cell, each along a way from one corner to the opposite one
+        std::array<int, 3> corner{i, j, 0};
+        std::array<std::int32_t, 4> tet{at(corner[0], corner[1], corner[2]), 0, 0, 0};
+        for (int n = 0; n < 3; ++n) ++corner[order[n]], tet[n + 1] = at(corner[0], corner[1], corner[2]);
+        const bool is_even = (order[1] - order[0] + 3) % 3 == 1;
+        if (!is_even) std::swap(tet[2], tet[3]);
+        sheet.tets.insert(sheet.tets.end(), tet.begin(), tet.end());
+      } while (std::next_permutation(order.begin(), order.end()));
+    }
+  ASSERT_EQ(sheet.tet_count(), 6 * kCells * kCells);
+  ASSERT_GT(measure(sheet).volume_m3, 0.0);
+  const std::int64_t moved = better_flat_elements(sheet, 12, [](const Vec3& p) { return p; });
+  EXPECT_LT(moved, static_cast<std::int64_t>(sheet.nodes.size()));
 }
 
 TEST(bodies, small_and_slender_targets_are_met) {
