@@ -128,7 +128,7 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
     for (auto face = first; face != last && face + 1 != last; ++face) {
       if (!same(face[0], face[1])) continue;
       if (face + 2 != last && same(face[0], face[2]))
-        throw InputError(fmt::format("tetrahedra {}, {} and {} share one face (nodes {}, {}, {}); at most two can. Mend the mesh",
+        throw InputError(fmt::format("tetrahedra {}, {} and {} share one face (nodes {}, {}, {}); at most two can. Correct the mesh",
                                      face[0].element, face[1].element, face[2].element, low, face->middle, face->high));
       neighbours[face[0].element][degree[face[0].element]++] = face[1].element;
       neighbours[face[1].element][degree[face[1].element]++] = face[0].element;

@@ -143,7 +143,7 @@ std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::stri
 }
 
 bool is_submitted_again(const registry::Job& job, bool has_work) {
-  const bool is_lost = job.state == registry::State::failed && (!has_work || job.attempts == 0);  // a retry has nothing to go on with
+  const bool is_lost = job.state == registry::State::failed && (!has_work || job.attempts == 0);  // a retry has nothing to resume
   return job.state == registry::State::cancelled || is_lost;
 }
 

@@ -39,7 +39,7 @@ using registry::Job;
 using registry::State;
 
 constexpr std::size_t kMostCandidates = 256;
-constexpr int kMostRounds = 3;       // of reading what new jobs need, before the next step goes on with it
+constexpr int kMostRounds = 3;       // of reading what new jobs need, before the next step uses it
 constexpr double kDrawingHosts = 4;  // Smaller machines than so many drawings take give no job memory for them.
 constexpr double kAskAgainS = 5.0, kDiskPatienceS = 2.0, kLostPatienceS = 60.0;
 

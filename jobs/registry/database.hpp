@@ -27,7 +27,7 @@ class Database {
 
   void run(const char* sql);
   sqlite3* get() const { return handle_; }
-  /// Throws what `code`, an error of SQLite, means: Damaged, or SystemError with the mend.
+  /// Throws what `code`, an error of SQLite, means: Damaged, or SystemError with the remedy.
   [[noreturn]] void fail(int code) const;
 
  private:

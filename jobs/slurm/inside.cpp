@@ -20,7 +20,7 @@
 namespace carillon::slurm {
 namespace {
 
-/// For what another run with the same memory will not mend, the row's keeper decides.
+/// For what another run with the same memory will not cure, the row's keeper decides.
 bool is_for_outside(outcome::Cause cause) { return cause == outcome::Cause::memory; }
 
 }  // namespace

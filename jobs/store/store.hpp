@@ -83,7 +83,7 @@ class Store {
  public:
   /// Opens the store in `folder`, which is made when there is none. Throws InputError: the folder holds something else, or a newer store;
   /// one of its own folders is a link or a file;
-  /// no right to write there (names owner, group and mend). SystemError: the disk refuses. Where the folder is writable by its group, all
+  /// no right to write there (names owner, group and remedy). SystemError: the disk refuses. Where the folder is writable by its group, all
   /// that this process makes from then on is too (umask).
   static Store open(const std::filesystem::path& folder);
   /// The same, but a store that this process may only read (another user's, a disk mounted read-only) is taken as it is and nothing is made

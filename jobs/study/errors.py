@@ -3,7 +3,7 @@ import unicodedata
 
 
 class InputError(Exception):
-    """What the user can mend."""
+    """What the user can correct."""
 
 
 class RunError(Exception):

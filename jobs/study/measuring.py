@@ -24,7 +24,7 @@ class Cost:
 @functools.cache
 def find_kernels():
     """(kernels, text): OpenBLAS's kernels for every program that is measured, and why these. A release of OpenBLAS that is older than the
-    processor takes kernels without AVX: carillon-precompute mends that by itself, its rivals would be slow for no fault of theirs."""
+    processor takes kernels without AVX: carillon-precompute corrects that by itself, its rivals would be slow for no fault of theirs."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
     child = subprocess.run([sys.executable, "-c", ASK_KERNELS], env=environment, capture_output=True, text=True)
     if child.returncode != 0:

@@ -16,33 +16,33 @@ MOST_BYTES = 16 << 20
 QUICK_NODES = [600, 1200]
 
 
-def read_text(path, what, mend):
-    """The text of a regular file of modest size. InputError says what cannot be read, and the mend."""
+def read_text(path, what, remedy):
+    """The text of a regular file of modest size. InputError says what cannot be read, and the remedy."""
     try:
         status = os.stat(path)
         if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{path}: this is no regular file; {mend}")
+            raise InputError(f"{path}: this is no regular file; {remedy}")
         if status.st_size > MOST_BYTES:
             raise InputError(f"{path}: a {what} of {status.st_size} bytes; at most {MOST_BYTES} are read")
         return pathlib.Path(path).read_text()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: the {what} cannot be read: {error}; {mend}") from None
+        raise InputError(f"{path}: the {what} cannot be read: {error}; {remedy}") from None
 
 
-def parse(text, path, mend):
+def parse(text, path, remedy):
     """The JSON value of a text. InputError names the line."""
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
-        raise InputError(f"{path}:{error.lineno}: this is no JSON: {error.msg}; {mend}") from None
+        raise InputError(f"{path}:{error.lineno}: this is no JSON: {error.msg}; {remedy}") from None
     except (ValueError, RecursionError) as error:  # numbers of thousands of digits, thousands of brackets
-        raise InputError(f"{path}: this is no JSON that can be read: {error}; {mend}") from None
+        raise InputError(f"{path}: this is no JSON that can be read: {error}; {remedy}") from None
 
 
 def read_job(path):
     """The job's object; comments and all errors are carillon-precompute's own business, which says them better."""
-    mend = "give a job of carillon-precompute"
-    job = parse(strip_comments(read_text(path, "job", mend)), path, mend)
+    remedy = "give a job of carillon-precompute"
+    job = parse(strip_comments(read_text(path, "job", remedy)), path, remedy)
     if not isinstance(job, dict):
         raise InputError(f"{path}: a job is a JSON object")
     return job

@@ -34,13 +34,13 @@ def write(path, study):
 
 def read(path):
     """A record as write() made it. InputError names what is missing in it."""
-    mend = f"make it anew with --record {path}"
-    record = scaling.parse(scaling.read_text(path, "record", mend), path, mend)
+    remedy = f"make it anew with --record {path}"
+    record = scaling.parse(scaling.read_text(path, "record", remedy), path, remedy)
     if not isinstance(record, dict) or record.get("format") != FORMAT or not isinstance(record.get("job"), dict) or not isinstance(record.get("cases"), list):
-        raise scaling.InputError(f"{path}: this is no record of a study; {mend}")
+        raise scaling.InputError(f"{path}: this is no record of a study; {remedy}")
     for number, case in enumerate(record["cases"], 1):
         if fault := find_fault(case):
-            raise scaling.InputError(f"{path}: case {number} of the record {fault}; {mend}")
+            raise scaling.InputError(f"{path}: case {number} of the record {fault}; {remedy}")
     return record
 
 

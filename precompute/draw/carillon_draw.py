@@ -40,7 +40,7 @@ FIXED = [(0.55, 0.66, 0.80), (0.72, 0.74, 0.78), (0.80, 0.66, 0.46), (0.62, 0.74
 
 
 class InputError(Exception):
-    """The input cannot be used; the message says what would mend it."""
+    """The input cannot be used; the message says what would correct it."""
 
 
 class SystemError_(Exception):

@@ -1,5 +1,5 @@
 // Method:     The narrow block is packed, a panel of rows at a time that stays in the second-level cache; the wide block streams past it, a
-//             few columns at a time, in strips that stay in the first level and are called from memory one strip ahead. Sums and
+//             few columns at a time, in strips that stay in the first level and are fetched one strip ahead. Sums and
 //             coefficients live in registers (6 x 4 tiles).
 // Source:     Goto, van de Geijn, Anatomy of high-performance matrix multiplication, ACM TOMS 34(3), 2008 (panels, register tiles).
 // Deviations: the wide block is not packed: it is used once, and packing it costs BLAS half its speed for 16 columns (figures:

@@ -65,7 +65,7 @@ struct LanczosState {
   std::int64_t size() const { return sizes[2]; }
 };
 
-/// Saves an iteration on its way and goes on with one.
+/// Saves an iteration on its way, and resumes one.
 struct LanczosKeeper {
   std::function<Wish()> ask;                                            // local, every step
   std::function<void(const LanczosState&, const Columns& basis)> save;  // collective

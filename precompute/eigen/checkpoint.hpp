@@ -1,4 +1,4 @@
-// A solve that is saved on its way and gone on with later, by as many ranks as one likes.
+// A solve that is saved on its way and resumed later, by as many ranks as one likes.
 #pragma once
 
 #include <cstdint>
@@ -31,11 +31,11 @@ struct Checkpoint {
   std::int64_t column_count = 0;  // and how many columns belong to it
   /// Reads the columns from `first` on into this rank's rows. Collective. Throws SystemError on every rank.
   std::function<void(std::int64_t first, const Columns& into)> read;
-  /// Says why the state cannot be gone on from; the solve then begins anew. Collective.
+  /// Says why the state cannot be resumed from; the solve then begins anew. Collective.
   std::function<void(const std::string& why)> reject;
 };
 
-/// Thrown on every rank alike after a rank was asked to stop: what can be gone on with is saved.
+/// Thrown on every rank alike after a rank was asked to stop: what can be resumed is saved.
 class Stopped : public std::exception {
  public:
   const char* what() const noexcept override { return "stopped"; }

@@ -1,4 +1,4 @@
-// What a solve needs, known before it is begun; the solver itself and those who foresee it reckon alike.
+// What a solve needs, known before it is begun; the solver itself and those who predict it reckon alike.
 #pragma once
 
 #include <cstdint>

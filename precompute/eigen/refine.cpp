@@ -1,5 +1,5 @@
 // Method:     A few bad modes go through the operator at hand once more, (K - sigma M)^-1 M phi, and are made orthogonal to the others:
-//             that mends what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration
+//             that corrects what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration
 //             with sigma just below the group damps everything farther from sigma than the group is. It is written as a correction, phi -
 //             (K - sigma M)^-1 (K phi - lambda M phi), so that it ends at the modes of K and M and not at those of the factors' rounding,
 //             which differ for thin bodies. Rayleigh-Ritz within the group parts its members; Gram-Schmidt from the lowest mode up makes
@@ -107,7 +107,7 @@ double stand_below(const RefineRequest& request, const Group& group, double near
   throw SolveError("K - sigma M is singular all around a mode: the mesh has nodes without mass or stiffness.");
 }
 
-// The modes of a group, and what they have to be mended by: (K - sigma M)^-1 (K phi - lambda M phi), with the factor that stands.
+// The modes of a group, and what they have to be corrected by: (K - sigma M)^-1 (K phi - lambda M phi), with the factor that stands.
 struct Corrections {
   Corrections(const RefineRequest& request, const Group& group, const std::vector<double>& lambda, const Columns& all, RefineCost& cost)
       : rows(static_cast<std::size_t>(all.rows)),
@@ -203,21 +203,21 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
     }
     ritz = calc_ritz(operators, x, work);
   }
-  const ModeErrors mended = normalise_and_measure(operators, ritz, polished);
+  const ModeErrors corrected = normalise_and_measure(operators, ritz, polished);
   double before = 0, after = 0;
   for (std::size_t j = 0; j < bad.size(); ++j) {
     before = std::max(before, errors.residual[bad[j]] / std::max(request.tolerance, errors.floor[bad[j]]));
-    after = std::max(after, mended.residual[j] / std::max(request.tolerance, mended.floor[j]));
+    after = std::max(after, corrected.residual[j] / std::max(request.tolerance, corrected.floor[j]));
   }
-  if (!(after < before) || std::max(overlap, mended.orthonormality) > kOrthonormal) return;
+  if (!(after < before) || std::max(overlap, corrected.orthonormality) > kOrthonormal) return;
   const LocalColumns own(polished);
   for (std::size_t j = 0; j < bad.size(); ++j) {
     std::copy_n(own.column(static_cast<PetscInt>(j)), own.rows, all.column(static_cast<int>(bad[j])));
     lambda[bad[j]] = ritz[j];
-    errors.residual[bad[j]] = mended.residual[j];
-    errors.floor[bad[j]] = mended.floor[j];
+    errors.residual[bad[j]] = corrected.residual[j];
+    errors.floor[bad[j]] = corrected.floor[j];
   }
-  errors.orthonormality = std::max({errors.orthonormality, overlap, mended.orthonormality});
+  errors.orthonormality = std::max({errors.orthonormality, overlap, corrected.orthonormality});
 }
 
 // Gram-Schmidt must go upwards in lambda, and refined values may have passed their neighbours.
@@ -255,8 +255,8 @@ RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lamb
       const double sigma = stand_below(request, group, nearness, lambda, cost);
       const LocalColumns access(shapes);
       const Columns all = access.view();
-      Corrections mend(request, group, lambda, all, cost);
-      const std::vector<double> size = mend.calc_norms(request);
+      Corrections corrections(request, group, lambda, all, cost);
+      const std::vector<double> size = corrections.calc_norms(request);
       double worst = 0;
       for (std::size_t c = 0; c < group.size(); ++c) {
         const std::size_t j = group[c];
@@ -264,7 +264,7 @@ RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lamb
         worst = std::max(worst, certified[j]);
       }
       if (worst <= request.tolerance || round + 1 == kRounds.size()) continue;
-      mend.apply(request, group, lambda, all);
+      corrections.apply(request, group, lambda, all);
       is_mended = true;
     }
     if (!is_mended) {

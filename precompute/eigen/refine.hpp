@@ -1,4 +1,4 @@
-// Mends modes whose residual is above the tolerance.
+// Corrects modes whose residual is above the tolerance.
 #pragma once
 
 #include <petscmat.h>

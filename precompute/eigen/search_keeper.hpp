@@ -1,4 +1,4 @@
-// What a search for the modes of a band has found out, kept so that it can be gone on with.
+// What a search for the modes of a band has found out, kept so that it can be resumed.
 #pragma once
 
 #include <mpi.h>
@@ -27,7 +27,7 @@ struct SearchStep {
 };
 
 /// Keeps the steps of a search, the modes found and the basis of the iteration that is under way, and gives them back: a search that is
-/// gone on with goes its way once more from the start, is told what its steps came to, and does by itself what it was not told. Where it
+/// resumed goes its way once more from the start, is told what its steps came to, and does by itself what it was not told. Where it
 /// asks for something else than it did before, the rest of what was kept is forgotten. Everything is collective but the get_ functions, and
 /// without a checkpoint nothing happens.
 class SearchKeeper {

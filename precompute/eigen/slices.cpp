@@ -70,7 +70,7 @@ Sweep::Sweep(const Slice& band, std::int64_t most, CountBelow count_below)
 bool Sweep::is_last() const { return rest_.count() <= most_ || rest_.high - rest_.low < kNarrow * rest_.high; }
 
 Sweep::Part Sweep::take() {
-  constexpr int kTrials = 3;  // by what the counts foresee, then by halves
+  constexpr int kTrials = 3;  // by what the counts predict, then by halves
   const double parts = std::ceil(static_cast<double>(rest_.count()) / static_cast<double>(most_));
   const double share = static_cast<double>(rest_.count()) / parts;
   const auto below_low = static_cast<double>(rest_.below_low);

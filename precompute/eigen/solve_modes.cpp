@@ -600,7 +600,7 @@ RefineRequest BandSolver::make_refine_request(double tolerance) {
   return request;
 }
 
-/// Mending has a factor of its own, which is not the story of the solve; its work counts.
+/// The correction has a factor of its own, which is not the story of the solve; its work counts.
 template <class Step>
 void BandSolver::add_cost(Step&& step) {
   const FactorStatistics before = modes_.factor;
@@ -624,7 +624,7 @@ void BandSolver::refine(double tolerance, ModeErrors& errors) {
     if (is_accepted(errors, j, options_.tolerance)) continue;
     throw SolveError(
         fmt::format("Mode {} at {:.6g} Hz has the relative residual {:.2g}, above the tolerance {:.2g} and above what rounding "
-                    "explains ({:.2g}). Take a looser tolerance, or mend the thinnest elements of the mesh.",
+                    "explains ({:.2g}). Take a looser tolerance, or correct the thinnest elements of the mesh.",
                     j, to_hz(modes_.lambda[j]), errors.residual[j], options_.tolerance, errors.floor[j]));
   }
 }
@@ -678,7 +678,7 @@ void BandSolver::finish() {
     if (errors.residual[j] <= std::max(kWorstResidual, options_.tolerance)) continue;
     throw SolveError(fmt::format(
         "Mode {} at {:.6g} Hz is so slow beside the stiffest of the body that rounding leaves a relative residual of {:.2g} in it, "
-        "more than {:g}. Let the band begin above it, or mend what is far stiffer than the rest: thin elements, or a material.",
+        "more than {:g}. Let the band begin above it, or correct what is far stiffer than the rest: thin elements, or a material.",
         j, to_hz(modes_.lambda[j]), errors.residual[j], kWorstResidual));
   }
   counter_.reset();

@@ -17,7 +17,7 @@ namespace {
 constexpr double kOctave = 1200.0;  // cents
 
 /// The bar that a mode at `top` can have, which is not below the last. at: places of the modes [cents], ascending.
-double foresee(std::span<const double> at, std::span<const double> cents, double top) {
+double predict(std::span<const double> at, std::span<const double> cents, double top) {
   const std::size_t count = at.size();
   const auto octave = static_cast<std::size_t>(std::upper_bound(at.begin(), at.end(), top - kOctave) - at.begin());
   const std::size_t first = std::min(octave, count - (count + 3) / 4);  // at least a quarter of the list
@@ -51,7 +51,7 @@ std::vector<double> widen_for_order(std::span<const double> lambda, const OwnBar
   std::sort(low.begin(), low.end());
   std::sort(high.begin(), high.end());
   const double top = unlisted.high_hz > 0 ? std::max(at[count - 1], place_hz(unlisted.high_hz)) : at[count - 1];
-  const double least = top - foresee(at, own.cents, top);  // of all above
+  const double least = top - predict(at, own.cents, top);  // of all above
   double most = at[0] - 1e9;                               // of all below
   if (unlisted.below > 0 && unlisted.low_hz > 0) {
     const double bottom = std::min(at[0], place_hz(unlisted.low_hz));

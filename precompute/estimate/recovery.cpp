@@ -100,7 +100,7 @@ std::array<double, 4> find_place(int samples, int s) {
 std::array<float, 36> calc_root(const Solid& solid) {
   using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
   const Eigen::LLT<Matrix6> llt(Eigen::Map<const Matrix6>(solid.elasticity_pa.data()));
-  if (llt.info() != Eigen::Success) throw InputError("a material's elasticity is not positive definite; mend its constants");
+  if (llt.info() != Eigen::Success) throw InputError("a material's elasticity is not positive definite; correct its constants");
   std::array<float, 36> root{};
   const Matrix6 upper = llt.matrixU();
   for (int i = 0; i < 36; ++i) root[i] = static_cast<float>(upper.data()[i]);

@@ -197,7 +197,7 @@ void Search::give_up(const std::string& why) const {
       fmt::format("{}: key 'accuracy_cents': {}; {}; {}", run_.job.file.string(), describe_reached(), why, describe(forecast_next())));
 }
 
-/// Why a mesh file whose surface is not that of the body ends at `cents`, and what would mend it.
+/// Why a mesh file whose surface is not that of the body ends at `cents`, and what would correct it.
 std::string Search::describe_surface(double cents) const {
   const mesh::CheckReport& check = current_.body.check;
   const std::string end =
@@ -386,7 +386,7 @@ AccurateBody Search::solve() {
     }
     petsc::run_agreed(run_.comm, [&] {
       if (run_.rank == 0) decision = decide();
-      // CPU seconds have a say in it, and differ from run to run; a run that is gone on with takes the mesh that the other took.
+      // CPU seconds have a say in it, and differ from run to run; a run that is resumed takes the mesh that the other took.
       if (const Setting* kept = run_.checkpoint ? run_.checkpoint->find_setting(report_.trials.size()) : nullptr;
           kept != nullptr && decision.is_done == 0)
         decision.setting = *kept;

@@ -51,9 +51,9 @@ struct AccurateBody {
 /// Solves the job's body in the cheapest setting whose largest error bar is no more than the job's accuracy_cents: a coarse one first,
 /// whose error bars tell by their rates of convergence how fine the mesh has to be, with tetrahedra of four and of ten nodes; then that
 /// one; then finer ones while they do not meet it. Bodies are meshed as fine as is needed; a mesh file is taken with either element and
-/// refined uniformly, which cannot mend the facets it was made with. Says on the way what it tries, and at the end what the next stricter
-/// setting would cost. Collective. Throws on every rank what the solve throws, and SolveError when no setting within reach meets it, with
-/// what was reached, why no more, and what the next stricter setting would cost.
+/// refined uniformly, which cannot correct the facets it was made with. Says on the way what it tries, and at the end what the next
+/// stricter setting would cost. Collective. Throws on every rank what the solve throws, and SolveError when no setting within reach meets
+/// it, with what was reached, why no more, and what the next stricter setting would cost.
 AccurateBody solve_to_accuracy(Run& run);
 
 /// What solve_to_accuracy() tries first.

@@ -361,7 +361,7 @@ void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into
   }
 }
 
-/// Says why the file is not gone on from, and gives it another name: it may be worth something to somebody.
+/// Says why the file is not resumed from, and gives it another name: it may be worth something to somebody.
 void CheckpointFile::set_aside(const std::string& why) {
   is_there_ = false;
   checkpoint_.numbers.clear();
@@ -369,7 +369,7 @@ void CheckpointFile::set_aside(const std::string& why) {
   if (rank_ == 0) {
     const fs::path aside = file_.string() + ".aside";
     const bool is_moved = ::rename(file_.c_str(), aside.c_str()) == 0;
-    stations_.warn(fmt::format("{}: the checkpoint is not gone on from, because {}{}", file_.string(), why,
+    stations_.warn(fmt::format("{}: the checkpoint is not resumed from, because {}{}", file_.string(), why,
                                is_moved ? "; it is now " + aside.filename().string() : ""));
   }
   MPI_Barrier(comm_);

@@ -1,4 +1,4 @@
-// The file that a solve is saved to on its way, and gone on with from.
+// The file that a solve is saved to on its way, and resumed from.
 #pragma once
 
 #include <mpi.h>
@@ -45,7 +45,7 @@ class CheckpointFile {
   eigen::Wish vote() const;
   /// From now on the run goes to its end, which is near.
   void finish();
-  /// The bank is whole: nothing is to be gone on with.
+  /// The bank is whole: nothing is to be resumed.
   void remove();
   /// Whether this run has saved something.
   bool was_saved() const { return was_saved_; }

@@ -47,7 +47,7 @@ void handle(int signal) {
   if (own_rank == 0) {
     say("carillon-precompute: stopped by ");
     say(find_name(signal));
-    say(is_to_save ? "; what the checkpoint holds can be gone on from\n" : "; the bank was not touched, or it is whole\n");
+    say(is_to_save ? "; the run can be resumed from the checkpoint\n" : "; the bank was not touched, or it is whole\n");
   } else {
     poll(nullptr, 0, kFirstRankMs);  // mpirun ends all ranks with the first that ends, which is to be the one that speaks
   }

@@ -179,7 +179,7 @@ RunSummary describe_stop(const Run& run) {
   summary.is_stopped = true;
   summary.result = fmt::format("stopped by {}; {}", find_stop_name(),
                                run.checkpoint->was_saved() ? "the same command resumes from " + run.options.checkpoint.string()
-                                                           : "what the checkpoint held before, if anything, can be gone on from");
+                                                           : "the run can be resumed from the checkpoint there was before, if any");
   return summary;
 }
 

@@ -53,7 +53,7 @@ struct Panel {
 struct Kernels {
   /// X -= A in, A (m, n) in tiles; in: n rows. Of X, rows 3 nodes[i], 3 nodes[i] + 1 and 3 nodes[i] + 2 are meant for i < m / 3.
   void (*subtract_product)(const double* tiles, int m, int n, int vectors, const double* in, const int* nodes, double* x);
-  /// out (n rows) -= A^T X. next: what will be read after A; it is called from memory meanwhile.
+  /// out (n rows) -= A^T X. next: what will be read after A; it is fetched meanwhile.
   void (*subtract_transposed)(const double* tiles, int m, int n, int vectors, const int* nodes, double* x, double* out, const double* next);
   /// out (n rows) = T in, T a lower triangle in tiles.
   void (*set_triangle)(const double* tiles, int n, int vectors, const double* in, double* out);

@@ -17,7 +17,7 @@ namespace {
 typedef double Vector __attribute__((vector_size(64)));
 
 /// Numbers of L to call ahead of their use, from memory to the second-level cache and then to the first: the order of use inside a tile is
-/// not what the processor foresees.
+/// not what the processor predicts.
 constexpr int kFar = 512;
 constexpr int kNear = 256;
 constexpr int kLine = 8;
@@ -48,7 +48,7 @@ inline TileRows<kStride> find_rows(Vector* first) {
   return rows;
 }
 
-/// Rows of the first `count` of some nodes. Those of the next four, which come next, are called from memory.
+/// Rows of the first `count` of some nodes. Those of the next four, which come next, are fetched meanwhile.
 template <int kStride>
 inline TileRows<kStride> find_rows(double* all, const int* nodes, int count) {
   TileRows<kStride> rows;

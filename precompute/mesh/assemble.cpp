@@ -71,8 +71,8 @@ void sort_set(std::vector<std::int32_t>& set, std::size_t node_count) {
 void RawMesh::add_node(const Cursor& cursor, std::int64_t tag, const Vec3& x, std::size_t place) {
   for (const double value : x)
     if (!std::isfinite(value))
-      cursor.fail(place, "node {} has the coordinates ({}, {}, {}), which are not all finite; mend the mesh where it was made", tag, x[0],
-                  x[1], x[2]);
+      cursor.fail(place, "node {} has the coordinates ({}, {}, {}), which are not all finite; correct the mesh where it was made", tag,
+                  x[0], x[1], x[2]);
   if (nodes.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
     cursor.fail(place, "more than 2147483647 nodes; use a coarser mesh");
   node_tags.push_back(tag);

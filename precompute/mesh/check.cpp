@@ -48,7 +48,7 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
   for (std::int64_t i = 0; i < count; ++i)
     for (const double x : mesh.nodes[static_cast<std::size_t>(i)])
       if (!std::isfinite(x))
-        refuse(name, fmt::format("node {} has a coordinate that is not finite; mend the mesh where it was made", i + 1));
+        refuse(name, fmt::format("node {} has a coordinate that is not finite; correct the mesh where it was made", i + 1));
   for (const auto& [set, nodes] : mesh.node_sets)
     for (const auto node : nodes)
       if (node < 0 || node >= count)

@@ -1,4 +1,4 @@
-// Is a mesh fit to be computed on?  What can be mended is mended and counted, what cannot is refused with its elements named.
+// Is a mesh fit to be computed on?  What can be repaired is repaired and counted, what cannot is refused with its elements named.
 //
 //   mesh::CheckReport report = mesh::check_mesh(mesh, "plate.msh");
 //   for (const std::string& line : report.warnings) fmt::print("warning: {}\n", line);
@@ -16,11 +16,11 @@
 namespace carillon::mesh {
 
 struct CheckReport {
-  std::int64_t nodes = 0;  // after the mending
+  std::int64_t nodes = 0;  // after the repair
   std::int64_t tets = 0;
   int order = 1;
 
-  // What was mended.
+  // What was repaired.
   std::int64_t reoriented = 0;    // elements that were numbered inside out
   std::int64_t unreferenced = 0;  // nodes of no element, dropped
   std::int64_t welded = 0;        // nodes that were joined with another in the same place, closing a crack
@@ -49,9 +49,9 @@ struct CheckReport {
   std::vector<std::string> warnings;  // sentences for the user
 };
 
-/// Checks and mends `mesh`; afterwards its elements are positively oriented, its nodes all used, its boundary is a closed edge manifold.
+/// Checks and repairs `mesh`; afterwards its elements are positively oriented, its nodes all used, its boundary is a closed edge manifold.
 /// Nodes are renumbered when some were dropped or welded; node sets follow. `name` begins every message.
-/// Throws InputError naming the first ten offenders, their number and the mend: an element with a repeated node or without volume; an
+/// Throws InputError naming the first ten offenders, their number and the remedy: an element with a repeated node or without volume; an
 /// element twice; two elements on the same side of their common face; a face of more than two elements; a boundary edge of other than two
 /// boundary faces; quadratic elements that disagree about a mid node; indices out of range. The mesh is then in no defined state.
 /// Not collective.

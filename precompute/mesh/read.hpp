@@ -28,7 +28,7 @@ namespace carillon::mesh {
 enum class MeshFormat { kGmsh, kVtu, kMedit, kTetgen };
 
 /// Reads one mesh file; of a TetGen pair either file may be named. The format is found from the content, TetGen's from the extension.
-/// Throws InputError "file:line: what is wrong; what would mend it" ("file: byte N:" in binary files), SystemError when the disk fails.
+/// Throws InputError "file:line: what is wrong; what would correct it" ("file: byte N:" in binary files), SystemError when the disk fails.
 /// Not collective.
 TetMesh read_mesh(const std::filesystem::path& file);
 

@@ -41,7 +41,7 @@ TetMesh parse_tetgen(std::string_view node_bytes, const std::string& node_name, 
       if (k == 0) values.push_back(marker);
     }
   }
-  if (node.skip_space()) node.fail(node.place(), "more than the {} nodes that the first line announces; mend that line", count);
+  if (node.skip_space()) node.fail(node.place(), "more than the {} nodes that the first line announces; correct that line", count);
 
   Cursor ele(ele_bytes, ele_name);
   ele.set_comment('#');
@@ -67,7 +67,7 @@ TetMesh parse_tetgen(std::string_view node_bytes, const std::string& node_name, 
     }
     raw.add_tet(ele, tag, tags, static_cast<int>(corners), corners == 4 ? kVtkOrder : kTetgenOrder, region, place);
   }
-  if (ele.skip_space()) ele.fail(ele.place(), "more than the {} tetrahedra that the first line announces; mend that line", tet_count);
+  if (ele.skip_space()) ele.fail(ele.place(), "more than the {} tetrahedra that the first line announces; correct that line", tet_count);
   TetMesh mesh = assemble_mesh(std::move(raw), node, ele);
   add_value_sets("marker", values, 0, mesh);
   return mesh;

@@ -1,6 +1,6 @@
 // Method: ascii numbers; base64 read four characters at a time, padding allowed between header and data; blocks of zlib.
 // Source: VTK file formats, "XML File Formats" (The VTK User's Guide); RFC 4648 section 4; zlib's uncompress().
-// Deviations: LZ4 and LZMA data are refused with the mend; unsigned 64-bit integers above 2^63 - 1 are refused.
+// Deviations: LZ4 and LZMA data are refused with the remedy; unsigned 64-bit integers above 2^63 - 1 are refused.
 
 #include "precompute/mesh/vtu_data.hpp"
 

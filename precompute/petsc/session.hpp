@@ -74,7 +74,7 @@ std::int64_t get_peak_memory_bytes();
 
 /// Starts the program again, once, with OPENBLAS_CORETYPE set, when OpenBLAS took kernels for older instructions than this processor has:
 /// its releases know the processors of their day by number, and every later one is a Pentium 4 to them. Call it first in main, before MPI
-/// starts; returns where nothing is to be mended: the kernels fit, the user has set OPENBLAS_CORETYPE, or the BLAS is another. Local.
+/// starts; returns where nothing is to be corrected: the kernels fit, the user has set OPENBLAS_CORETYPE, or the BLAS is another. Local.
 void restart_with_fitting_kernels(char** argv);
 /// The BLAS behind dgemm in this process, and why it has the kernels that it has: "OpenBLAS 0.3.21 ... (/usr/lib/...), kernels SkylakeX,
 /// OpenBLAS's own choice", "reference BLAS (/usr/lib/...)". Local.

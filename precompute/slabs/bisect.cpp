@@ -57,7 +57,7 @@ void find_axes(MPI_Comm comm, const std::vector<Vec3>& centres, const std::vecto
     groups[g].left = count / groups[g].ranks * left_ranks + std::min<std::int64_t>(count % groups[g].ranks, left_ranks);
     const Eigen::Matrix3d moment = Eigen::Map<Eigen::Matrix3d>(moments.data() + 9 * g);
     if (moment.trace() > 0) groups[g].axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moment).eigenvectors().col(2);
-    // The sign of an eigenvector is the library's whim.
+    // The sign of an eigenvector is arbitrary.
     Eigen::Index largest = 0;
     groups[g].axis.cwiseAbs().maxCoeff(&largest);
     if (groups[g].axis[largest] < 0) groups[g].axis = -groups[g].axis;

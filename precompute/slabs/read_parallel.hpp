@@ -56,8 +56,8 @@ bool is_parallel_format(const std::filesystem::path& file);
 /// Reads, checks, cuts and numbers the mesh without any rank ever holding the whole. Elements are turned where they are inside out. The cut
 /// is by recursive inertial bisection; nodes and elements keep the numbers that mesh::check_mesh and mesh::to_quadratic would give them.
 /// Collective. Throws on every rank: InputError naming the file and the element for whatever mesh::check_mesh refuses (cracks and folded
-/// curved elements, which it would mend, are told as a warning and refused by the assembly), for a damaged file, for a wish that cannot be
-/// met, and when there are fewer tetrahedra than ranks; SystemError when the disk or the memory fails.
+/// curved elements, which it would repair, are told as a warning and refused by the assembly), for a damaged file, for a wish that cannot
+/// be met, and when there are fewer tetrahedra than ranks; SystemError when the disk or the memory fails.
 ParallelMesh read_parallel(MPI_Comm comm, const std::filesystem::path& file, const Wish& wish);
 
 }  // namespace carillon::slabs

@@ -31,8 +31,8 @@ std::string list_elements(const std::vector<std::int64_t>& elements, std::int64_
   return text + " (tetrahedra counted from 1 in the order of the file)";
 }
 
-/// Throws on every rank if any rank found bad elements. `what` completes "3 elements ...", `mend` follows the list. Collective.
-void refuse_elements(MPI_Comm comm, const std::string& name, const std::vector<std::int64_t>& bad, const char* what, const char* mend) {
+/// Throws on every rank if any rank found bad elements. `what` completes "3 elements ...", `remedy` follows the list. Collective.
+void refuse_elements(MPI_Comm comm, const std::string& name, const std::vector<std::int64_t>& bad, const char* what, const char* remedy) {
   auto total = static_cast<std::int64_t>(bad.size());
   MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_INT64_T, MPI_SUM, comm);
   if (total == 0) return;
@@ -41,7 +41,8 @@ void refuse_elements(MPI_Comm comm, const std::string& name, const std::vector<s
                     [&] { first.assign(bad.begin(), bad.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(bad.size(), 10))); });
   const auto all = share(comm, first);
   petsc::run_agreed(comm, [&] {
-    throw InputError(fmt::format("{}: {} element{} {}: {}; {}", name, total, total == 1 ? "" : "s", what, list_elements(all, total), mend));
+    throw InputError(
+        fmt::format("{}: {} element{} {}: {}; {}", name, total, total == 1 ? "" : "s", what, list_elements(all, total), remedy));
   });
 }
 
@@ -146,7 +147,7 @@ void read_nodes(const Source& source, const std::string& name, const Layout& lay
     slab.nodes_m[i] = {scale * values[3 * i], scale * values[3 * i + 1], scale * values[3 * i + 2]};
     for (const double x : slab.nodes_m[i])
       if (!std::isfinite(x))
-        throw InputError(fmt::format("{}: node {} has a coordinate that is not finite; mend the mesh where it was made", name,
+        throw InputError(fmt::format("{}: node {} has a coordinate that is not finite; correct the mesh where it was made", name,
                                      begin + static_cast<std::int64_t>(i) + 1));
   }
 }

@@ -81,7 +81,7 @@ std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& valu
     reason = report.substr(start, report.find('\n', start + 1) - start);
   }
   reason.erase(0, reason.find_first_not_of(" \n"));
-  throw InputError(fmt::format("{}:{}: this is not JSON (column {}): {}; mend the text there", data.file.string(),
+  throw InputError(fmt::format("{}:{}: this is not JSON (column {}): {}; correct the text there", data.file.string(),
                                line - 1 + data.first_line, column, reason.substr(0, 200)));
 }
 
@@ -186,7 +186,7 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   try {
     if (!reader->parse(data->text.data(), data->text.data() + data->text.size(), &data->root, &report)) fail_syntax(*data, report);
   } catch (const Json::Exception& error) {
-    throw InputError(fmt::format("{}:{}: this is not JSON: {}; mend the text", file.string(), first_line, error.what()));
+    throw InputError(fmt::format("{}:{}: this is not JSON: {}; correct the text", file.string(), first_line, error.what()));
   }
   if (!data->root.isObject())
     throw InputError(

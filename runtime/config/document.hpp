@@ -7,7 +7,7 @@
 //   double tol = solver.number_or("tolerance", 1e-8, {0.0, 1.0});   // default
 //   job.finish();                                                   // a key nobody asked for is an InputError
 //
-// All errors are InputError: "file:line: what is wrong; what would mend it". Not thread-safe; no MPI.
+// All errors are InputError: "file:line: what is wrong; what would correct it". Not thread-safe; no MPI.
 #pragma once
 
 #include <array>

@@ -5,7 +5,7 @@
 
 namespace carillon {
 
-/// The user's input cannot be used. The message names the file, the place in it and the mend. Exit code 2.
+/// The user's input cannot be used. The message names the file, the place in it and the remedy. Exit code 2.
 class InputError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };

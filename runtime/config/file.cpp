@@ -84,11 +84,11 @@ std::size_t read_some(int fd, char* bytes, std::size_t count, const fs::path& fi
 
 }  // namespace
 
-std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes, std::string_view mend) {
+std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes, std::string_view remedy) {
   std::uint64_t length = 0;
   const Descriptor fd(open_regular(file, what, length));
   if (length > max_bytes) {
-    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", file.string(), length, what, max_bytes, mend));
+    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", file.string(), length, what, max_bytes, remedy));
   }
   std::string bytes(static_cast<std::size_t>(length), '\0');
   bytes.resize(read_some(fd.get(), bytes.data(), bytes.size(), file, what));  // shorter when the file shrank meanwhile

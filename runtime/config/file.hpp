@@ -17,7 +17,7 @@ bool is_full_error(int error);
 /// The bytes of a regular file. Throws InputError when there is none, when it is a folder, a pipe or a device (never waits on one), when it
 /// cannot be read, or when it holds more than `max_bytes`. `what` says in messages what was expected ("job file").
 std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes,
-                      std::string_view mend = "check that this is the right file");
+                      std::string_view remedy = "check that this is the right file");
 
 /// The bytes of a regular file of any length, in pieces of at most `piece_bytes`, in order. Throws as read_file does.
 void read_pieces(const std::filesystem::path& file, std::string_view what, std::size_t piece_bytes,

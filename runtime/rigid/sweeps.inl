@@ -12,7 +12,8 @@ namespace carillon::rigid::sweeps {
 namespace {
 
 /// The part across the normal.
-inline Four drop_normal(Four a) {
+inline Four drop_normal(const Four& from) {
+  Four a = from;
   a[0] = 0.0;
   return a;
 }

@@ -1,4 +1,4 @@
-// Method: one JSON object a line, so that a file can be read, cut and mended with a text editor; numbers in the shortest form that reads
+// Method: one JSON object a line, so that a file can be read, cut and corrected with a text editor; numbers in the shortest form that reads
 // back as
 //   the same double.
 // Source: jsonlines.org for lines; Steele and White (1990) for the shortest form (in fmt, by Dragonbox).
@@ -225,7 +225,7 @@ class EventReader {
   template <class T>
   T finish(const T& event) {
     in_.finish();
-    if (const char* fault = find_fault(event); fault != nullptr) in_.fail("", fmt::format("{}; mend the event", fault));
+    if (const char* fault = find_fault(event); fault != nullptr) in_.fail("", fmt::format("{}; correct the event", fault));
     return event;
   }
 

@@ -43,8 +43,8 @@ bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int a
   const double least = awake_bodies * kGroupCost;
   const bool strikes_take_too_much = extra_ > kExtraShare * std::max(0.0, allowed - least) || overdrawn > 0.0;
   strictness_ = strikes_take_too_much ? std::min(strictness_ * kStricter, kMostStrict) : std::max(1.0F, strictness_ / kStricter);
-  const double foreseen = allowed > 0.0 ? extra_ * std::min(1.0, debt_ / (kCredit * allowed)) : 0.0;
-  const double room = std::max(0.0, allowed - foreseen - kRepayment * overdrawn);
+  const double predicted = allowed > 0.0 ? extra_ * std::min(1.0, debt_ / (kCredit * allowed)) : 0.0;
+  const double room = std::max(0.0, allowed - predicted - kRepayment * overdrawn);
   planned_ = static_cast<double>(live_groups) * kGroupCost;  // what fades out takes as much for one period more
   has_room_ = planned_ + extra_ < kReleaseBelow * allowed && debt_ < allowed;
   if (planned_ <= room) {

@@ -20,7 +20,7 @@ namespace carillon::synth {
 class Budget {
  public:
   /// At the start of a period: mode-samples that it may take, those that the last period took, and the groups that are live now, of how
-  /// many bodies. True when some must go. Work on top of the live groups (strikes, what they wake, what fades out) is foreseen from the
+  /// many bodies. True when some must go. Work on top of the live groups (strikes, what they wake, what fades out) is predicted from the
   /// last periods; what was taken too much is given back over the next ones.
   bool begin(double allowed, double spent, std::int64_t live_groups, int awake_bodies) noexcept;
 

@@ -304,7 +304,7 @@ void DrivenBank::process(std::span<const float> force_n, std::span<float> pressu
     const std::size_t count = std::min<std::size_t>(static_cast<std::size_t>(kQuantum - in_quantum), force_n.size());
     alignas(64) float answer[kQuantum];
     if (!take(force_n.first(count), answer)) {
-      mend(force_n.first(count));
+      replace_faults(force_n.first(count));
       if (!take(force_n.first(0), answer)) {
         silence();
         std::fill(std::begin(answer), std::end(answer), 0.0F);
@@ -330,7 +330,7 @@ bool DrivenBank::take(std::span<const float> force_n, std::span<float, kQuantum>
 }
 
 /// Puts the force before in the place of what is not finite.
-void DrivenBank::mend(std::span<const float> force_n) noexcept {
+void DrivenBank::replace_faults(std::span<const float> force_n) noexcept {
   for (std::size_t n = 0; n < force_n.size(); ++n) {
     const std::size_t at = static_cast<std::size_t>(at_) + n;
     if (std::isfinite(force_n[n])) continue;

@@ -38,7 +38,7 @@ class DrivenBank {
   void add_grid_modes(std::span<const Mode> modes);
   void add_direct_modes(std::span<const Mode> modes);
   bool take(std::span<const float> force_n, std::span<float, kQuantum> answer) noexcept;
-  void mend(std::span<const float> force_n) noexcept;
+  void replace_faults(std::span<const float> force_n) noexcept;
   void end_period() noexcept;
   void silence() noexcept;
 

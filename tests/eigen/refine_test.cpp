@@ -1,4 +1,4 @@
-// The pieces behind solve_modes that a good solve hardly uses: mending bad modes, cutting a band.
+// The pieces behind solve_modes that a good solve hardly uses: correcting bad modes, cutting a band.
 #include "precompute/eigen/refine.hpp"
 
 #include <gtest/gtest.h>

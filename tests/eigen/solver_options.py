@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """What follows "--": every type of SLEPc's eigensolver and every option ends in the same proven bank, or in one error with exit code 2 that names
-the option and the mend; nothing hangs. Real runs on a bar with 21 modes."""
+the option and the remedy; nothing hangs. Real runs on a bar with 21 modes."""
 import json
 import os
 import pathlib

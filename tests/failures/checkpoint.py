@@ -103,7 +103,7 @@ def make_plate(folder, nodes=9000):
 
 
 def stops(folder):
-    """Asked to stop early, on the way, late; on 1, 2, 3 ranks in turn, and gone on with on others."""
+    """Asked to stop early, on the way, late; on 1, 2, 3 ranks in turn, and resumed on others."""
     make_plate(folder)
     body = Body(folder, band_hz=[20, 45000])
     print(f"{len(body.expected)} modes, {body.seconds:.1f} s")
@@ -125,7 +125,7 @@ def stops(folder):
         resumed, worst = body.resume(then, f"{name}, then {then}")
         check(not has_saved or "resumes from state" in resumed, f"{name}: the checkpoint was not used:\n{resumed}")
         check("warning" not in heed(resumed), resumed)
-        print(f"{name}, then {then}: {'gone on with' if has_saved else 'from the start'}, frequencies equal to {worst:.1e}")
+        print(f"{name}, then {then}: {'resumed' if has_saved else 'from the start'}, frequencies equal to {worst:.1e}")
     check(was_stopped >= 6, f"only {was_stopped} runs were stopped")
     # Several times on the way to one bank, on all numbers of ranks; a single process without mpirun, by SIGTERM.
     for turn in range(4):
@@ -233,7 +233,7 @@ def damage(folder):
             spoilt[place] ^= 1 << generator.randrange(8)
         (folder / "state").write_bytes(spoilt)
         text, _ = body.resume(1, f"{kind} at {place}")
-        said = text.count("warning: state: the checkpoint is not gone on from, because")
+        said = text.count("warning: state: the checkpoint is not resumed from, because")
         check(said <= 1 and heed(text).count("warning") == said, text)
         silent += said == 0
         check(said == 1 or (kind == "flipped" and place < 4096), f"{kind} at {place}: nothing was said:\n{text}")
@@ -333,7 +333,7 @@ def replaced(folder):
 
 
 def accuracy(folder):
-    """A job that asks for accuracy tries several meshes: it goes on with the one at which it was stopped."""
+    """A job that asks for accuracy tries several meshes: it resumes the one at which it was stopped."""
     job = {"body": {"shape": "plate", "length_m": 0.3, "width_m": 0.21, "thickness_m": 0.02}, "bank": "out.bank", "band_hz": [20, 12000], "accuracy_cents": 10,
            "material": {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {}}}}
     body = Body.__new__(Body)

@@ -50,7 +50,7 @@ def out_of_memory(folder):
     for ranks in (1, 2):
         started = time.monotonic()
         text = folder.expect(ranks, 4, ["GB"], before=limit)
-        check("coarser" in text or "more ranks" in text or "memory" in text, f"no mend is named:\n{text}")
+        check("coarser" in text or "more ranks" in text or "memory" in text, f"no remedy is named:\n{text}")
         print(f"{ranks} ranks: {text.split('error:')[1].strip()} ({time.monotonic() - started:.1f} s)")
 
 

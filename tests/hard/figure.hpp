@@ -48,7 +48,7 @@ inline void hold(const std::string& id, double value, double bound, const std::s
   EXPECT_LE(value, bound) << id << " " << part;
 }
 
-/// For what is refused or warned of: `message` must contain all of `words` (file, place, mend). Counts as the figure "refused".
+/// For what is refused or warned of: `message` must contain all of `words` (file, place, remedy). Counts as the figure "refused".
 inline void hold_refusal(const std::string& id, const std::string& message, std::initializer_list<std::string> words,
                          const std::string& part = "") {
   record(id, part, "\"refused\"", "\"refused\"");

@@ -52,7 +52,7 @@ mesh::TetMesh make(const std::string& name, const Polygons& surface, SurfaceOpti
   options.order = 2;
   mesh::TetMesh m = mesh_surface(options, report);
   mesh::TetMesh copy = m;
-  const auto check = mesh::check_mesh(copy, name);  // nothing is left to mend for those who read it
+  const auto check = mesh::check_mesh(copy, name);  // nothing is left to repair for those who read it
   EXPECT_EQ(check.straightened + check.reoriented + check.unreferenced + check.welded + check.pinched_nodes, 0);
   return m;
 }

@@ -1,4 +1,4 @@
-// Jobs and meshes that cannot be used: exit code, one message that says where and how to mend, and nothing left behind.
+// Jobs and meshes that cannot be used: exit code, one message that says where and how to correct it, and nothing left behind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

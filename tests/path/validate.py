@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""--validate against runs: the modes it counts are those a run finds, the memory it foresees is enough and not twice too much, and a job
+"""--validate against runs: the modes it counts are those a run finds, the memory it predicts is enough and not twice too much, and a job
 that a run refuses before it solves is refused with the same words.
 
 usage: validate.py BIN_DIR
@@ -39,19 +39,19 @@ def check_predictions(folder, name, job):
     result = run(folder, "--validate", "--json", "--patience", "1000000", "job.json")
     assert result.returncode == 0, f"{name}: {result.stderr}"
     assert not (folder / "bank.hdf").exists(), f"{name}: a validation wrote a bank"
-    foreseen = json.loads(result.stdout)
-    assert foreseen["ok"] is True
+    predicted = json.loads(result.stdout)
+    assert predicted["ok"] is True
     for ranks in (1, 2, 4):
         solved = run(folder, "-q", "job.json", ranks=ranks)
         assert solved.returncode == 0, f"{name}: {solved.stderr}"
         record = json.loads((folder / "bank.hdf.resolved.json").read_text())["run"]
-        peak, bound = sum(record["peak_bytes_by_rank"]), foreseen["memory_bytes"][str(ranks)]
-        assert peak <= bound <= 2 * peak, f"{name}, {ranks} ranks: {peak / 1e6:.0f} MB, and {bound / 1e6:.0f} MB were foreseen"
-        assert foreseen["modes"] == foreseen["modes"] | {"count": record["solver"]["modes"], "how": "counted"}, f"{name}: {foreseen['modes']}, {record['solver']['modes']} found"
+        peak, bound = sum(record["peak_bytes_by_rank"]), predicted["memory_bytes"][str(ranks)]
+        assert peak <= bound <= 2 * peak, f"{name}, {ranks} ranks: {peak / 1e6:.0f} MB, and {bound / 1e6:.0f} MB were predicted"
+        assert predicted["modes"] == predicted["modes"] | {"count": record["solver"]["modes"], "how": "counted"}, f"{name}: {predicted['modes']}, {record['solver']['modes']} found"
         mesh = {key: record["mesh"][key] for key in ("nodes", "tets", "components", "held_nodes")}
-        assert foreseen["mesh"] == foreseen["mesh"] | mesh, f"{name}: {foreseen['mesh']} and {mesh}"
-        assert foreseen["unknowns"] == 3 * record["mesh"]["free_nodes"]
-    assert foreseen["cpu_seconds"] > 0 and foreseen["wall_seconds"]["2"] <= foreseen["wall_seconds"]["1"]
+        assert predicted["mesh"] == predicted["mesh"] | mesh, f"{name}: {predicted['mesh']} and {mesh}"
+        assert predicted["unknowns"] == 3 * record["mesh"]["free_nodes"]
+    assert predicted["cpu_seconds"] > 0 and predicted["wall_seconds"]["2"] <= predicted["wall_seconds"]["1"]
     for file in ("bank.hdf", "bank.hdf.resolved.json"):
         (folder / file).unlink()
 

@@ -58,7 +58,7 @@ class Kernels(unittest.TestCase):
         self.assertEqual("would fit this processor" in line, KERNELS not in ("Haswell", "Zen"), line)
 
     def test_it_starts_again_once(self):
-        """A second start that finds the kernels as old as before goes on with them."""
+        """A second start that finds the kernels as old as before keeps them."""
         line, kernels, _, _ = read_blas_line({"CARILLON_KERNELS_BEFORE": "Prescott"})
         self.assertIn(f"kernels {kernels}, " + ("which fit" if "own choice" in WHY else "older than this processor"), line)
 

@@ -26,9 +26,9 @@ constexpr std::string_view kMpirunKill =
 
 TEST(Endings, the_programs_own_last_error_line_is_the_reason) {
   const Verdict verdict = classify_code(
-      2, "carillon-precompute: error: first.\nnoise\ncarillon-precompute: error: bar.msh:3: no node 7; mend it.\n--- mpirun says\n");
+      2, "carillon-precompute: error: first.\nnoise\ncarillon-precompute: error: bar.msh:3: no node 7; correct it.\n--- mpirun says\n");
   EXPECT_EQ(verdict.cause, Cause::bad_input);
-  EXPECT_EQ(verdict.reason, "bar.msh:3: no node 7; mend it");
+  EXPECT_EQ(verdict.reason, "bar.msh:3: no node 7; correct it");
   EXPECT_EQ(classify_code(3, "carillon-precompute: error: modes are missing\n").cause, Cause::no_solution);
 }
 

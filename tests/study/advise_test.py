@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""carillon study advise: what it foresees against closed forms, and from outside: the errors that its banks have against known frequencies, and bad input.
+"""carillon study advise: what it predicts against closed forms, and from outside: the errors that its banks have against known frequencies, and bad input.
 
 usage: advise_test.py BIN_DIR
 """
@@ -69,7 +69,7 @@ class Forecasts(unittest.TestCase):
             self.assertAlmostEqual(model.predict(sample.unknowns, sample.modes) / sample.cpu_s, 1, 4)
         self.assertGreaterEqual(min(model.weights), 0)
 
-    def test_stranger_is_foreseen_from_two_trials(self):
+    def test_stranger_is_predicted_from_two_trials(self):
         """A body whose errors and bars obey one power: two meshes tell it to half as much again and never less, whatever the study's ratio of bars to errors."""
         rows = [{"element": "T10", "nodes": n, "unknowns": 3 * n, "modes": 10, "cpu_s": n / 1000, "worst_cents": 4000 / n, "bar_cents": ratio * 4000 / n} for n in (500, 1000, 2000, 4000) for ratio in (1.5, 9)]
         advice = forecast.Advice({"bodies": {"a": rows[::2], "b": rows[1::2]}})
@@ -132,7 +132,7 @@ class Program(unittest.TestCase):
         self.assertIn("0.05 cents", both["remark"])
         self.assertGreater(both["predicted"]["cents"], 0.05)
 
-    def test_study_writes_what_advise_foresees_from(self):
+    def test_study_writes_what_advise_predicts_from(self):
         done = subprocess.run([str(BIN / "carillon-study"), "accuracy", "--quick", "--on", "cube", "--only", "advice", "-o", "report"], cwd=self.folder, capture_output=True, text=True, timeout=250)
         self.assertEqual(done.returncode, 0, done.stderr)
         made = json.loads((self.folder / "report/advice.json").read_text())

@@ -1,5 +1,5 @@
 """Section: the recommendation. For every default of the program the figure that chose it, and what the next stricter and the next looser
-would cost and bring; and the measurements that `carillon study advise` foresees from (advice.json), written anew from a study."""
+would cost and bring; and the measurements that `carillon study advise` predicts from (advice.json), written anew from a study."""
 import json
 import os
 import statistics

@@ -1,6 +1,6 @@
 """`carillon study advise BODY --cents 5 [--seconds 10]`: the setting to use, what it will reach and cost, and afterwards what it did.
 
-Bodies of the study are foreseen from what the study measured on them; others from coarse solves of their own (forecast.Probe). Seconds
+Bodies of the study are predicted from what the study measured on them; others from coarse solves of their own (forecast.Probe). Seconds
 of another machine are scaled by one small solve that both made.
 """
 import argparse
@@ -96,7 +96,7 @@ class Adviser:
         if self.target.kind != "study" or self.target.name not in advice.curves:
             for element in ("T4", "T10") if self.target.kind == "mesh" else ("T10",):
                 if len(advice.find_bar_ratios(element)) < 2:
-                    raise InputError(f"{options.advice}: it has too few meshes of {element} to foresee {self.target.name} from; take the advice of a study of more bodies")
+                    raise InputError(f"{options.advice}: it has too few meshes of {element} to predict {self.target.name} from; take the advice of a study of more bodies")
         self.lab = Lab(options.out, tools, repeats=1, surface=options.surface)
         self.lab.say = lambda text: None  # what there is to say is said here
         self.cores = len(os.sched_getaffinity(0))
@@ -313,7 +313,7 @@ class Adviser:
     def describe_reach(self, curves, cents):
         finest = min((self.make_forecast(curve, math.floor(curve.get_most_nodes())) for curve in curves), key=lambda f: f.cents)
         least = math.ceil(finest.cents / forecast.GOAL * 100) / 100
-        return (f"{self.target.name}: {cents:g} cents are out of reach of what the study can foresee: the finest mesh, {finest.setting.nodes:,} nodes, comes to about {finest.cents:.2g} cents in "
+        return (f"{self.target.name}: {cents:g} cents are out of reach of what the study can predict: the finest mesh, {finest.setting.nodes:,} nodes, comes to about {finest.cents:.2g} cents in "
                 f"{finest.cpu_s:.0f} CPU s; give --cents {least:g} or more")
 
     # --- after
@@ -425,11 +425,11 @@ def read_packed_advice(path=None):
     """That of the package, or of a file that `carillon study accuracy --write-advice` wrote."""
     if path is None:
         return forecast.read_advice(pkgutil.get_data(__package__, "advice.json").decode())
-    mend = "carillon study accuracy --write-advice FILE writes one"
+    remedy = "carillon study accuracy --write-advice FILE writes one"
     try:
-        return forecast.read_advice(scaling.read_text(path, "advice", mend))
+        return forecast.read_advice(scaling.read_text(path, "advice", remedy))
     except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
-        raise InputError(f"{path}: {f'{error} is missing' if isinstance(error, KeyError) else error}; {mend}") from None
+        raise InputError(f"{path}: {f'{error} is missing' if isinstance(error, KeyError) else error}; {remedy}") from None
 
 
 def run(options):
@@ -497,7 +497,7 @@ def read_band(text):
 def add_command(commands):
     one = commands.add_parser("advise", help="the setting to use for so many cents or seconds, what it will reach and cost, and afterwards what it did",
                               description="Says which element, mass, mesh size, tolerance and ranks to use for a body, with the error and the CPU seconds to expect, then solves it so and says what "
-                              "they were. Bodies of the study are foreseen from its measurements; others are tried on coarse meshes first.")
+                              "they were. Bodies of the study are predicted from its measurements; others are tried on coarse meshes first.")
     one.add_argument("body", metavar="BODY", help=f"a body of the study ({', '.join(bodies.make_bodies())}), a shape ({', '.join(name for name in targets.SHAPES if name not in bodies.make_bodies())}), a job (.json), a surface (.obj .stl .ply .off) or a mesh file; "
                      "steel where no material is given")
     one.add_argument("--cents", type=read_positive(MOST_CENTS, "cents"), metavar="C", help="the largest error that any frequency of the band may have")

@@ -1,4 +1,4 @@
-"""What a setting will reach and cost, foreseen from what the study measured (advice.json). Pure: runs nothing.
+"""What a setting will reach and cost, predicted from what the study measured (advice.json). Pure: runs nothing.
 
 A curve is one body with one element on meshes of several sizes: the largest error of the band, the largest error bar, CPU seconds. Between
 two sizes all are powers of the nodes. A body that the study does not have is measured on two coarse meshes first (Probe): how much its
@@ -21,7 +21,7 @@ CENTS_OF_RESIDUAL = 600 / math.log(2)  # of a frequency, for a relative residual
 
 
 class OutOfReach(Exception):
-    """Nothing that can be foreseen meets what was asked."""
+    """Nothing that can be predicted meets what was asked."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Curve:
         return interpolate([(s.nodes, s.cpu_s) for s in self.samples], nodes, 0.3, 1.7)
 
     def find_nodes(self, cents):
-        """The fewest nodes foreseen to be no more than `cents` wrong; a mesh that was measured to be so goes before one that is foreseen. None: out of reach."""
+        """The fewest nodes predicted to be no more than `cents` wrong; a mesh that was measured to be so goes before one that is predicted. None: out of reach."""
         for (nodes, error), after in zip(self.errors, [*self.errors[1:], None]):
             if error <= (0.95 if self.is_measured else GOAL) * cents:
                 return nodes

@@ -43,11 +43,11 @@ def study_density(section, lab, results):
             factor = 2 ** (2 * shift / 1200)
             before_others, after_others = list_modes(point.cents[1:]), list_modes(after[1:])
             rows.append((body.name, f"{point.nodes:,}", f"{shift:+.3g}", f"{factor:.4g}", *(f"{value:.3g}" for value in (*before_others, *after_others))))
-            data += [(body.name, point.nodes, factor, index + 1, value, mended) for index, (value, mended) in enumerate(zip(point.cents, after))]
+            data += [(body.name, point.nodes, factor, index + 1, value, corrected) for index, (value, corrected) in enumerate(zip(point.cents, after))]
             if abs(shift) > 1:
                 left.append((after_others[0] / before_others[0], after_others[1], body.name, point.nodes))
             curves.setdefault(body.name, []).append((before_others[0], after_others[0]))
-    section.add_table("density", rows, "Coarse meshes of T4 with consistent mass, and what is left when the density is raised until mode 1 is right. Every frequency falls by the same cents: the repair mends what "
+    section.add_table("density", rows, "Coarse meshes of T4 with consistent mass, and what is left when the density is raised until mode 1 is right. Every frequency falls by the same cents: the raised density corrects what "
                       "all modes have in common, and no more.", data)
     panel = plots.Panel("median of the other modes, before and after", "error before, cents", "error after, cents", curves, guides={"no repair": plots.draw_slope([(x, x) for curve in curves.values() for x, _ in curve], 1)})
     section.add_chart("repair", plots.draw_panels([panel], "Raising the density until mode 1 is right", "what is left in the other modes; each point one mesh of T4"),

@@ -26,7 +26,7 @@ def add_command(commands, read_count):
     one.add_argument("--repeats", type=read_count, help="of every case, all cases in turn (default: 2; with --quick 1)")
     one.add_argument("--surface", metavar="FILE", default=bodies.BUNNY_SURFACE, help=f"the bunny's surface (default: {bodies.BUNNY_SURFACE}, of Debian's glmark2-data)")
     one.add_argument("--timeout", type=programs.read_seconds, default=3600, help="seconds that one run may take (default: 3600)")
-    one.add_argument("--write-advice", metavar="FILE", help="also write what carillon study advise foresees from, for its --advice")
+    one.add_argument("--write-advice", metavar="FILE", help="also write what carillon study advise predicts from, for its --advice")
     one.add_argument("--bin", metavar="FOLDER", help="where the programs are (default: beside this one)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output: the report's path and what it says in words")
 
