@@ -93,7 +93,7 @@ function(carillon_fuzz name)
   add_dependencies(fuzz_all fuzz_${name})
   # New inputs go to a folder of the build; the kept corpus is only read.
   file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz/${name})
-  add_test(NAME fuzz.${name} COMMAND fuzz_${name} -max_total_time=15 -rss_limit_mb=3000 -timeout=10 -print_final_stats=1
+  add_test(NAME fuzz.${name} COMMAND fuzz_${name} -max_total_time=15 -rss_limit_mb=3000 -timeout=20 -print_final_stats=1
     -artifact_prefix=${CMAKE_BINARY_DIR}/fuzz/${name}- ${CMAKE_BINARY_DIR}/fuzz/${name} ${arg_CORPUS})
   set_tests_properties(fuzz.${name} PROPERTIES LABELS fuzz TIMEOUT 120)
 endfunction()

@@ -171,7 +171,11 @@ class Attempt {
   void solve(double percent_before) {
     const store::Request request = check_inputs();
     bool has_bank = false;
-    if (!find_bank_fault(work_, request, has_bank)) return set(Cause::done, "");  // killed between the solve and the publication
+    if (!find_bank_fault(work_, request, has_bank)) {
+      // Its log may be lost with it: a job that is done has one.
+      fmt::print(stderr, "carillon attempt: the bank was solved by an attempt that ended before it was published\n");
+      return set(Cause::done, "");
+    }
     if (has_bank) store::OpenFolder::open(work_).remove(store::kBankFile);
     const fs::path log = work_ / store::kLogFile, checkpoint = work_ / store::kCheckpointFile;
     std::optional<Scratch> scratch;

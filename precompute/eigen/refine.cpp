@@ -250,7 +250,7 @@ RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lamb
       if (errors.residual[j] > request.tolerance) above.push_back(j);
     }
     std::vector<double> certified = errors.residual;
-    bool is_mended = false;
+    bool is_corrected = false;
     for (const Group& group : group_neighbours(above, lambda, spread)) {
       const double sigma = stand_below(request, group, nearness, lambda, cost);
       const LocalColumns access(shapes);
@@ -265,9 +265,9 @@ RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lamb
       }
       if (worst <= request.tolerance || round + 1 == kRounds.size()) continue;
       corrections.apply(request, group, lambda, all);
-      is_mended = true;
+      is_corrected = true;
     }
-    if (!is_mended) {
+    if (!is_corrected) {
       errors.residual = certified;
       for (const std::size_t j : above) errors.floor[j] = std::min(errors.floor[j], certified[j]);
       return cost;

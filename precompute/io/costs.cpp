@@ -31,7 +31,7 @@ constexpr double kFactorFlop = 2.2e-11, kFactorEntry = 6e-9;
 constexpr double kSolveEntry = 1.5e-10;
 constexpr double kBasisNumber = 1.2e-10, kSmallNumber = 4e-10;
 constexpr double kCheckNumber = 2e-8, kCheckPair = 1e-10;
-constexpr double kMended = 0.5;  // of the iteration: thin bodies have low modes that are sought once more
+constexpr double kCorrected = 0.5;  // of the iteration: thin bodies have low modes that are sought once more
 constexpr double kErrorMode = 1.5e-8, kErrorQuadraticMode = 9e-8, kErrorTet = 6e-6;
 constexpr double kCollectNumber = 1e-8, kWriteNumber = 5e-9;
 
@@ -85,7 +85,7 @@ Costs predict_costs(const Extent& known) {
   costs.solve = kSolveEntry * entries * solves;
   costs.orthogonalise = kBasisNumber * unknowns * columns * solves + kSmallNumber * columns * columns * solves;
   costs.check = kCheckNumber * shapes + kCheckPair * shapes * modes;
-  if (extent.is_thin && extent.modes > 0) costs.check += factorisation + kMended * (costs.solve + costs.orthogonalise);
+  if (extent.is_thin && extent.modes > 0) costs.check += factorisation + kCorrected * (costs.solve + costs.orthogonalise);
   return costs;
 }
 

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "precompute/mesher/tet_quality.hpp"
@@ -16,6 +18,7 @@ namespace {
 
 constexpr int kMostPasses = 12;
 constexpr std::size_t kMany = 100;
+constexpr double kHardly = 0.95;  // of what they lacked before the pass
 // A boundary node whose faces turn away from their mean by more than this lies on an edge (cosine of 25 degrees).
 constexpr double kSmooth = 0.906;
 
@@ -95,14 +98,16 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
     return true;
   };
   std::int64_t moved = 0;
-  std::size_t last = mesh.tets.size();
+  double last = std::numeric_limits<double>::infinity();  // degrees that flat elements lack, summed
   for (int pass = 0; pass < kMostPasses; ++pass) {
     std::vector<std::pair<double, std::int32_t>> flat;
     for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
       if (const double angle = calc_element_flatness(mesh, e); angle < angle_deg) flat.emplace_back(angle, e);
-    // Where many do not become fewer it is the body that is flat there.
-    if (flat.size() > kMany && flat.size() >= last) break;
-    last = flat.size();
+    // Where many hardly become better it is the body that is flat there.
+    const double lacking =
+        std::accumulate(flat.begin(), flat.end(), 0.0, [&](double sum, const auto& f) { return sum + angle_deg - f.first; });
+    if (flat.size() > kMany && lacking > kHardly * last) break;
+    last = lacking;
     std::sort(flat.begin(), flat.end());
     std::int64_t moves = 0;
     for (const auto& [angle, e] : flat)

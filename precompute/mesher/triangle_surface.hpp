@@ -40,10 +40,10 @@ struct Box {
   double diagonal() const { return norm(high - low); }
 };
 Box calc_box(const std::vector<Vec3>& points);
-
-/// The enclosed volume by the divergence theorem (signed: positive if the triangles face outward), and the area.
 /// Of the points that a triangle has.
 Box calc_used_box(const TriangleSurface& surface);
+
+/// The enclosed volume by the divergence theorem (signed: positive if the triangles face outward), and the area.
 double calc_volume(const TriangleSurface& surface);
 double calc_area(const TriangleSurface& surface);
 

@@ -117,14 +117,14 @@ std::int64_t count_parts(const std::vector<Triangle>& boundary, std::size_t node
   return static_cast<std::int64_t>(split_parts(skin).size());
 }
 
-/// Where a mesh of this extent falls short of the body by more than coarse elements explain; empty if nowhere.
-std::string describe_lost(const Body& body, const Vec3& made, double edge_m) {
+/// Where a mesh of this extent falls short of the body by more than coarse elements explain; empty if nowhere. `is` begins the sentence.
+std::string describe_lost(const Body& body, const Vec3& made, double edge_m, const char* is) {
   const Vec3 wanted = calc_used_box(body.repaired.surface).extent();
   std::string text;
   for (int c = 0; c < 3; ++c) {
     const double extent = wanted[c] - 2 * body.repaired.offset_m, lost = extent - made[c];
     if (lost > kMostLost * extent && lost > kMostLostEdges * edge_m)
-      text = fmt::format("is {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", made[c],
+      text = fmt::format("{} {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", is, made[c],
                          "xyz"[c], extent);
   }
   return text;
@@ -146,7 +146,7 @@ std::string find_lost(const Body& body, double edge_m) {
   // The skin is less than a sample beyond the last one inside.
   Vec3 made{};
   for (int c = 0; c < 3; ++c) made[c] = high[c] < 0 ? 0 : field.voxel_m * (high[c] - low[c] + 2);
-  return describe_lost(body, made, edge_m);
+  return describe_lost(body, made, edge_m, "would be at most");
 }
 
 Shells count_shells(const Body& body, double edge_m) {
@@ -217,7 +217,7 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
   // Of a hollow that was filled where elements are as long as the wall is thick several times over.
   result.lacks_part =
       !result.fault.empty() && result.shells < expectation.shells.least && body.wall_m > 0 && edge > kHopelessWalls * body.wall_m;
-  if (std::string lost = describe_lost(body, calc_box(linear.nodes).extent(), edge); !lost.empty()) {
+  if (std::string lost = describe_lost(body, calc_box(linear.nodes).extent(), edge, "is"); !lost.empty()) {
     result.lacks_part = true;
     result.fault = std::move(lost);
   }

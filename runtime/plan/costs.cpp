@@ -28,9 +28,9 @@ template <typename Function>
 double time_ns(Function function) {
   double best = 1e300;
   for (int round = 0; round < 3; ++round) {
-    const double begin = 1e9 * config::get_thread_cpu_s();
+    const double begin = config::get_thread_cpu_ns();
     function();
-    best = std::min(best, 1e9 * config::get_thread_cpu_s() - begin);
+    best = std::min(best, config::get_thread_cpu_ns() - begin);
   }
   return best;
 }

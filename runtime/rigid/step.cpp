@@ -29,7 +29,8 @@ constexpr double kPatience = 0.02;                           // s; for so long
 constexpr double kLong = 0.3;                                // s; what was slow for so long is no faster than kSlow: less balance is enough
 constexpr int kMostAtOnce = 12;                              // bodies that are about to rest and are factorised without sweeps before
 constexpr double kLoose = 1000.0;                            // times the tolerance
-constexpr double kLooseOfSpeed = 1e-3;                       // of the fastest of its bodies, where that is more
+constexpr double kLooseOfSpeed = 1e-3;                       // of the fastest of its bodies, where that is more,
+constexpr double kLoosest = 0.3 * kSlowest;                  // and no more than this: what stands must not strike
 constexpr int kGuesses = 6;                                  // of a factorised problem in a step
 constexpr int kMostGuesses = 12;                             // where rest is to be proven
 constexpr double kRetry = 4e-3;                              // s; a group whose guesses failed goes by sweeps for so long
@@ -300,7 +301,7 @@ void Space::solve(double tolerance_m_s) {
   };
   const auto sweep = [&](int most) {
     const bool is_loose = !settles && !is_small;  // what moves fast needs less than what is about to stand still
-    const double tolerance = is_loose ? std::max(kLoose * tolerance_m_s, kLooseOfSpeed * fastest) : tolerance_m_s,
+    const double tolerance = is_loose ? std::max(kLoose * tolerance_m_s, std::min(kLooseOfSpeed * fastest, kLoosest)) : tolerance_m_s,
                  left = solver_.solve(movers_, points_, tolerance, most);
     costs_.sweeps += solver_.get_sweeps();
     return left <= tolerance && !gains();

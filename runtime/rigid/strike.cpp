@@ -5,6 +5,7 @@
 // Deviations: impulses are scaled back where friction and restitution together would gain energy.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -21,7 +22,7 @@ using impact::cross;
 using impact::dot;
 
 constexpr double kInstant = 1e-9;      // m; how well an instant of impact is found,
-constexpr double kNear = 1e-6;         // m; and how near it must come
+constexpr int kLooks = 20;             // and in how many looks at most
 constexpr std::size_t kFewPoints = 8;  // of an impact that is solved to rounding, its load shared evenly
 constexpr double kLongestHertz = 20e-3;
 
@@ -85,14 +86,15 @@ bool Space::find_impact(const Island& island, double h, double& at_s, std::vecto
       if (at <= h) candidates.push_back({{pair, k}, at, approach < 0.0 ? -approach / rate : 0.0});
     }
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& x, const auto& y) { return x.at < y.at; });
-  // Paths are not quite straight: the instant of the first is looked for on its path. One that does not come so far after all is none.
-  const auto earliest = std::find_if(candidates.begin(), candidates.end(), [&](Candidate& c) {
-    const std::optional<double> instant = find_instant(c.ref, c.apex, c.at, h);
-    c.at = instant.value_or(c.at);
-    return instant.has_value();
-  });
-  if (earliest == candidates.end()) return false;
-  at_s = earliest->at;
+  // Paths are not quite straight: instants are looked for on them, as long as a guess is earlier than the first of those found.
+  double earliest = std::numeric_limits<double>::infinity();
+  for (Candidate& c : candidates) {
+    if (c.at >= earliest) break;
+    c.at = find_instant(c.ref, c.apex, c.at, h).value_or(std::numeric_limits<double>::infinity());
+    earliest = std::min(earliest, c.at);
+  }
+  if (!std::isfinite(earliest)) return false;
+  at_s = earliest;
   for (const Candidate& c : candidates)
     if (c.at <= at_s + together_s_) first.push_back(c.ref);
   return true;
@@ -119,17 +121,35 @@ std::optional<double> Space::find_instant(const Ref& ref, double apex_s, double 
     return touch.gap_m;
   };
   if (!(guess_s > 0.0)) return guess_s;
-  double s0 = apex_s, g0 = apex_s > 0.0 ? look(apex_s) : now.gap_m, s1 = guess_s, g1 = look(s1);
-  for (int n = 0; n < 8 && std::abs(g1) > kInstant && s1 != s0 && g1 != g0; ++n) {
-    const double s2 = std::clamp(s1 - g1 * (s1 - s0) / (g1 - g0), apex_s, h);
-    s0 = s1;
-    g0 = g1;
-    s1 = s2;
-    g1 = look(s1);
+  double open = apex_s, open_m = apex_s > 0.0 ? look(apex_s) : now.gap_m;
+  if (!(open_m > 0.0)) return guess_s;  // it parts by less than it is deep
+  double shut = guess_s, shut_m = look(guess_s);
+  if (shut_m > kInstant) {
+    open = shut;
+    open_m = shut_m;
+    shut = h;
+    shut_m = look(h);
+    if (shut_m > kInstant) return std::nullopt;
   }
-  // A search that ends where the touch parts, or is nearest to its last one, has found that.
-  if (g1 > kNear || (s1 <= apex_s && g1 > kInstant)) return std::nullopt;
-  return s1;
+  if (shut_m >= -kInstant) return shut;
+  // The secant between what is open and what is shut; the value of an end that stays is halved (Illinois), so that both come closer.
+  int stays = 0;
+  for (int n = 0; n < kLooks; ++n) {
+    const double at = shut - shut_m * (shut - open) / (shut_m - open_m), gap_m = look(at);
+    if (gap_m > 0.0) {
+      open = at;
+      open_m = gap_m;
+      if (stays > 0) shut_m *= 0.5;
+      stays = 1;
+    } else {
+      shut = at;
+      shut_m = gap_m;
+      if (stays < 0) open_m *= 0.5;
+      stays = -1;
+    }
+    if (std::abs(gap_m) <= kInstant) return at;
+  }
+  return shut;
 }
 
 /// Looks at the pairs of an impact again, as they are at its instant: an edge that passes another one close by was taken for a plane until

@@ -12,7 +12,11 @@
 
 namespace carillon::shape {
 
+namespace {
+
 constexpr double kOnFace = 1e-4;  // of the size of the body: what is as near to a face is on it
+
+}  // namespace
 
 Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int32_t, 3>> triangles)
     : mesh_(std::make_unique<const Mesh>(vertices, triangles)), skin_(std::make_unique<const Skin>(*mesh_)) {
@@ -50,7 +54,8 @@ Box Shape::calc_box(const Frame& frame) const {
 Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hint) const {
   if (hint >= 0) {
     const Nearest on = mesh_->find_nearest_on_face(point, hint);
-    if (on.distance2 < kOnFace * kOnFace * size_m_ * size_m_) return choose_face(on, point, outward);
+    if (on.distance2 < kOnFace * kOnFace * size_m_ * size_m_ && dot(mesh_->normals[hint], outward) > 0.0)
+      return choose_face(on, point, outward);
   }
   const Nearest nearest = mesh_->find_nearest(point, Box::kFar, -1);
   // At an edge or a corner, and under a curved skin, several faces are near: the one that looks the way asked.

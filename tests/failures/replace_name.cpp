@@ -31,7 +31,8 @@ int open_and_replace(const char* name, int flags, unsigned mode) {
 extern "C" int open(const char* name, int flags, ...) {
   va_list list;
   va_start(list, flags);
-  const unsigned mode = (flags & O_CREAT) != 0 ? va_arg(list, unsigned) : 0;
+  const bool has_mode = (flags & O_CREAT) != 0 || (flags & O_TMPFILE) == O_TMPFILE;
+  const unsigned mode = has_mode ? va_arg(list, unsigned) : 0;
   va_end(list);
   return open_and_replace(name, flags, mode);
 }

@@ -172,7 +172,7 @@ TEST(bodies, thin_plate_keeps_its_edges_where_elements_are_as_long_as_it_is_thic
   EXPECT_GT(report.min_dihedral_deg, 8);
 }
 
-TEST(bodies, coarse_hollow_sphere_is_mended_where_its_skins_meet) {
+TEST(bodies, coarse_hollow_sphere_is_repaired_where_its_skins_meet) {
   SurfaceReport report;
   const auto m = mesh_surface({.surface = write_text("coarse.off", to_off(make_sphere(0.05, 4))), .wall_m = 0.004, .nodes = 2000}, report);
   expect_sound(m);

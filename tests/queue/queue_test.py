@@ -5,6 +5,7 @@ usage: queue_test.py BIN_DIR CASE
 """
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -241,7 +242,24 @@ def lost_claims(service):
     service.check_nothing_left()
 
 
-cases = {function.__name__: function for function in (kills, hopeless, cancel, stop, time_limit, two_runs, disk_full, clock, hang, lost_claims)}
+def killed_before_publication(service):
+    """An attempt that was killed between the solve and the publication: the next one publishes its bank, and the job has a log."""
+    service.mesh("bar.msh", 300)
+    (identity,) = service.submit(service.write_job("job.json", "bar.msh"))
+    check(service.wait_end(service.run()) == 0, "carillon run ends badly")
+    solved = service.path / "bank.hdf"
+    shutil.copy(service.bank(identity), solved)
+    service.store = service.path / "another store"
+    check(service.submit("job.json") == [identity], "another id")
+    shutil.copy(solved, service.store / "work" / identity[:2] / identity / "bank.hdf")
+    check(service.wait_end(service.run()) == 0, "carillon run ends badly")
+    check(service.job(identity)["state"] == "done", f"{service.job(identity)}")
+    check("solved by an attempt that ended before it was published" in service.call("log", identity), "no log")
+    check(service.bank(identity).read_bytes() == solved.read_bytes(), "it was solved again")
+    service.check_nothing_left()
+
+
+cases = {function.__name__: function for function in (killed_before_publication, kills, hopeless, cancel, stop, time_limit, two_runs, disk_full, clock, hang, lost_claims)}
 service = Service(sys.argv[1])
 try:
     cases[sys.argv[2]](service)
