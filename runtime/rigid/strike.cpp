@@ -23,6 +23,7 @@ using impact::dot;
 
 constexpr double kInstant = 1e-9;      // m; how well an instant of impact is found,
 constexpr int kLooks = 20;             // and in how many looks at most
+constexpr double kNear = 1e-6;         // m; what is nearer at the end of a step strikes there
 constexpr std::size_t kFewPoints = 8;  // of an impact that is solved to rounding, its load shared evenly
 constexpr double kLongestHertz = 20e-3;
 
@@ -129,7 +130,7 @@ std::optional<double> Space::find_instant(const Ref& ref, double apex_s, double 
     open_m = shut_m;
     shut = h;
     shut_m = look(h);
-    if (shut_m > kInstant) return std::nullopt;
+    if (shut_m > kNear) return std::nullopt;
   }
   if (shut_m >= -kInstant) return shut;
   // The secant between what is open and what is shut; the value of an end that stays is halved (Illinois), so that both come closer.
