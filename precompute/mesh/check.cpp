@@ -68,12 +68,17 @@ double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squ
   return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
+/// `determinant` and the square of the longest edge as calc_determinant gives them.
+bool is_flat(double determinant, double longest_squared) {
+  return !(std::abs(determinant) > kFlat * longest_squared * std::sqrt(longest_squared));
+}
+
 void orient(TetMesh& mesh, const std::string& name, CheckReport& report) {
   std::vector<std::int64_t> flat;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     double longest_squared = 0.0;
     const double determinant = calc_determinant(mesh, e, longest_squared);
-    if (!(std::abs(determinant) > kFlat * longest_squared * std::sqrt(longest_squared))) {
+    if (is_flat(determinant, longest_squared)) {
       flat.push_back(e);
     } else if (determinant < 0.0) {
       auto* tet = mesh.tets.data() + e * mesh.nodes_per_tet();
@@ -289,6 +294,16 @@ std::string list_elements(const std::vector<std::int64_t>& elements) {
   for (std::size_t i = 0; i < std::min(elements.size(), kShown); ++i) text += fmt::format("{}{}", i == 0 ? "" : ", ", elements[i] + 1);
   if (elements.size() > kShown) text += fmt::format(" and {} more", elements.size() - kShown);
   return text + " (tetrahedra counted from 1 in the order of the file)";
+}
+
+std::int64_t count_flat(const TetMesh& mesh) {
+  std::int64_t count = 0;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+    double longest_squared = 0.0;
+    const double determinant = calc_determinant(mesh, e, longest_squared);
+    count += is_flat(determinant, longest_squared);
+  }
+  return count;
 }
 
 CheckReport check_mesh(TetMesh& mesh, const std::string& name) {

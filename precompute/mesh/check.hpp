@@ -57,6 +57,9 @@ struct CheckReport {
 /// Not collective.
 CheckReport check_mesh(TetMesh& mesh, const std::string& name = "mesh");
 
+/// How many elements check_mesh would refuse as without volume.
+std::int64_t count_flat(const TetMesh& mesh);
+
 /// Several lines of text about the report, for the log.
 std::string describe(const CheckReport& report);
 

@@ -197,7 +197,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
       finish(mesh);
       refuse_empty(mesh);
       if (is_the_body(mesh)) return mesh;
-      if (comparison.lacks_part) break;
+      if (comparison.is_hopeless) break;
     }
     throw WrongMesh(comparison.fault, edge_m);
   }
@@ -212,7 +212,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     const double count = std::max(static_cast<double>(count_nodes(mesh, options.order)), 1.0);
     const bool met = std::abs(count / asked - 1) <= kCountTolerance;
     if (met && is_the_body(mesh)) return mesh;
-    if (comparison.lacks_part) break;
+    if (comparison.is_hopeless) break;
     if (met) {
       target = std::min(1.03 * target, asked * (1 + 0.7 * kCountTolerance));
       edge_m *= kShorter;

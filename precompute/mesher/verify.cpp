@@ -12,6 +12,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "precompute/mesh/check.hpp"
 #include "precompute/mesher/tet_quality.hpp"
 
 namespace carillon::mesher {
@@ -202,7 +203,10 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
       0.1 * edge * (body.wall_m > 0 ? calc_area(body.repaired.surface) / 3 : calc_area(body.repaired.surface)) / expectation.volume_m3;
   const double most_off = (body.wall_m > 0 ? 0.08 : 0.03) + part;
   const double off = result.volume_m3 / expectation.volume_m3 - 1;
-  if (!(std::abs(off) <= most_off))
+  const std::int64_t flat = mesh::count_flat(linear);
+  if (flat > 0)
+    result.fault = fmt::format("has {} element{} without volume", flat, flat == 1 ? "" : "s");
+  else if (!(std::abs(off) <= most_off))
     result.fault = fmt::format("has {:+.1f} % of the body's volume too {}, where {:.1f} % are the most that its facets explain",
                                100 * std::abs(off), off > 0 ? "much" : "little", 100 * most_off);
   else if (outside > 0)
@@ -215,10 +219,10 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
                                    : fmt::format("{} to {}", expectation.shells.least, expectation.shells.most));
 
   // Of a hollow that was filled where elements are as long as the wall is thick several times over.
-  result.lacks_part =
-      !result.fault.empty() && result.shells < expectation.shells.least && body.wall_m > 0 && edge > kHopelessWalls * body.wall_m;
+  result.is_hopeless = flat > 0 || (!result.fault.empty() && result.shells < expectation.shells.least && body.wall_m > 0 &&
+                                    edge > kHopelessWalls * body.wall_m);
   if (std::string lost = describe_lost(body, calc_box(linear.nodes).extent(), edge, "is"); !lost.empty()) {
-    result.lacks_part = true;
+    result.is_hopeless = true;
     result.fault = std::move(lost);
   }
   return result;

@@ -29,14 +29,14 @@ struct Comparison {
   double volume_m3 = 0;
   std::int64_t shells = 0;
   double farthest_outside_m = 0;
-  std::string fault = {};   // empty: the mesh is the body; else what is off, as the end of a sentence "the mesh ..."
-  bool lacks_part = false;  // a part, or the hollow, is missing: slightly shorter edges will not bring it back
+  std::string fault = {};    // empty: the mesh is the body; else what is off, as the end of a sentence "the mesh ..."
+  bool is_hopeless = false;  // slightly shorter edges will not help: a part, or the hollow, is missing, or elements have no volume
 };
 
-/// Compares a linear mesh with the body. Off is: a volume that differs by more than 3 % and what facets a tenth of an edge off the skin
-/// would take away from a solid (8 % and a third of that for a wall); a node farther outside, or inside the hollow, than a tenth of an edge
-/// and half a sample of the distance field; other shells than expected; an extent that falls short by a tenth and by two edges: a part that
-/// is thinner than the elements is missing.
+/// Compares a linear mesh with the body. Off is: an element without volume (mesh::count_flat); a volume that differs by more than 3 % and
+/// what facets a tenth of an edge off the skin would take away from a solid (8 % and a third of that for a wall); a node farther outside,
+/// or inside the hollow, than a tenth of an edge and half a sample of the distance field; other shells than expected; an extent that falls
+/// short by a tenth and by two edges: a part that is thinner than the elements is missing.
 Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectation& expectation);
 
 }  // namespace carillon::mesher

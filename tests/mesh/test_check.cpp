@@ -202,9 +202,10 @@ TEST(check, a_node_that_joins_two_parts_at_a_point_is_a_warning) {
   EXPECT_NE(report.warnings.at(0).find("at a point only"), std::string::npos);
 }
 
-TEST(check, elements_without_volume_are_refused_by_number_and_mend) {
+TEST(check, elements_without_volume_are_counted_and_refused_by_number_and_remedy) {
   TetMesh mesh = make_two();
   mesh.nodes[4] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
+  EXPECT_EQ(count_flat(mesh), 1);
   expect_refusal(mesh, {"1 element without volume: 2", "counted from 1", "Mesh.Optimize"});
   mesh = make_cube(3);
   for (auto& x : mesh.nodes) x[2] = 0.0;
