@@ -22,7 +22,7 @@ def kills(service):
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000, resources={"ranks": 2}))
     run = service.run(has_pictures=True)
     for kind in ("rank", "mpirun", "attempt", "run"):
-        service.wait_for(f"a {kind} to kill", lambda: len(service.processes()["rank"]) == 2 and service.processes()[kind])
+        service.wait_for(f"a {kind} to kill", lambda: (found := service.processes()) and len(found["rank"]) == 2 and found[kind])
         time.sleep(0.3)
         victims = service.processes()
         if not victims[kind]:
@@ -195,8 +195,8 @@ def clock(service):
     (identity,) = service.submit(service.write_job("job.json", "bar.msh", 30000))
     for prefix in (other, ()):
         run = service.run(prefix=prefix)
-        service.wait_for("a rank", lambda: service.processes()["rank"])
-        service.kill(service.processes()["rank"][0])
+        rank, *_ = service.wait_for("a rank", lambda: service.processes()["rank"])
+        service.kill(rank)
         service.wait_for("a back-off", lambda: service.job(identity)["state"] == "waiting")
         service.kill(run.pid)
         run.wait()

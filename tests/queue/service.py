@@ -35,6 +35,16 @@ def is_alive(pid):
     return stat != b"" and stat.rsplit(b")", 1)[1].split()[0] not in (b"Z", b"X")
 
 
+def read_words(pid, has_words):
+    """The command line of a process. While a program starts anew (the solver does once, to choose kernels) Linux shows none, for up to 20 ms."""
+    end = time.monotonic() + 0.5
+    while True:
+        words = read(f"/proc/{pid}/cmdline").split(b"\0")
+        if words[0] or not has_words or time.monotonic() > end or not is_alive(pid):
+            return words
+        time.sleep(0.001)
+
+
 class Service:
     def __init__(self, bin_dir):
         self.bin = pathlib.Path(bin_dir).resolve()
@@ -110,12 +120,12 @@ class Service:
         for entry in os.listdir("/proc"):
             if not entry.isdigit() or not is_alive(entry):
                 continue
-            words = read(f"/proc/{entry}/cmdline").split(b"\0")
-            name = words[0].rsplit(b"/", 1)[-1]
             try:
                 where = os.readlink(f"/proc/{entry}/cwd").encode()
             except OSError:
                 continue
+            words = read_words(entry, where.startswith(folder))
+            name = words[0].rsplit(b"/", 1)[-1]
             if name == b"carillon" and folder in b" ".join(words):
                 kind = "attempt" if b"attempt" in words else "run" if b"run" in words else None
             elif where.startswith(folder):
