@@ -172,8 +172,9 @@ class Attempt {
     const store::Request request = check_inputs();
     bool has_bank = false;
     if (!find_bank_fault(work_, request, has_bank)) {
-      // Its log may be lost with it: a job that is done has one.
-      fmt::print(stderr, "carillon attempt: the bank was solved by an attempt that ended before it was published\n");
+      // What that attempt printed may be lost with it; a job that is done has a log, under Slurm too, where this error stream is not it.
+      store::append_text(work_ / store::kLogFile,
+                         "carillon attempt: the bank was solved by an attempt that ended before it was published\n");
       return set(Cause::done, "");
     }
     if (has_bank) store::OpenFolder::open(work_).remove(store::kBankFile);

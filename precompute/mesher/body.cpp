@@ -8,6 +8,7 @@
 
 #include "precompute/mesher/inset_curves.hpp"
 #include "precompute/mesher/untangle_curves.hpp"
+#include "runtime/config/crossing.hpp"
 #include "runtime/config/error.hpp"
 
 namespace carillon::mesher {
@@ -142,7 +143,7 @@ std::optional<Vec3> find_skin(const Body& body, const Vec3& middle, const Vec3& 
     const Vec3 p = body.nearest->find(middle);
     return norm(p - middle) < reach_m ? std::optional(p) : std::nullopt;
   }
-  // The body's function is about a distance, so its value is the first guess of the way; then regula falsi (Illinois).
+  // The body's function is about a distance, so its value is the first guess of the way.
   const auto calc = [&](double t) { return calc_body(*body.field, body.wall_m, middle + t * normal); };
   double low = 0, at_low = calc(0), high = 0, at_high = at_low;
   for (double way = 1.5 * std::abs(at_low) + 0.01 * reach_m; (at_high > 0) == (at_low > 0); way *= 2) {
@@ -151,16 +152,7 @@ std::optional<Vec3> find_skin(const Body& body, const Vec3& middle, const Vec3& 
     if (high == low) return std::nullopt;
     at_high = calc(high);
   }
-  for (int n = 0; n < 40 && std::abs(high - low) > 1e-6 * reach_m; ++n) {
-    const double t = high - at_high * (high - low) / (at_high - at_low), at = calc(t);
-    if (at == 0) return middle + t * normal;
-    if ((at > 0) != (at_high > 0))
-      low = high, at_low = at_high;
-    else
-      at_low *= 0.5;
-    high = t, at_high = at;
-  }
-  return middle + high * normal;
+  return middle + config::find_crossing(calc, low, at_low, high, at_high, 0, 1e-6 * reach_m, 40) * normal;
 }
 
 }  // namespace carillon::mesher

@@ -1,6 +1,6 @@
-// From a surface file to tetrahedra: reads, scales, repairs, then makes meshes until the node count is met, and finishes the last one. One
-// file, because it is one path whose every step decides what the next one gets; the steps themselves live in the other files of this
-// folder.
+// One path from a surface file to tetrahedra, whose every step decides what the next one gets; longer than most files.
+// It reads, scales, repairs, then makes meshes until the node count is met, and finishes the last one; the steps themselves live in the
+// other files of this folder.
 #include "precompute/mesher/surface.hpp"
 
 #include <fmt/core.h>
@@ -472,8 +472,11 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   Body body;
   TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
   report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
-  std::optional<CpuLimit> cpu_limit(std::in_place, kLeastCpuOfRepair + kCpuPerTriangle * static_cast<double>(raw.triangles.size()) +
-                                                       kCpuPerNode * static_cast<double>(options.nodes.value_or(0)));
+  const auto calc_limit = [&](double least, double nodes) {
+    return least + kCpuPerTriangle * static_cast<double>(report.input_triangles) + kCpuPerNode * nodes;
+  };
+  const double asked = static_cast<double>(options.nodes.value_or(0));
+  std::optional<CpuLimit> cpu_limit(std::in_place, calc_limit(kLeastCpuOfRepair, asked));
   scale_surface(raw, options, report);
   tell_roughly(raw, options, phases);
   body.repaired = phases.run("repairing", [&] { return repair_surface(std::move(raw), options, report); });
@@ -491,9 +494,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
                                  options.surface.string(), edge, nodes, kMostNodes));
   const double least = calc_least_nodes(body);
-  cpu_limit.reset();
-  cpu_limit.emplace(kLeastCpu + kCpuPerTriangle * static_cast<double>(report.input_triangles) +
-                    kCpuPerNode * (options.nodes ? static_cast<double>(*options.nodes) : std::max(body.model.calc_nodes(edge), least)));
+  cpu_limit.emplace(calc_limit(kLeastCpu, options.nodes ? asked : std::max(body.model.calc_nodes(edge), least)));
   if (!options.nodes && least > 1.5 * kMostNodes) throw_count(options, CountError("", least, least));
   if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * least)
     throw_count(options, CountError("", least, least));
@@ -509,9 +510,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   // Refinement of what is too thin for its elements takes long, and would fall short of it in the end. To meet a count, edges may become
   // longer than these.
   constexpr double kLonger = 1.5;
-  if (body.field)
-    if (const std::string lost = find_lost(body, options.nodes ? kLonger * edge : edge); !lost.empty())
-      throw_wrong(options, body, WrongMesh(lost, edge));
+  if (const std::string lost = find_lost(body, options.nodes ? kLonger * edge : edge); !lost.empty())
+    throw_wrong(options, body, WrongMesh(lost, edge));
   report.expected_volume_m3 = body.field ? calc_volume(*body.field, body.wall_m) : report.input_volume_m3;
   if (body.wall_m > 0) {
     body.model.volume_m3 = report.expected_volume_m3;

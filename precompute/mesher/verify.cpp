@@ -134,19 +134,18 @@ std::string describe_lost(const Body& body, const Vec3& made, double edge_m, con
 }  // namespace
 
 std::string find_lost(const Body& body, double edge_m) {
-  const DistanceField& field = *body.field;
-  std::array<std::int32_t, 3> low = field.size, high{-1, -1, -1};
-  std::size_t n = 0;
-  for (std::int32_t k = 0; k < field.size[2]; ++k)
-    for (std::int32_t j = 0; j < field.size[1]; ++j)
-      for (std::int32_t i = 0; i < field.size[0]; ++i, ++n) {
-        if (!(field.samples[n] < 0)) continue;
-        const std::array<std::int32_t, 3> at{i, j, k};
-        for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], at[c]), high[c] = std::max(high[c], at[c]);
-      }
-  // The skin is less than a sample beyond the last one inside.
+  if (!body.field) return "";
+  const std::vector<Region> regions = find_regions(*body.field, 0, true);
   Vec3 made{};
-  for (int c = 0; c < 3; ++c) made[c] = high[c] < 0 ? 0 : field.voxel_m * (high[c] - low[c] + 2);
+  for (int c = 0; c < 3; ++c) {
+    std::int32_t low = INT32_MAX, high = INT32_MIN;
+    for (std::size_t r = 1; r < regions.size(); ++r) {  // the first is the space around the body
+      low = std::min(low, regions[r].low[c]);
+      high = std::max(high, regions[r].high[c]);
+    }
+    // The skin is less than a sample beyond the last one inside.
+    if (regions.size() > 1) made[c] = body.field->voxel_m * (high - low + 2);
+  }
   return describe_lost(body, made, edge_m, "would be at most");
 }
 

@@ -15,7 +15,7 @@ struct Shells {
 Shells count_shells(const Body& body, double edge_m);
 
 /// Of a body that is known by its distance field alone: what its elements cannot show, since not even the field does, as the end of a
-/// sentence "the mesh ...". Empty if there is nothing.
+/// sentence "the mesh ...". Empty if there is nothing, or no field.
 std::string find_lost(const Body& body, double edge_m);
 
 /// What the mesh is compared with, beyond the body.

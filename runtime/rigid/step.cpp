@@ -1,3 +1,4 @@
+// One step from its prediction to its rest, on the rows that all its parts share; longer than most files.
 // Method: one group through one small step. A touch that lasts is a row of one velocity problem; impulses act at the middle of the step and
 //   places follow from the mean of the velocities at its two ends. With the arm from x0 + h v0 / 2 momentum and angular momentum of a free
 //   group are conserved to rounding, and a contact that neither slides nor strikes does no work. Rest is proven by a solution with zero

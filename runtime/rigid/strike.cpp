@@ -11,6 +11,7 @@
 #include <set>
 #include <tuple>
 
+#include "runtime/config/crossing.hpp"
 #include "runtime/impact/predict.hpp"
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
@@ -133,24 +134,7 @@ std::optional<double> Space::find_instant(const Ref& ref, double apex_s, double 
     if (shut_m > kNear) return std::nullopt;
   }
   if (shut_m >= -kInstant) return shut;
-  // The secant between what is open and what is shut; the value of an end that stays is halved (Illinois), so that both come closer.
-  int stays = 0;
-  for (int n = 0; n < kLooks; ++n) {
-    const double at = shut - shut_m * (shut - open) / (shut_m - open_m), gap_m = look(at);
-    if (gap_m > 0.0) {
-      open = at;
-      open_m = gap_m;
-      if (stays > 0) shut_m *= 0.5;
-      stays = 1;
-    } else {
-      shut = at;
-      shut_m = gap_m;
-      if (stays < 0) open_m *= 0.5;
-      stays = -1;
-    }
-    if (std::abs(gap_m) <= kInstant) return at;
-  }
-  return shut;
+  return config::find_crossing(look, open, open_m, shut, shut_m, kInstant, 0.0, kLooks);
 }
 
 /// Looks at the pairs of an impact again, as they are at its instant: an edge that passes another one close by was taken for a plane until

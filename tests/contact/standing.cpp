@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "tests/contact/bodies.hpp"
@@ -36,6 +37,30 @@ TEST(Standing, ABoxOnOthersDoesNotCreep) {
   const Course course = run(w, 2.0, 12.0);
   EXPECT_LT(calc_drift(course), 1e-6);
   EXPECT_LT(course.last_hit_s, 1.0);
+}
+
+TEST(Standing, NothingMovesOrStrikesInTheGroupOfSomethingFast) {
+  // Boxes stand on a plank, each in touch with it alone, while another one slides along the plank without friction.
+  const bank::Bank box = make_box({0.06, 0.05, 0.04}), plank = make_box({2.0, 0.4, 0.02});
+  WorldSpec w;
+  w.ground = GroundSpec{};
+  w.bodies = {make_body("plank", plank, {0, 0, 0.01}), make_body("fast", box, {-0.9, 0.1, 0.04})};
+  for (int i = 0; i < 6; ++i) w.bodies.push_back(make_body("stands", box, {-0.5 + 0.2 * i, -0.1, 0.04}));
+  w.bodies[1].velocity_m_s = {5.0, 0, 0};
+  w.bodies[1].friction = 0.0;
+  World world(w, {.end_s = 0.3, .lasting_contacts = false});
+  std::vector<stream::Motion> begun(w.bodies.size()), last(w.bodies.size());
+  int hits = 0;
+  world.advance(0.3, std::numeric_limits<double>::infinity(), [&](const stream::Event& e) {
+    if (const auto* i = std::get_if<Impulse>(&e)) hits += i->body >= 2 ? 1 : 0;
+    if (const auto* m = std::get_if<stream::Motion>(&e)) {
+      last[static_cast<std::size_t>(m->body)] = *m;
+      if (m->time_s == 0.0) begun[static_cast<std::size_t>(m->body)] = *m;
+    }
+  });
+  EXPECT_NEAR(last[1].position_m[0] - begun[1].position_m[0], 1.5, 1e-6) << "nothing brakes it";
+  EXPECT_EQ(hits, 0);
+  for (std::size_t i = 2; i < w.bodies.size(); ++i) EXPECT_LT(norm(last[i].position_m - begun[i].position_m), 1e-6) << i;
 }
 
 TEST(Standing, WhatFallsAsleepSaysSoByALastMotionAtRest) {

@@ -13,6 +13,7 @@
 #include "precompute/mesher/tet_quality.hpp"
 #include "runtime/config/error.hpp"
 #include "tests/mesher/surfaces.hpp"
+#include "tests/support/box_mesh.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -338,26 +339,8 @@ TEST(bodies, a_part_that_elements_are_too_coarse_for_is_not_left_out_in_silence)
 
 TEST(bodies, elements_of_what_is_flat_itself_are_not_improved_for_long) {
   // A sheet of one layer, a hundred times as wide as it is thick in each element: no place of its nodes makes an element less flat by much.
-  constexpr int kCells = 20;
-  mesh::TetMesh sheet;
-  const auto at = [](int i, int j, int k) { return static_cast<std::int32_t>((k * (kCells + 1) + j) * (kCells + 1) + i); };
-  for (int k = 0; k < 2; ++k)
-    for (int j = 0; j <= kCells; ++j)
-      for (int i = 0; i <= kCells; ++i)
-        sheet.nodes.push_back({0.1 * i + 0.02 * std::sin(7.0 * j), 0.1 * j + 0.02 * std::sin(5.0 * i), 0.001 * k});
-  for (int j = 0; j < kCells; ++j)
-    for (int i = 0; i < kCells; ++i) {
-      std::array<int, 3> order{0, 1, 2};
-      do {  // six elements of a cell, each along a way from one corner to the opposite one
-        std::array<int, 3> corner{i, j, 0};
-        std::array<std::int32_t, 4> tet{at(corner[0], corner[1], corner[2]), 0, 0, 0};
-        for (int n = 0; n < 3; ++n) ++corner[order[n]], tet[n + 1] = at(corner[0], corner[1], corner[2]);
-        const bool is_even = (order[1] - order[0] + 3) % 3 == 1;
-        if (!is_even) std::swap(tet[2], tet[3]);
-        sheet.tets.insert(sheet.tets.end(), tet.begin(), tet.end());
-      } while (std::next_permutation(order.begin(), order.end()));
-    }
-  ASSERT_EQ(sheet.tet_count(), 6 * kCells * kCells);
+  mesh::TetMesh sheet = tests::make_box({20, 20, 1}, {2.0, 2.0, 0.001});
+  for (Vec3& p : sheet.nodes) p = {p[0] + 0.02 * std::sin(70.0 * p[1]), p[1] + 0.02 * std::sin(50.0 * p[0]), p[2]};
   ASSERT_GT(measure(sheet).volume_m3, 0.0);
   const std::int64_t moved = better_flat_elements(sheet, 12, [](const Vec3& p) { return p; });
   EXPECT_LT(moved, static_cast<std::int64_t>(sheet.nodes.size()));
