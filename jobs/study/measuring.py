@@ -11,6 +11,8 @@ import sys
 import tempfile
 import time
 
+from errors import RunError
+
 PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "error bars", "write", "other")
 
 
@@ -69,8 +71,16 @@ def make_environment():
                    "OMPI_MCA_mpi_yield_when_idle": "1", "HWLOC_COMPONENTS": "-gl"}
 
 
+class Failed(RuntimeError):
+    """A program that did not end with 0: its exit code (negative: the signal that ended it) and its last lines."""
+
+    def __init__(self, program, code, lines):
+        super().__init__(f"{program}: exit code {code}\n" + "".join(lines))
+        self.program, self.code, self.lines = program, code, [line.strip() for line in lines if line.strip()]
+
+
 def run_measured(command, cwd, environment=None, timeout_s=3600):
-    """Runs the command; its output goes nowhere unless it fails. Raises RuntimeError with its last lines when it does."""
+    """Runs the command; its output goes nowhere unless it fails. Raises Failed when it does."""
     with tempfile.TemporaryFile("w+") as log:
         start = time.monotonic()
         child = subprocess.Popen([str(word) for word in command], cwd=cwd, stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
@@ -90,9 +100,20 @@ def run_measured(command, cwd, environment=None, timeout_s=3600):
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode != 0:
             log.seek(0)
-            tail = "".join(log.readlines()[-8:])
-            raise RuntimeError(f"{os.path.basename(str(command[0]))}: exit code {child.returncode}\n{tail}")
+            raise Failed(os.path.basename(str(command[0])), child.returncode, log.readlines()[-8:])
     return Cost(usage.ru_utime + usage.ru_stime, wall)
+
+
+def run_part(command, cwd, what, environment=None, timeout_s=3600):
+    """run_measured of a part of a study. RunError names it and has the program's own error line and exit code; 4, where that is none of those that say whose fault it was."""
+    try:
+        return run_measured(command, cwd, environment, timeout_s)
+    except Failed as error:
+        said = [line for line in error.lines if "error" in line] or error.lines[-1:]
+        if error.code in (2, 3) and said:
+            raise RunError(error.code, f"{what}: {said[0]}") from None
+        ended = f"{error.program} ended with exit code {error.code}"
+        raise RunError(4, f"{what}: {ended} and said: {said[0]}" if said else f"{what}: {ended}") from None
 
 
 def find_median(values):

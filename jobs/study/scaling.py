@@ -148,13 +148,7 @@ class Study:
     def run_case(self, case):
         name = self.name(case)
         command = ["mpirun", "-np", case.ranks, self.program, "-q", f"{name}.json"]
-        try:
-            cost = measuring.run_measured(command if case.ranks > 1 else command[3:], self.out, timeout_s=self.options.timeout)
-        except RuntimeError as error:
-            code = re.search(r"exit code (-?\d+)", str(error))
-            number = int(code.group(1)) if code else 4
-            lines = [line for line in str(error).splitlines() if "carillon-precompute: error" in line] or str(error).splitlines()
-            raise RunError(number if number in (2, 3) else 4, f"{name}: {lines[0]}") from None
+        cost = measuring.run_part(command if case.ranks > 1 else command[3:], self.out, name, timeout_s=self.options.timeout)
         record = json.loads((self.out / f"{name}.hdf.resolved.json").read_text())["run"]
         record["cost"] = dataclasses.asdict(cost)
         print(f"{self.describe(case)}: {3 * record['mesh']['free_nodes']:,} unknowns, {record['solver']['modes']} modes, {cost.cpu_s:.2f} CPU s, {cost.wall_s:.2f} s", flush=True)

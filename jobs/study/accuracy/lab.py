@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import pathlib
-import re
 import shlex
 import shutil
 import subprocess
@@ -153,14 +152,7 @@ class Lab:
 
     def call(self, command, what, environment=None, cwd=None):
         """One measured run. RunError carries the program's exit code and its own error line."""
-        try:
-            return measuring.run_measured(command, cwd or self.out, environment=environment, timeout_s=self.timeout_s)
-        except RuntimeError as error:
-            code = re.search(r"exit code (-?\d+)", str(error))
-            number = int(code.group(1)) if code else 4
-            said = [line.strip() for line in str(error).splitlines() if line.strip()]
-            lines = [line for line in said[1:] if "error" in line] or said[-1:]
-            raise RunError(number if number in (2, 3) else 4, f"{what}: {lines[0]}") from None
+        return measuring.run_part(command, cwd or self.out, what, environment, self.timeout_s)
 
     # --- solves
 

@@ -13,6 +13,7 @@ sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(_
 import charts
 import measuring
 import system
+from errors import RunError
 
 STEEL = (1.2e11, 8e10, 7850.0)  # Lame's lambda, mu [Pa], density [kg/m^3]
 
@@ -55,6 +56,11 @@ class Measuring(unittest.TestCase):
     def test_a_failing_program_tells_its_last_words(self):
         with self.assertRaisesRegex(RuntimeError, "exit code 3\nno such mesh"):
             measuring.run_measured(["sh", "-c", "echo no such mesh >&2; exit 3"], ".")
+        for command, code, text in (("echo error: no such key; exit 2", 2, "^bar: error: no such key$"), ("echo error: no such key; exit 7", 4, "^bar: sh ended with exit code 7 and said: error: no such key$"),
+                                    ("kill -9 $$", 4, "^bar: sh ended with exit code -9$")):
+            with self.assertRaisesRegex(RunError, text) as caught:
+                measuring.run_part(["sh", "-c", command], ".", "bar")
+            self.assertEqual(caught.exception.code, code)
 
     def test_median_and_spread(self):
         self.assertEqual(measuring.find_median([5.0, 1.0, 2.0]), 2.0)
