@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <tuple>
 
 #include "runtime/config/chance.hpp"
 #include "runtime/impact/spring.hpp"
@@ -50,58 +49,55 @@ Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const V
   return {place.triangle, place.barycentric};
 }
 
-/// What touches at one place now.
-struct LastingContacts::Group {
-  int a = 0, b = -1;
-  Vec3 where{}, normal{}, carried{}, turn{};  // carried: the velocity of the surface whose points carry
-  double push_n = 0.0, curvature_per_m = 0.0;
-  bool smooth = false;
-  std::vector<std::uint64_t> features;
-};
-
-std::vector<LastingContacts::Group> LastingContacts::make_groups(const rigid::Space& space) {
+/// Fills groups_ with what carries now, pair after pair.
+void LastingContacts::make_groups(const rigid::Space& space) {
+  groups_.clear();
+  carriers_.clear();
   space.list_contacts(contacts_);
-  // Groups have steps of different lengths: each counts when its step ends.
-  std::erase_if(contacts_, [&](const rigid::Contact* c) {
-    return !(c->step_s > 0.0 && c->touching && dot(c->impulse, c->touch.normal) > 0.0) ||
-           std::abs(c->until_s - space.get_time()) > kInstant;
-  });
-  const auto get_push = [](const rigid::Contact* c) { return dot(c->impulse, c->touch.normal) / c->step_s; };
-  std::stable_sort(contacts_.begin(), contacts_.end(), [&](const auto* x, const auto* y) {
-    return std::tuple(x->a, x->b, -get_push(x)) < std::tuple(y->a, y->b, -get_push(y));
-  });
-  std::vector<char> taken(contacts_.size(), 0);
-  std::vector<Group> groups;
-  for (std::size_t seed = 0; seed < contacts_.size(); ++seed) {
-    if (taken[seed]) continue;
-    const rigid::Contact& first = *contacts_[seed];
-    Group g;
-    g.a = first.a;
-    g.b = first.b;
-    const double near = calc_spot_radius(space, g.a, g.b);
-    for (std::size_t i = seed; i < contacts_.size() && contacts_[i]->a == g.a && contacts_[i]->b == g.b; ++i) {
-      const rigid::Contact& c = *contacts_[i];
-      if (taken[i] || norm(c.touch.where_m - first.touch.where_m) > near) continue;
-      taken[i] = 1;
-      const double push = get_push(&c);
-      g.push_n += push;
-      g.where = g.where + push * c.touch.where_m;
-      g.normal = g.normal + push * c.touch.normal;
-      g.carried = g.carried + push * space.calc_velocity(c.touch.side_a == shape::Side::plane ? g.b : g.a, c.touch.where_m);
-      g.curvature_per_m += push * (c.touch.curvature_a_per_m + c.touch.curvature_b_per_m);
-      g.smooth = g.smooth || c.touch.smooth;
-      g.features.push_back(c.touch.id);
-    }
-    g.where = (1.0 / g.push_n) * g.where;
-    g.carried = (1.0 / g.push_n) * g.carried;
-    g.curvature_per_m /= g.push_n;
-    g.normal = (1.0 / norm(g.normal)) * g.normal;
-    const Vec3 turn = space.get_spin(g.a) - (g.b >= 0 ? space.get_spin(g.b) : Vec3{});
-    g.turn = turn - dot(turn, g.normal) * g.normal;
-    std::sort(g.features.begin(), g.features.end());
-    groups.push_back(std::move(g));
+  for (const rigid::Contact* c : contacts_) {
+    // Groups have steps of different lengths: each counts when its step ends.
+    if (!(c->step_s > 0.0) || !c->touching || std::abs(c->until_s - space.get_time()) > kInstant) continue;
+    const double push = dot(c->impulse, c->touch.normal) / c->step_s;
+    if (push > 0.0) carriers_.push_back({c, push, false});
   }
-  return groups;
+  const auto is_of_other_pair = [](const Carrier& x, const Carrier& y) {
+    return x.contact->a != y.contact->a || x.contact->b != y.contact->b;
+  };
+  for (auto begin = carriers_.begin(); begin != carriers_.end();) {
+    const auto end = std::find_if(begin, carriers_.end(), [&](const Carrier& c) { return is_of_other_pair(c, *begin); });
+    std::stable_sort(begin, end, [](const Carrier& x, const Carrier& y) { return x.push_n > y.push_n; });
+    for (auto seed = begin; seed != end; ++seed)
+      if (!seed->is_taken) groups_.push_back(make_group(space, {seed, end}));
+    begin = end;
+  }
+}
+
+/// The first of these and those near it that no group has yet.
+LastingContacts::Group LastingContacts::make_group(const rigid::Space& space, std::span<Carrier> carriers) {
+  const rigid::Contact& first = *carriers.front().contact;
+  Group g;
+  g.a = first.a;
+  g.b = first.b;
+  const double near = calc_spot_radius(space, g.a, g.b);
+  for (Carrier& carrier : carriers) {
+    const rigid::Contact& c = *carrier.contact;
+    if (carrier.is_taken || norm(c.touch.where_m - first.touch.where_m) > near) continue;
+    carrier.is_taken = true;
+    g.push_n += carrier.push_n;
+    g.where = g.where + carrier.push_n * c.touch.where_m;
+    g.normal = g.normal + carrier.push_n * c.touch.normal;
+    g.carried = g.carried + carrier.push_n * space.calc_velocity(c.touch.side_a == shape::Side::plane ? g.b : g.a, c.touch.where_m);
+    g.curvature_per_m += carrier.push_n * (c.touch.curvature_a_per_m + c.touch.curvature_b_per_m);
+    g.smooth = g.smooth || c.touch.smooth;
+    g.features += scramble(c.touch.id);  // in any order
+  }
+  g.where = (1.0 / g.push_n) * g.where;
+  g.carried = (1.0 / g.push_n) * g.carried;
+  g.curvature_per_m /= g.push_n;
+  g.normal = (1.0 / norm(g.normal)) * g.normal;
+  const Vec3 turn = space.get_spin(g.a) - (g.b >= 0 ? space.get_spin(g.b) : Vec3{});
+  g.turn = turn - dot(turn, g.normal) * g.normal;
+  return g;
 }
 
 double LastingContacts::calc_patch(const Group& g, double radius_m) const {
@@ -182,7 +178,8 @@ std::uint64_t LastingContacts::make_id(const Spot& spot) {
 
 void LastingContacts::update(const rigid::Space& space, std::vector<stream::Event>& events) {
   const double time_s = space.get_time();
-  for (const Group& g : make_groups(space)) {
+  make_groups(space);
+  for (const Group& g : groups_) {
     Spot* nearest = nullptr;
     double least = 2.0 * calc_spot_radius(space, g.a, g.b);
     std::vector<Spot>& spots = spots_[{g.a, g.b}];

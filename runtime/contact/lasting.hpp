@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,16 +42,24 @@ class LastingContacts {
   void note_impact(const rigid::Space& space, int a, int b, const stream::Vec3& where, double time_s);
 
  private:
-  struct Group;
+  /// What touches at one place now.
+  struct Group {
+    int a = 0, b = -1;
+    stream::Vec3 where{}, normal{}, turn{};
+    stream::Vec3 carried{};  // the velocity of the surface whose points carry
+    double push_n = 0.0, curvature_per_m = 0.0;
+    bool smooth = false;
+    std::uint64_t features = 0;  // tells which of them carry
+  };
   /// A place where two bodies touch, followed while they do.
   struct Spot {
     std::uint64_t id = 0;  // of the contact, from its first record on
     int a = 0, b = -1;
     stream::Vec3 where{};
-    stream::Vec3 drift{};                 // velocity of the place over the surface that carries, smoothed
-    std::vector<std::uint64_t> features;  // that carry there
-    double quiet_s = 0.0;                 // time of the first touch, or of the last impact since
-    double seen_s = 0.0;                  // when it last touched
+    stream::Vec3 drift{};        // velocity of the place over the surface that carries, smoothed
+    std::uint64_t features = 0;  // which points carry there
+    double quiet_s = 0.0;        // time of the first touch, or of the last impact since
+    double seen_s = 0.0;         // when it last touched
     double recorded_s = 0.0;
     double begun_s = -1.0;                // time of its first record; below 0: none yet
     double load_n = 0.0;                  // smoothed
@@ -59,7 +68,15 @@ class LastingContacts {
     std::array<stream::Contact, 2> last;  // of both bodies
   };
 
-  std::vector<Group> make_groups(const rigid::Space& space);
+  /// A contact that carries.
+  struct Carrier {
+    const rigid::Contact* contact = nullptr;
+    double push_n = 0.0;
+    bool is_taken = false;
+  };
+
+  void make_groups(const rigid::Space& space);
+  Group make_group(const rigid::Space& space, std::span<Carrier> carriers);
   void record(const rigid::Space& space, const Group& group, Spot& spot, std::vector<stream::Event>& events);
   void end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<stream::Event>& events);
   std::uint64_t make_id(const Spot& spot);
@@ -71,7 +88,10 @@ class LastingContacts {
   std::vector<Matter> matter_;
   std::map<std::pair<int, int>, std::uint64_t> touches_;    // how many lasting contacts each pair has had
   std::map<std::pair<int, int>, std::vector<Spot>> spots_;  // by their bodies
+  // Of the step that has been made:
   std::vector<const rigid::Contact*> contacts_;
+  std::vector<Carrier> carriers_;
+  std::vector<Group> groups_;
 };
 
 }  // namespace carillon::contact

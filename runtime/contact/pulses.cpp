@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "runtime/rigid/limits.hpp"
 
@@ -77,7 +78,11 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
     const rigid::State& state =
         at == strike.bodies.end() ? space.state(body) : strike.before[static_cast<std::size_t>(at - strike.bodies.begin())];
     const double sign = side == 0 ? 1.0 : -1.0;
-    const Spotted place = find_place(space.solid(body), state, where, (-sign) * normal);
+    // Where one hit is alone, the place is known; where there are more, it is on the same face or near.
+    const std::optional<shape::Place>& known = first.places[static_cast<std::size_t>(side)];
+    const Spotted place = known && hits.size() == 1
+                              ? Spotted{known->triangle, known->barycentric}
+                              : find_place(space.solid(body), state, where, (-sign) * normal, known ? known->triangle : -1);
     pulse.body = body;
     pulse.other = side == 0 ? first.b : first.a;
     pulse.triangle = place.triangle;

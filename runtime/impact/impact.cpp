@@ -345,14 +345,15 @@ void Impact::set_up_step() {
   free_.assign(n, 0.0);
   moved_.assign(n, 0.0);
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j)
+    for (std::size_t j = 0; j <= i; ++j) {
+      double gain = 0.0;
       for (std::size_t s = 0; s < 2; ++s)
         for (std::size_t t = 0; t < 2; ++t)
-          if (rows_[i].body[s] >= 0 && rows_[i].body[s] == rows_[j].body[t]) {
-            const double gain = dot(rows_[i].linear[s], rows_[j].to_velocity[t]) + dot(rows_[i].angular[s], rows_[j].to_spin[t]);
-            mobility_[i * n + j] += gain;
-            A_[i * n + j] += 0.5 * h_ * h_ * gain;
-          }
+          if (rows_[i].body[s] >= 0 && rows_[i].body[s] == rows_[j].body[t])
+            gain += dot(rows_[i].linear[s], rows_[j].to_velocity[t]) + dot(rows_[i].angular[s], rows_[j].to_spin[t]);
+      mobility_[i * n + j] = mobility_[j * n + i] = gain;
+      A_[i * n + j] = A_[j * n + i] = 0.5 * h_ * h_ * gain;
+    }
   for (Group& group : groups_) {
     const Modes& modes = *bodies_[static_cast<std::size_t>(group.body)].modes;
     group.p = group.tail ? modes.find_tail_propagator(step_index_) : modes.find_propagator(step_index_);

@@ -11,11 +11,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+
+#include "runtime/impact/dense.hpp"
 
 namespace carillon::impact {
 namespace {
 
 constexpr int kSweeps = 200;
+constexpr double kFast = 1e-3;  // where a step leaves so little of the error, the next one takes the same factorisation
 
 /// The normal force of a step at whose end the compression is y1.
 StepForce calc_normal_force(const Touch& touch, double y1, double h_s) {
@@ -91,69 +95,65 @@ double StepSolver::calc_residual(const std::vector<Touch>& touches, const std::v
                                  const std::vector<double>& moved, double h_s, bool with_slopes) {
   calc_law(touches, moved, h_s, with_slopes);
   const std::size_t n = free.size();
+  change_.resize(pressed_.size());
+  for (std::size_t j = 0; j < pressed_.size(); ++j) change_[j] = -law_[pressed_[j]];
+  for (std::size_t i = 0; i < n; ++i) residual_[i] = moved[i] - free[i];
+  dense::get_functions().add_columns(A.data(), n, pressed_.data(), change_.data(), pressed_.size(), residual_.data(), n);
   double largest = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    double r = moved[i] - free[i];
-    for (const std::size_t j : pressed_) r -= A[i * n + j] * law_[j];
-    residual_[i] = r;
-    largest = std::max(largest, std::abs(r) / size_[i]);
-  }
+  for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, std::abs(residual_[i]) / size_[i]);
   return largest;
 }
 
-/// The step of Newton, (1 - A law') step_ = residual_. Columns of what does not press are those of 1: the rows that press are solved by
-/// elimination with partial pivoting, the others follow from theirs. False where it is singular.
-bool StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<double>& A) {
+/// Factorises 1 - A law' of the rows that press; columns of what does not are those of 1. False where it is singular.
+bool StepSolver::factorise(const std::vector<Touch>& touches, const std::vector<double>& A) {
   const std::size_t rows = residual_.size(), n = pressed_.size();
-  auto& J = jacobian_;
-  J.assign(n * n, 0.0);
-  step_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    J[i * n + i] = 1.0;
-    step_[i] = residual_[pressed_[i]];
-    std::size_t at = 0;
-    for (const std::size_t c : pressing_) {
-      for (std::size_t k = 0; k < touches[c].count_rows(); ++k) {
-        const double gain = A[pressed_[i] * rows + pressed_[at + k]];
-        for (std::size_t j = 0; j < touches[c].count_rows(); ++j) J[i * n + at + j] -= gain * slopes_[c][k][j];
-      }
-      at += touches[c].count_rows();
-    }
+  if (compliance_of_ != pressed_) {
+    compliance_of_ = pressed_;
+    compliance_.resize(n * n);
+    for (std::size_t j = 0; j < n; ++j)
+      for (std::size_t i = 0; i < n; ++i) compliance_[j * n + i] = A[pressed_[j] * rows + pressed_[i]];
   }
-  for (std::size_t k = 0; k < n; ++k) {
-    std::size_t pivot = k;
-    for (std::size_t i = k + 1; i < n; ++i)
-      if (std::abs(J[i * n + k]) > std::abs(J[pivot * n + k])) pivot = i;
-    if (!(std::abs(J[pivot * n + k]) > 0.0)) return false;
-    if (pivot != k) {
-      for (std::size_t j = k; j < n; ++j) std::swap(J[k * n + j], J[pivot * n + j]);
-      std::swap(step_[k], step_[pivot]);
+  pressing_then_ = pressing_;
+  pressed_then_ = pressed_;
+  slopes_then_ = slopes_;
+  jacobian_.assign(n * n, 0.0);
+  pivots_.resize(n);
+  const dense::Functions& functions = dense::get_functions();
+  std::size_t at = 0;
+  for (const std::size_t c : pressing_) {
+    const std::size_t own = touches[c].count_rows();
+    for (std::size_t j = 0; j < own; ++j) {
+      double* column = jacobian_.data() + (at + j) * n;
+      column[at + j] = 1.0;
+      const std::array<std::size_t, 3> which{at, at + 1, at + 2};
+      const std::array<double, 3> by{-slopes_[c][0][j], -slopes_[c][1][j], -slopes_[c][2][j]};
+      functions.add_columns(compliance_.data(), n, which.data(), by.data(), own, column, n);
     }
-    for (std::size_t i = k + 1; i < n; ++i) {
-      const double factor = J[i * n + k] / J[k * n + k];
-      if (factor == 0.0) continue;
-      for (std::size_t j = k + 1; j < n; ++j) J[i * n + j] -= factor * J[k * n + j];
-      step_[i] -= factor * step_[k];
-    }
+    at += own;
   }
-  for (std::size_t k = n; k-- > 0;) {
-    for (std::size_t j = k + 1; j < n; ++j) step_[k] -= J[k * n + j] * step_[j];
-    step_[k] /= J[k * n + k];
-  }
+  return functions.factorise(jacobian_.data(), n, n, pivots_.data());
+}
+
+/// The step of Newton, (1 - A law') step_ = residual_, with the law' that was factorised: the rows that press follow from that, the others
+/// from theirs.
+void StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<double>& A) {
+  const std::size_t rows = residual_.size(), n = pressed_then_.size();
+  const dense::Functions& functions = dense::get_functions();
+  solved_.resize(n);
+  for (std::size_t j = 0; j < n; ++j) solved_[j] = residual_[pressed_then_[j]];
+  functions.substitute(jacobian_.data(), n, n, pivots_.data(), solved_.data());
   // By what the forces change with that, the motions of all rows.
   change_.assign(n, 0.0);
   std::size_t at = 0;
-  for (const std::size_t c : pressing_) {
-    for (std::size_t k = 0; k < touches[c].count_rows(); ++k)
-      for (std::size_t j = 0; j < touches[c].count_rows(); ++j) change_[at + k] += slopes_[c][k][j] * step_[at + j];
-    at += touches[c].count_rows();
+  for (const std::size_t c : pressing_then_) {
+    const std::size_t own = touches[c].count_rows();
+    for (std::size_t k = 0; k < own; ++k)
+      for (std::size_t j = 0; j < own; ++j) change_[at + k] += slopes_then_[c][k][j] * solved_[at + j];
+    at += own;
   }
-  solved_.swap(step_);
   step_ = residual_;
-  for (std::size_t i = 0; i < rows; ++i)
-    for (std::size_t j = 0; j < n; ++j) step_[i] += A[i * rows + pressed_[j]] * change_[j];
-  for (std::size_t j = 0; j < n; ++j) step_[pressed_[j]] = solved_[j];
-  return std::all_of(step_.begin(), step_.end(), [](double x) { return std::isfinite(x); });
+  functions.add_columns(A.data(), rows, pressed_then_.data(), change_.data(), n, step_.data(), rows);
+  for (std::size_t j = 0; j < n; ++j) step_[pressed_then_[j]] = solved_[j];
 }
 
 /// Friction of one contact with its other forces given: u = c + A F/2, F = -k P(u) with P to at most limit/k. Where it slips, u and F are
@@ -221,10 +221,11 @@ bool StepSolver::solve(const std::vector<Touch>& touches, const std::vector<doub
   law_.resize(n);
   residual_.resize(n);
   slopes_.resize(touches.size());
+  all_.resize(n);
+  std::iota(all_.begin(), all_.end(), std::size_t{0});
   moved_ = free;
+  dense::get_functions().add_columns(A.data(), n, all_.data(), f.data(), n, moved_.data(), n);
   double size_normal = 1e-300, size_tangential = 1e-300;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j) moved_[i] += A[i * n + j] * f[j];
   for (const Touch& t : touches) {
     const auto row = static_cast<std::size_t>(t.row);
     size_normal = std::max({size_normal, std::abs(free[row]), 1e-3 * std::abs(t.compression_m)});
@@ -233,21 +234,33 @@ bool StepSolver::solve(const std::vector<Touch>& touches, const std::vector<doub
   }
   size_.assign(n, size_tangential);
   for (const Touch& t : touches) size_[static_cast<std::size_t>(t.row)] = size_normal;
+  compliance_of_.clear();  // A may be another one
   double error = calc_residual(touches, A, free, moved_, h_s, true);
+  bool is_fast = false, is_current = true;  // are forces and residual those of moved_?
   for (int iteration = 0; iteration < 40 && error > 1e-13; ++iteration) {
-    if (!find_step(touches, A)) break;
+    const bool is_new = !is_fast || pressed_ != pressed_then_;
+    if (is_new && !factorise(touches, A)) break;
+    find_step(touches, A);
     double part = 1.0, next = error;
     for (int halving = 0; halving < 12; ++halving, part *= 0.5) {
       trial_ = moved_;
       for (std::size_t i = 0; i < n; ++i) trial_[i] -= part * step_[i];
       next = calc_residual(touches, A, free, trial_, h_s, true);
-      if (next < error) break;
+      if (next < error || !is_new) break;
     }
-    if (!(next < error)) break;  // as near as rounding or a kink lets it
-    moved_.swap(trial_);
-    error = next;
+    is_fast = next < kFast * error;
+    is_current = next < error;
+    if (is_current) {
+      moved_.swap(trial_);
+      error = next;
+    } else if (is_new) {
+      break;  // as near as rounding or a kink lets it
+    } else {
+      error = calc_residual(touches, A, free, moved_, h_s, true);  // once more with a factorisation of its own
+      is_current = true;
+    }
   }
-  error = calc_residual(touches, A, free, moved_, h_s, false);
+  if (!is_current) error = calc_residual(touches, A, free, moved_, h_s, false);
   f = law_;
   if (error <= 1e-11) return true;
   if (sweep(touches, A, free, h_s, true, f)) return true;

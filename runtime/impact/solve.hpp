@@ -31,9 +31,9 @@ std::array<double, 2> calc_shortened(const std::array<double, 2>& x, double long
 class StepSolver {
  public:
   /// Finds forces f (N, one per row: normal >= 0, then the two tangents) with f = law(moved), moved = free + A f; `moved` [m] is the
-  /// separation along the normal and the slip along the tangents in the step. A: (rows, rows), symmetric positive semidefinite, row-major
-  /// [m/N]. f comes in as a guess. Newton with the laws' derivatives and halved steps; where it fails, single contacts in turn
-  /// (Gauss-Seidel); where that fails, the step without friction, which cannot gain energy, and the answer false.
+  /// separation along the normal and the slip along the tangents in the step. A: (rows, rows), symmetric positive semidefinite [m/N]. f
+  /// comes in as a guess. Newton with the laws' derivatives and halved steps; where it fails, single contacts in turn (Gauss-Seidel);
+  /// where that fails, the step without friction, which cannot gain energy, and the answer false.
   bool solve(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free, double h_s,
              std::vector<double>& f);
 
@@ -45,11 +45,17 @@ class StepSolver {
   static std::array<double, 2> solve_friction(const std::array<double, 3>& A, const std::array<double, 2>& c, double k, double limit);
   bool sweep(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free, double h_s, bool rubs,
              std::vector<double>& f) const;
-  bool find_step(const std::vector<Touch>& touches, const std::vector<double>& A);
+  bool factorise(const std::vector<Touch>& touches, const std::vector<double>& A);
+  void find_step(const std::vector<Touch>& touches, const std::vector<double>& A);
 
-  std::vector<double> law_, residual_, size_, moved_, trial_, jacobian_, step_, solved_, change_;
-  std::vector<std::size_t> pressing_, pressed_;               // contacts, and rows
-  std::vector<std::array<std::array<double, 3>, 3>> slopes_;  // per contact, of the forces by what moved
+  using Slopes = std::vector<std::array<std::array<double, 3>, 3>>;  // per contact, of the forces by what moved
+  std::vector<double> law_, residual_, size_, moved_, trial_, step_, solved_, change_;
+  std::vector<std::size_t> all_, pressing_, pressed_;  // rows; contacts that press, and their rows
+  Slopes slopes_;
+  // Of the motions at which the Jacobian was factorised last:
+  std::vector<double> compliance_, jacobian_;  // by columns, of the rows that press
+  std::vector<std::size_t> compliance_of_, pressing_then_, pressed_then_, pivots_;
+  Slopes slopes_then_;
 };
 
 }  // namespace carillon::impact

@@ -90,11 +90,15 @@ Space::Ring& Space::ring_until(int body, double time_s) {
   return ring;
 }
 
-shape::Place Space::find_place(int body, const shape::Touch& touch, bool is_a) const {
-  const auto i = static_cast<std::size_t>(body);
+/// Of a body of a hit; looked for once.
+const shape::Place& Space::find_place(Hit& hit, bool is_a) const {
+  std::optional<shape::Place>& place = hit.places[is_a ? 0 : 1];
+  if (place) return *place;
+  const auto i = static_cast<std::size_t>(is_a ? hit.a : hit.b);
   const Mat3 back = transpose(placed_[i].rotation);
-  return solids_[i].shape->find_place(solids_[i].centre_m + back * (touch.where_m - states_[i].centre),
-                                      back * ((is_a ? -1.0 : 1.0) * touch.normal));
+  place = solids_[i].shape->find_place(solids_[i].centre_m + back * (hit.touch.where_m - states_[i].centre),
+                                       back * ((is_a ? -1.0 : 1.0) * hit.touch.normal));
+  return *place;
 }
 
 impact::Spring Space::make_spring(const shape::Touch& touch, int a, int b) const {
@@ -122,7 +126,7 @@ bool Space::predict_hits(const std::vector<Ref>& taken, std::vector<Hit>& hits, 
       const int body = side == 0 ? hit.a : hit.b;
       if (!rings(body) || in_ringing_[static_cast<std::size_t>(body)]) continue;
       const auto i = static_cast<std::size_t>(body);
-      phi[side] = project(solids_[i].find_shape(find_place(body, hit.touch, side == 0)), transpose(placed_[i].rotation) * hit.touch.normal);
+      phi[side] = project(solids_[i].find_shape(find_place(hit, side == 0)), transpose(placed_[i].rotation) * hit.touch.normal);
       Ring& ring = ring_until(body, std::max(time_s_, rings_[i].time_s));
       sides[side] = {solids_[i].modes.get(), phi[side], ring.q, ring.q_dot};
     }
@@ -227,7 +231,7 @@ bool Space::add_resting(const std::vector<Ref>& taken, const std::vector<Hit>& h
 
 /// Begins an impact with modes, or lets the hits join one that is on its way. False where there are too many points: the rigid impact
 /// stands.
-bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s) {
+bool Space::begin_ringing(const std::vector<Ref>& taken, std::vector<Hit>& hits, double time_s) {
   std::vector<std::size_t> order;
   for (std::size_t n = 0; n < hits.size(); ++n)
     if (hits[n].approach_m_s > kSlowest && !hits[n].is_cord) order.push_back(n);
@@ -302,7 +306,7 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
   std::vector<impact::Contact> contacts;
   std::list<std::vector<double>> shapes;  // kept until the impact has them
   for (const std::size_t n : order) {
-    const Hit& hit = hits[n];
+    Hit& hit = hits[n];
     Contact& c = taken[n].get();
     Press press;
     press.a = hit.a;
@@ -321,15 +325,13 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>&
     contact.restitution = calc_pair_restitution(hit.a, hit.b);
     contact.is_limit = true;
     contact.friction = calc_pair_friction(hit.a, hit.b);
+    press.place_a = find_place(hit, true);
     if (rings(hit.a)) {
-      press.place_a = find_place(hit.a, hit.touch, true);
       press.shape_a = solid(hit.a).find_shape(press.place_a);
       shapes.push_back(find_shape(hit.a, press.shape_a));
       contact.shape_a = shapes.back();
-    } else {
-      press.place_a = find_place(hit.a, hit.touch, true);
     }
-    if (hit.b >= 0) press.place_b = find_place(hit.b, hit.touch, false);
+    if (hit.b >= 0) press.place_b = find_place(hit, false);
     if (rings(hit.b)) {
       press.shape_b = solid(hit.b).find_shape(press.place_b);
       shapes.push_back(find_shape(hit.b, press.shape_b));

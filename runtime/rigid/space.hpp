@@ -89,9 +89,10 @@ struct Hit {
   int a = 0, b = -1;
   shape::Touch touch;
   double approach_m_s = 0.0, restitution = 0.0;
-  Vec3 impulse{};               // on a [N s]
-  bool is_cord = false;         // comes taut
-  double linked_mass_kg = 0.0;  // that meets there, where bodies are on joints
+  Vec3 impulse{};                                       // on a [N s]
+  bool is_cord = false;                                 // comes taut
+  double linked_mass_kg = 0.0;                          // that meets there, where bodies are on joints
+  std::array<std::optional<shape::Place>, 2> places{};  // on a and b, where they were looked for
 };
 
 /// An instant of impact: its points, and the bodies that it moved, before and after.
@@ -309,6 +310,7 @@ class Space {
   void predict(const Island& island, double h, bool at_rest);
   Point make_point(const Contact& contact) const;
   void make_points(Island& island, double h, bool leaves_impacts);
+  void sort_points();
   double calc_patch_radius(const Contact& contact) const;
   Vec3 calc_travelled(Pair& pair, shape::Touch touch) const;
   Point make_lasting_point(Pair& pair, const Contact& contact, double h) const;
@@ -340,7 +342,7 @@ class Space {
 
   // ringing.cpp: impacts with modes
   bool predict_hits(const std::vector<Ref>& taken, std::vector<Hit>& hits, std::vector<Point>& points);
-  bool begin_ringing(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s);
+  bool begin_ringing(const std::vector<Ref>& taken, std::vector<Hit>& hits, double time_s);
   bool add_resting(const std::vector<Ref>& taken, const std::vector<Hit>& hits, double time_s, std::vector<std::size_t>& order) const;
   void release_what_rests(const Island& island);
   void advance_ringings(const Island& island, double to_s, double part_s, double step_s);
@@ -353,7 +355,7 @@ class Space {
   impact::Body make_struck(int body, double time_s);
   void put_on_joints(int body, impact::Body& b) const;
   impact::Spring make_spring(const shape::Touch& touch, int a, int b) const;
-  shape::Place find_place(int body, const shape::Touch& touch, bool is_a) const;
+  const shape::Place& find_place(Hit& hit, bool is_a) const;
   std::vector<double> find_shape(int body, const std::vector<double>& shape) const;
   Ringing* find_ringing(int body);
   Ringing* find_own_ringing(const Hit& hit);

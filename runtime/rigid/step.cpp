@@ -28,6 +28,7 @@ constexpr double kAtRest = 1e-6;                             // m/s
 constexpr double kSlow = 5e-3;                               // m/s; of what may be about to rest
 constexpr double kPatience = 0.02;                           // s; for so long
 constexpr double kLong = 0.3;                                // s; what was slow for so long is no faster than kSlow: less balance is enough
+constexpr std::size_t kTurns = 16;                           // points that take turns by their pairs
 constexpr int kMostAtOnce = 12;                              // bodies that are about to rest and are factorised without sweeps before
 constexpr double kLoose = 1000.0;                            // times the tolerance
 constexpr double kLooseOfSpeed = 1e-3;                       // of the fastest of its bodies, where that is more,
@@ -254,17 +255,35 @@ void Space::make_points(Island& island, double h, bool leaves_impacts) {
       rows_.push_back({pair, k});
     }
   }
-  // From below to above, so that a sweep carries the weight down a pile.
-  order_.resize(points_.size());
-  std::iota(order_.begin(), order_.end(), std::size_t{0});
+  sort_points();
+}
+
+/// From below to above, so that a sweep carries the weight down a pile. Of each kTurns points in that order those that are the first of
+/// their pairs come first, then the second ones, and so on: sweeps over such an order need a tenth fewer.
+void Space::sort_points() {
+  const std::size_t count = points_.size();
   std::vector<double> heights;
-  heights.reserve(rows_.size());
+  heights.reserve(count);
   for (const Ref& row : rows_) heights.push_back(-dot(row.get().touch.where_m, gravity_));
+  order_.resize(count);
+  std::iota(order_.begin(), order_.end(), std::size_t{0});
   std::stable_sort(order_.begin(), order_.end(), [&](std::size_t x, std::size_t y) { return heights[x] < heights[y]; });
+  std::array<std::pair<int, std::size_t>, kTurns> turns;  // of a point: its turn among those of its pair
+  for (std::size_t begin = 0; begin < count; begin += kTurns) {
+    const std::size_t size = std::min(kTurns, count - begin);
+    const auto get_pair = [&](std::size_t n) { return rows_[order_[begin + n]].pair; };
+    for (std::size_t n = 0; n < size; ++n) {
+      turns[n] = {0, order_[begin + n]};
+      for (std::size_t m = 0; m < n; ++m) turns[n].first += get_pair(m) == get_pair(n) ? 1 : 0;
+    }
+    std::stable_sort(turns.begin(), turns.begin() + static_cast<std::ptrdiff_t>(size),
+                     [](const auto& x, const auto& y) { return x.first < y.first; });
+    for (std::size_t n = 0; n < size; ++n) order_[begin + n] = turns[n].second;
+  }
   std::vector<Point> points;
   std::vector<Ref> rows;
-  points.reserve(points_.size());
-  rows.reserve(rows_.size());
+  points.reserve(count);
+  rows.reserve(count);
   for (const std::size_t n : order_) points.push_back(points_[n]), rows.push_back(rows_[n]);
   points_.swap(points);
   rows_.swap(rows);

@@ -329,14 +329,14 @@ void Space::give_to_modes(Strike& record, double taken_j) {
   std::map<int, Ring> before;  // of the bodies whose modes are struck
   const double lost_before = lost_j_;
   double given = 0.0;
-  for (const Hit& hit : record.hits) {
+  for (Hit& hit : record.hits) {
     if (hit.impulse == Vec3{} || hit.is_cord || !(hit.approach_m_s > kSlowest)) continue;
     for (const bool is_a : {true, false}) {
       const int body = is_a ? hit.a : hit.b;
       if (!rings(body) || in_ringing_[static_cast<std::size_t>(body)]) continue;
       const auto i = static_cast<std::size_t>(body);
       const Vec3 impulse = transpose(placed_[i].rotation) * ((is_a ? 1.0 : -1.0) * hit.impulse);
-      const std::vector<double> shape = solids_[i].find_shape(find_place(body, hit.touch, is_a));
+      const std::vector<double> shape = solids_[i].find_shape(find_place(hit, is_a));
       const double push = dot(hit.impulse, hit.touch.normal);
       const double mass = push > 0.0 ? push / ((1.0 + hit.restitution) * hit.approach_m_s) : 0.0;
       if (!(mass > 0.0)) continue;
