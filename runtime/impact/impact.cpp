@@ -322,7 +322,11 @@ void Impact::choose_step(const Options& options) {
     const ElasticPulse pulse = calc_elastic_pulse(touch.spring, 1.0 / inverse_mass[c], v);
     shortest = std::min(shortest, pulse.length_s);
     part_s_ = std::max(part_s_, pulse.length_s);
-    touch.spring.hysteresis_s_m = calc_hysteresis(contacts_[c].restitution, v);
+    if (contacts_[c].restitution != hysteresis_of_) {
+      hysteresis_of_ = contacts_[c].restitution;
+      hysteresis_ = calc_hysteresis(hysteresis_of_, 1.0);
+    }
+    touch.spring.hysteresis_s_m = hysteresis_ / v;
     const double peak = std::max(pulse.compression_m, touch.compression_m);
     touch.tangential_n_m = contacts_[c].tangential_ratio * touch.spring.stiffness * std::pow(peak, touch.spring.exponent - 1.0);
   }

@@ -184,6 +184,7 @@ class Impact {
   StepSolver solver_;
   bool above_band_ = true, ended_ = false;
   int step_index_ = 0, steps_ = 0, quiet_ = 0, misses_ = 0;
+  double hysteresis_of_ = -1.0, hysteresis_ = 0.0;  // the last restitution, and its hysteresis at 1 m/s: contacts often have the same
   double h_ = 0.0, part_s_ = 0.0, settling_s_ = 0.0, fastest_ = 0.0;
   double on_joints_j_ = 0.0;  // work done on bodies on joints
   Books books_;

@@ -268,17 +268,22 @@ void Space::sort_points() {
   order_.resize(count);
   std::iota(order_.begin(), order_.end(), std::size_t{0});
   std::stable_sort(order_.begin(), order_.end(), [&](std::size_t x, std::size_t y) { return heights[x] < heights[y]; });
-  std::array<std::pair<int, std::size_t>, kTurns> turns;  // of a point: its turn among those of its pair
+  std::array<const Pair*, kTurns> pairs;
+  std::array<std::size_t, kTurns> sorted;
+  std::array<int, kTurns> turns;  // of each point among those of its pair
   for (std::size_t begin = 0; begin < count; begin += kTurns) {
     const std::size_t size = std::min(kTurns, count - begin);
-    const auto get_pair = [&](std::size_t n) { return rows_[order_[begin + n]].pair; };
+    int last = 0;
     for (std::size_t n = 0; n < size; ++n) {
-      turns[n] = {0, order_[begin + n]};
-      for (std::size_t m = 0; m < n; ++m) turns[n].first += get_pair(m) == get_pair(n) ? 1 : 0;
+      sorted[n] = order_[begin + n];
+      pairs[n] = rows_[sorted[n]].pair;
+      turns[n] = static_cast<int>(std::count(pairs.begin(), pairs.begin() + n, pairs[n]));
+      last = std::max(last, turns[n]);
     }
-    std::stable_sort(turns.begin(), turns.begin() + static_cast<std::ptrdiff_t>(size),
-                     [](const auto& x, const auto& y) { return x.first < y.first; });
-    for (std::size_t n = 0; n < size; ++n) order_[begin + n] = turns[n].second;
+    std::size_t at = begin;
+    for (int turn = 0; turn <= last; ++turn)
+      for (std::size_t n = 0; n < size; ++n)
+        if (turns[n] == turn) order_[at++] = sorted[n];
   }
   std::vector<Point> points;
   std::vector<Ref> rows;
