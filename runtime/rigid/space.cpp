@@ -323,8 +323,9 @@ void Space::update(Pair& pair, double step_s) {
   pair.sag_m = std::min(pair.sag_m, deepest);
 }
 
-/// Wakes a body and what it carries. They take the steps of the one that wakes them, which is due: so theirs do not depend on other groups.
-void Space::wake(int body, int by) {
+/// Wakes a body and what it carries, or it alone. They take the steps of the one that wakes them, which is due: so theirs do not depend on
+/// other groups.
+void Space::wake(int body, int by, bool alone) {
   std::vector<int> woken{body};
   while (!woken.empty()) {
     const int i = woken.back();
@@ -341,13 +342,18 @@ void Space::wake(int body, int by) {
       add_pair(key.first, key.second);
       const int other = key.first == i ? key.second : key.first;
       const bool touching = std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.touching; });
-      if (touching && other >= 0 && asleep_[static_cast<std::size_t>(other)]) woken.push_back(other);
+      const bool sleeps = other >= 0 && asleep_[static_cast<std::size_t>(other)];
+      if (!alone && touching && sleeps) woken.push_back(other);
+      for (Contact& c : pair.contacts)
+        if (!sleeps) c.rests = c.is_load = false;
     }
     for (Pair& pair : cord_pairs_) {
       if (pair.a != i && pair.b != i) continue;
       add_cord(pair);
       const int other = pair.a == i ? pair.b : pair.a;
-      if (pair.contacts.front().touching && other >= 0) woken.push_back(other);
+      Contact& c = pair.contacts.front();
+      c.rests = c.is_load = false;
+      if (c.touching && other >= 0) woken.push_back(other);
     }
     if (const Linked* linked = find_linked(i); linked != nullptr) woken.insert(woken.end(), linked->bodies.begin(), linked->bodies.end());
   }
@@ -450,6 +456,7 @@ double Space::find_time(int step) const {
 
 void Space::step(double end_s) {
   if (at_window_) {
+    if (options_.islands) rest_apart();
     open_window(end_s);
     at_window_ = false;
   } else if (any_active_) {
@@ -468,15 +475,19 @@ void Space::step(double end_s) {
       const double step_s = find_time(step_in_window_ + stride) - from;
       update(pair, step_s);
       if (pair.b < 0 || (a_moves && b_moves)) continue;
+      const bool rests = std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests; });
       for (const int body : {pair.a, pair.b}) {
         if (!asleep_[static_cast<std::size_t>(body)]) continue;
         for (const Contact& c : pair.contacts) {
-          if (c.touch.gap_m - calc_approach(c) * step_s - 0.5 * norm(gravity_) * step_s * step_s > kTouch) continue;
+          const double approach = calc_approach(c);
+          if (rests && approach <= kSlowest) continue;  // wake_unbalanced() watches them
+          if (c.touch.gap_m - approach * step_s - 0.5 * norm(gravity_) * step_s * step_s > kTouch) continue;
           wake(body, a_moves ? pair.a : pair.b);
           break;
         }
       }
     }
+    wake_unbalanced();
     sort_near();
     for (Island& island : make_islands()) {
       step_island(island, from, find_time(step_in_window_ + island.stride) - from);

@@ -82,6 +82,9 @@ struct Contact {
   double step_s = 0.0;       // its length
   double until_s = 0.0;      // its end
   double lost_j = 0.0;       // by it, in that step
+  bool rests = false;        // it did when a body of it fell asleep,
+  Vec3 rest_n{};             // and gave a this force,
+  bool is_load = false;      // which acts on whichever body is awake, and `impulse` is that and what it takes in addition
 };
 
 /// One point of an impact. Momentum and place in the world.
@@ -249,7 +252,7 @@ class Space {
   std::vector<Island> make_islands();
   void place_body(int body);
   void check_finite(int body) const;
-  void wake(int body, int by);
+  void wake(int body, int by, bool alone = false);
   void reach_out(int body);
   void call_back(int body, int by);
   double find_time(int step) const;
@@ -323,8 +326,17 @@ class Space {
   void move_bodies(const Island& island, double to_s, double part_s, double h, double before_j);
   double calc_energy(const Island& island) const;
   void take_gain(const Island& island, double before_j);
+
+  // rest.cpp: what sleeps, and until when
   bool may_rest(const Island& island, double h);
-  bool rests(Island& island, double h);
+  bool is_balanced(Island& island, double h, const std::vector<joints::Spatial>& pulls, double slow_s);
+  enum class Rest { none, stands, leans };  // leans: only with the forces of others
+  Rest rest(Island& island, double h, const std::vector<joints::Spatial>& pulls = {});
+  void add_loads(const Island& island, double h);
+  void rest_apart();
+  void add_pull(const Contact& contact, bool is_a, const Vec3& force_n, joints::Spatial& pull) const;
+  void wake_unbalanced();
+  bool wake_struck(Island& island, const std::vector<Ref>& taken);
 
   // strike.cpp: impacts
   double calc_compliance(int a, int b) const;
@@ -382,7 +394,7 @@ class Space {
   /// Are both bodies of a pair, as far as they move, in the group that is being stepped? A touch that was found in this step waits for the
   /// next.
   bool is_stepped(const Pair& pair) const {
-    const auto is_in = [this](int body) { return is_fixed(body) || index_[static_cast<std::size_t>(body)] >= 0; };
+    const auto is_in = [this](int body) { return !moves(body) || index_[static_cast<std::size_t>(body)] >= 0; };
     return is_in(pair.a) && is_in(pair.b);
   }
 
@@ -425,8 +437,9 @@ class Space {
   std::vector<Placed> free_;
   std::vector<Vec3> free_centre_, free_velocity_;  // of those on joints
   std::vector<Point> points_;
-  std::vector<Vec3> turned_;  // angular impulses on them
-  std::vector<Ref> rows_;     // of points_
+  std::vector<Vec3> turned_;            // angular impulses on them
+  std::vector<joints::Spatial> loads_;  // impulses of what sleeps on them
+  std::vector<Ref> rows_;               // of points_
   std::vector<std::size_t> order_;
   std::vector<shape::Touch> touches_;
 };

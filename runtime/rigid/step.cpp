@@ -25,23 +25,18 @@ constexpr double kShortest = 1e-9;                           // s; what is left 
 constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
 constexpr double kSettling = 0.02;                           // m/s; a group that is slower is about to rest
 constexpr double kAtRest = 1e-6;                             // m/s
-constexpr double kSlow = 5e-3;                               // m/s; of what may be about to rest
-constexpr double kPatience = 0.02;                           // s; for so long
-constexpr double kLong = 0.3;                                // s; what was slow for so long is no faster than kSlow: less balance is enough
+constexpr std::size_t kMostDirect = 24;                      // points of a small group
 constexpr std::size_t kTurns = 16;                           // points that take turns by their pairs
 constexpr int kMostAtOnce = 12;                              // bodies that are about to rest and are factorised without sweeps before
 constexpr double kLoose = 1000.0;                            // times the tolerance
 constexpr double kLooseOfSpeed = 1e-3;                       // of the fastest of its bodies, where that is more,
 constexpr double kLoosest = 0.3 * kSlowest;                  // and no more than this: what stands must not strike
 constexpr int kGuesses = 6;                                  // of a factorised problem in a step
-constexpr int kMostGuesses = 12;                             // where rest is to be proven
 constexpr double kRetry = 4e-3;                              // s; a group whose guesses failed goes by sweeps for so long
 constexpr int kMostMissed = 30;                              // in a step: instants at which nothing struck after all
 constexpr int kMostImpacts = 8;                              // of a group in a step, each at its instant; a group with more is crowded
 constexpr int kLeastImpacts = 2;                             // the same of the largest groups, each of whose impacts costs more
 constexpr int kStruckBodies = 96;                            // bodies of a group times its impacts in a step
-constexpr int kProofSweeps = 120;                            // that look for rest,
-constexpr int kMostProofSweeps = 1200;                       // of what was slow for kLong
 constexpr double kCrowded = 2e-3;                            // s; for so long after
 
 }  // namespace
@@ -63,7 +58,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
   while (step_s - done > kShortest) {
     const double h = step_s - done;
     time_s_ = start_s + done;
-    if (!std::exchange(begun, true) && may_rest(island, h) && rests(island, h)) break;
+    if (!std::exchange(begun, true) && may_rest(island, h) && rest(island, h) != Rest::none) break;
     release_what_rests(island);
     predict(island, h, false);
     make_points(island, h, impacts < most_impacts);
@@ -138,6 +133,7 @@ void Space::predict(const Island& island, double h, bool at_rest) {
     free_state_[n] = to;
     free_centre_[n] = to.centre;
   }
+  add_loads(island, h);
 }
 
 /// A contact as it is now, between the bodies of the group that is being stepped.
@@ -233,6 +229,7 @@ Point Space::make_lasting_point(Pair& pair, const Contact& c, double h) const {
     p.twisting_m = kDrilling * p.friction * calc_patch_radius(c);
   }
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
+  if (c.is_load) p.impulse = p.impulse - h * c.rest_n;
   p.couple = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.couple;
   return p;
 }
@@ -317,7 +314,7 @@ void Space::solve(double tolerance_m_s) {
   }
   const int count = static_cast<int>(movers_.size());
   const bool settles = fastest < kSettling;
-  const bool is_small = count <= options_.most_direct;
+  const bool is_small = count <= options_.most_direct && points_.size() <= kMostDirect;
   const auto factorise = [&](bool are_swept) {
     if (solver_.solve_directly(movers_, points_, is_small ? kMostGuesses : kGuesses, are_swept) && !gains()) return true;
     if (!is_small)
@@ -362,6 +359,7 @@ void Space::solve(double tolerance_m_s) {
 /// The angular impulses of all points on each body.
 void Space::sum_turned() {
   turned_.assign(movers_.size(), Vec3{});
+  for (std::size_t n = 0; n < loads_.size(); ++n) turned_[n] = loads_[n].angular;
   for (const Point& p : points_) {
     if (p.a >= 0) turned_[static_cast<std::size_t>(p.a)] = turned_[static_cast<std::size_t>(p.a)] + cross(p.arm_a, p.impulse) + p.couple;
     if (p.b >= 0) turned_[static_cast<std::size_t>(p.b)] = turned_[static_cast<std::size_t>(p.b)] - cross(p.arm_b, p.impulse) - p.couple;
@@ -412,6 +410,7 @@ void Space::keep_impulses(double at_s, double h) {
   for (std::size_t n = 0; n < points_.size(); ++n) {
     Contact& c = rows_[n].get();
     c.impulse = points_[n].impulse;
+    if (c.is_load) c.impulse = c.impulse + h * c.rest_n;
     c.couple = points_[n].couple;
     c.step_s = h;
     c.until_s = time_s_ + at_s;
@@ -484,108 +483,6 @@ void Space::take_gain(const Island& island, double before_j) {
     s.momentum = part * s.momentum;
     place_body(body);
   }
-}
-
-/// Counts how long the bodies of a group have been slow; true where it is time to look whether it rests.
-bool Space::may_rest(const Island& island, double h) {
-  bool all = true;
-  for (const int body : island.bodies) {
-    const auto i = static_cast<std::size_t>(body);
-    const double speed = norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m;
-    paces_[i].slow_s = speed < kSlow && !has_impact(body) ? paces_[i].slow_s + h : 0.0;
-    all = all && paces_[i].slow_s > kPatience && time_s_ >= paces_[i].next_proof_s;
-  }
-  return all;
-}
-
-/// Puts the group to sleep if contact forces exist that balance all of its bodies at rest. What has been slower than kSlow for so long that
-/// its mean acceleration is below `bound` times gravity needs no better balance than that.
-bool Space::rests(Island& island, double h) {
-  bool touches = false;
-  double slow_s = std::numeric_limits<double>::infinity();
-  for (const Pair* pair : island.pairs)
-    touches = touches || std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
-  for_linked(island, [&](const Linked& linked) { touches = touches || linked.hangs; });
-  if (!touches) return false;
-  std::vector<State> kept;
-  std::vector<joints::Coordinates> kept_linked;
-  for_linked(island, [&](Linked& linked) {
-    kept_linked.push_back(linked.now);
-    std::fill(linked.now.u.begin(), linked.now.u.end(), 0.0);
-  });
-  for (const int body : island.bodies) {
-    State& s = states_[static_cast<std::size_t>(body)];
-    kept.push_back(s);
-    slow_s = std::min(slow_s, paces_[static_cast<std::size_t>(body)].slow_s);
-    s.velocity = s.momentum = {};
-    place_body(body);
-  }
-  predict(island, h, true);
-  make_points(island, h, false);
-  // A gap that roughness bridges is none: here all that is near is in touch.
-  for (std::size_t n = 0; n < points_.size(); ++n) {
-    if (rows_[n].get().touch.gap_m <= kDeep) points_[n].wanted = {};
-  }
-  const std::vector<Point> moving = points_;
-  for (Point& p : points_) p.impulse = p.couple = {};
-  const std::vector<Point> unloaded = points_;
-  const double g = std::max(norm(gravity_), 1e-9);
-  const double bound = slow_s > kLong ? kSlow / (g * kLong) : kBalanced;
-  const std::vector<Mover> free = movers_;
-  const auto is_balanced = [&] {
-    std::vector<char> carried(island.bodies.size(), 0);  // what drifts where nothing pulls is at rest nowhere
-    for (const Point& p : points_)
-      for (const int n : {p.a, p.b})
-        if (n >= 0 && dot(p.impulse, p.normal) > 0.0) carried[static_cast<std::size_t>(n)] = 1;
-    for_linked(island, [&](const Linked& linked) {
-      const std::vector<int>& members = linked.linkage.movers;
-      const bool any =
-          linked.hangs || std::any_of(members.begin(), members.end(), [&](int n) { return carried[static_cast<std::size_t>(n)] != 0; });
-      for (const int n : members) carried[static_cast<std::size_t>(n)] = any ? 1 : 0;
-    });
-    for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-      const double radius = solid(island.bodies[n]).radius_m;
-      if (!carried[n] || norm(movers_[n].velocity) + norm(movers_[n].spin) * radius > bound * g * h) return false;
-    }
-    return true;
-  };
-  ++costs_.solves;
-  bool balanced = solver_.solve_directly(movers_, points_, kMostGuesses) && is_balanced();
-  // By sweeps from the impulses of the motion, and from none.
-  const auto sweep_from = [&](const std::vector<Point>& from, int most_sweeps) {
-    movers_ = free;
-    points_ = from;
-    solver_.solve(movers_, points_, 1e-2 * bound * g * h, most_sweeps);
-    costs_.sweeps += solver_.get_sweeps();
-    return is_balanced();
-  };
-  balanced = balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLong ? kMostProofSweeps : kProofSweeps);
-  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-    const auto i = static_cast<std::size_t>(island.bodies[n]);
-    if (balanced) {
-      asleep_[i] = 1;
-      lost_j_ += rigid::calc_kinetic(solids_[i], kept[n]);
-    } else {
-      states_[i] = kept[n];
-      paces_[i].next_proof_s = time_s_ + std::min(0.5 * slow_s, kLong);
-      place_body(island.bodies[n]);
-    }
-  }
-  if (!balanced) {
-    std::size_t k = 0;
-    for_linked(island, [&](Linked& linked) {
-      linked.now = kept_linked[k++];
-      place_linked(linked);
-    });
-  }
-  for (std::size_t n = 0; balanced && n < points_.size(); ++n) {
-    Contact& c = rows_[n].get();
-    c.impulse = points_[n].impulse;
-    c.couple = points_[n].couple;
-    c.step_s = h;
-    c.touching = dot(c.impulse, c.touch.normal) > 0.0;
-  }
-  return balanced;
 }
 
 }  // namespace carillon::rigid

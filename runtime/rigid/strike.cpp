@@ -276,7 +276,8 @@ double Space::give_impulses(Strike& record, const std::vector<Point>& points) {
 }
 
 void Space::strike(Island& island, const std::vector<Ref>& first, double time_s) {
-  const std::vector<Ref> taken = gather_points(island, first);
+  std::vector<Ref> taken = gather_points(island, first);
+  while (wake_struck(island, taken)) taken = gather_points(island, first);
   Strike record;
   record.time_s = time_s;
   record.together_s = together_s_;

@@ -79,6 +79,33 @@ TEST(time, contact_ball_in_bowl) {
   hold("contact_ball_in_bowl", calc_rise(course), 1e-5, "energy gained as a height [m]");
 }
 
+TEST(time, contact_sleeps_apart) {
+  // A board with twelve boxes; another one slides to and fro on it between two walls, without friction. Each strikes where it turns.
+  const bank::Bank board = make_dense_box({1.6, 0.5, 0.02}, 700.0), box = make_dense_box({0.06, 0.05, 0.04}, 700.0),
+                   wall = make_dense_box({0.05, 0.2, 0.2}, 2700.0);
+  WorldSpec spec;
+  spec.ground = GroundSpec{};
+  spec.bodies = {make_body(board, {0, 0, 0.01}), make_body(box, {0, 0.15, 0.04}, 1.0), make_fixed(wall, {-0.9, 0.15, 0.15}, 1.0),
+                 make_fixed(wall, {0.9, 0.15, 0.15}, 1.0)};
+  spec.bodies[1].velocity_m_s = {0.7, 0, 0};
+  spec.bodies[1].friction = 0.0;
+  for (int i = 0; i < 12; ++i) spec.bodies.push_back(make_body(box, {-0.66 + 0.12 * i, -0.1, 0.04}));
+  World world(spec, {.end_s = 60.0, .lasting_contacts = false, .audits_energy = true});
+  double way = 0.0;
+  int hits = 0;
+  world.advance(60.0, std::numeric_limits<double>::infinity(), [&](const stream::Event& e) {
+    if (const auto* i = std::get_if<stream::Impulse>(&e)) hits += i->body >= 4 ? 1 : 0;
+    if (const auto* m = std::get_if<stream::Motion>(&e); m != nullptr && m->body >= 4)
+      way = std::max(way, norm(m->position_m - spec.bodies[static_cast<std::size_t>(m->body)].initial.position_m));
+  });
+  const auto statistics = world.get_statistics();
+  hold("contact_sleeps_apart", way, 1e-5, "way of those that stand in a minute [m]");
+  hold("contact_sleeps_apart", hits, 0, "hits of those that stand");
+  hold("contact_sleeps_apart", statistics.energy.error_j / statistics.energy.kinetic_j, 0.01, "books, relative");
+  hold("contact_sleeps_apart", static_cast<double>(statistics.body_steps) / static_cast<double>(statistics.steps), 7.0,
+       "bodies of fourteen that take a step, mean");
+}
+
 TEST(time, contact_flush) {
   // Two or three equal boxes whose faces and edges coincide, without gap and without weight, pushed along and across.
   const bank::Bank box = make_dense_box({0.06, 0.05, 0.04}, 2700.0);
