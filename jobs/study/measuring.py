@@ -202,14 +202,23 @@ def escape(text):
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
-def replace_between(text, name, content):
-    """Puts content between the lines <!-- name --> and <!-- /name --> of a page. ValueError when they are not there."""
+def split_page(text, name):
+    """What is before, between and after the lines <!-- name --> and <!-- /name --> of a page. ValueError when they are not there."""
     start, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
     before, found, rest = text.partition(start)
-    _, closed, after = rest.partition(end)
+    between, closed, after = rest.partition(end)
     if not found or not closed:
         raise ValueError(f"the page has no place for {name}")
-    return before + start + content.rstrip("\n") + "\n" + end + after
+    return before + start, between, end + after
+
+
+def find_between(text, name):
+    return split_page(text, name)[1]
+
+
+def replace_between(text, name, content):
+    before, _, after = split_page(text, name)
+    return before + content.rstrip("\n") + "\n" + after
 
 
 def read_json(path):

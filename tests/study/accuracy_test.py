@@ -136,6 +136,11 @@ class Study(unittest.TestCase):
         self.assertEqual(first.returncode, 0, first.stderr)
         text = (docs / "accuracy.md").read_text()
         self.assertIn("| cube | T10 straight |", text)
+        # A part of the study renews its own findings, and leaves those of the others.
+        summary = lambda page: re.search(r"<!-- accuracy:summary -->(.*?)<!-- /accuracy:summary -->", page, re.S)[1].splitlines()
+        old, new = summary((ROOT / "docs/accuracy.md").read_text()), summary(text)
+        self.assertTrue(set(old) - set(new), "nothing was renewed")
+        self.assertEqual([line for line in old if re.match(r"- (\*\*Defaults|Step of contacts|Culling)", line)], [line for line in new if re.match(r"- (\*\*Defaults|Step of contacts|Culling)", line)])
         for picture in re.findall(r"\((images/accuracy-elements[^)]*)\)", text):
             self.assertTrue((docs / picture).is_file() or (ROOT / "docs" / picture).is_file(), picture)
         self.assertTrue((docs / "images/accuracy-elements-cube.svg").is_file())
