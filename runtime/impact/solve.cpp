@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "runtime/impact/dense.hpp"
@@ -100,7 +101,11 @@ double StepSolver::calc_residual(const std::vector<Touch>& touches, const std::v
   for (std::size_t i = 0; i < n; ++i) residual_[i] = moved[i] - free[i];
   dense::get_functions().add_columns(A.data(), n, pressed_.data(), change_.data(), pressed_.size(), residual_.data(), n);
   double largest = 0.0;
-  for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, std::abs(residual_[i]) / size_[i]);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = std::abs(residual_[i]) / size_[i];
+    if (!std::isfinite(r)) return std::numeric_limits<double>::infinity();  // of a step that was not finite
+    largest = std::max(largest, r);
+  }
   return largest;
 }
 

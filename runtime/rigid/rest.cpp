@@ -133,7 +133,7 @@ Space::Rest Space::rest(Island& island, double h, const std::vector<joints::Spat
       lost_j_ += rigid::calc_kinetic(solids_[i], kept[n]);
     } else {
       states_[i] = kept[n];
-      paces_[i].next_proof_s = time_s_ + std::min(0.5 * slow_s, kLong);
+      (pulls.empty() ? paces_[i].next_proof_s : paces_[i].next_part_s) = time_s_ + std::min(0.5 * slow_s, kLong);
       place_body(island.bodies[n]);
     }
   }
@@ -147,10 +147,11 @@ Space::Rest Space::rest(Island& island, double h, const std::vector<joints::Spat
   for (std::size_t n = 0; balanced && n < points_.size(); ++n) {
     Contact& c = rows_[n].get();
     c.impulse = points_[n].impulse;
+    if (c.is_load) c.impulse = c.impulse + h * c.rest_n;
     c.couple = points_[n].couple;
     c.step_s = h;
     c.touching = dot(c.impulse, c.touch.normal) > 0.0;
-    c.rests = c.is_load = true;
+    c.rests = c.is_load = c.touch.gap_m <= kDeep;
     c.rest_n = (1.0 / h) * c.impulse;
   }
   return !balanced ? Rest::none : stands ? Rest::stands : Rest::leans;
@@ -164,7 +165,7 @@ void Space::rest_apart() {
   for (int i = 0; i < static_cast<int>(solids_.size()); ++i) {
     const auto n = static_cast<std::size_t>(i);
     const bool is_slow =
-        moves(i) && get_slow(i) > kApart && time_s_ >= paces_[n].next_proof_s && !has_impact(i) && find_linked(i) == nullptr;
+        moves(i) && get_slow(i) > kApart && time_s_ >= paces_[n].next_part_s && !has_impact(i) && find_linked(i) == nullptr;
     may[n] = is_slow ? 1 : 0;
     any = any || is_slow;
   }
@@ -269,7 +270,7 @@ void Space::wake_unbalanced() {
       if (!c.rests && !c.touching) continue;
       Change& change = changes[body];
       change.by = other;
-      change.is_struck = change.is_struck || has_impact(other);
+      change.is_struck = change.is_struck || has_impact(other) || struck_.contains(body);
       add_pull(c, is_a, calc_force(c) - (c.rests ? c.rest_n : Vec3{}), change.pull);
     }
   }
@@ -278,20 +279,35 @@ void Space::wake_unbalanced() {
     const double size = norm(change.pull.linear) + norm(change.pull.angular) / solid.radius_m;
     if (change.is_struck || size > kShift * solid.mass_kg * norm(gravity_)) wake(body, change.by, find_linked(body) == nullptr);
   }
+  std::erase_if(struck_, [&](int body) { return asleep_[static_cast<std::size_t>(body)] == 0; });
 }
 
-/// Bodies of an impact that slept until now move from here on, in the group that is being stepped. True if there were any.
+/// Bodies of an impact that slept until now move from here on, in the group that is being stepped. True if there were any. What another
+/// group touches, too, stays a wall for this impact, and wakes before the next step.
 bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
+  const auto is_touched_elsewhere = [&](int body) {
+    return std::any_of(near_.begin(), near_.end(), [&](const Pair* pair) {
+      if (pair->a != body && pair->b != body) return false;
+      const int other = pair->a == body ? pair->b : pair->a;
+      return moves(other) && index_[static_cast<std::size_t>(other)] < 0 &&
+             std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touching; });
+    });
+  };
   bool any = false;
   for (const Ref& ref : taken)
     for (const int body : {ref.pair->a, ref.pair->b}) {
-      if (is_fixed(body) || moves(body) || find_linked(body) != nullptr) continue;
+      if (is_fixed(body) || moves(body)) continue;
+      if (find_linked(body) != nullptr || is_touched_elsewhere(body)) {
+        struck_.insert(body);
+        continue;
+      }
       any = true;
       wake(body, island.bodies.front(), true);
       index_[static_cast<std::size_t>(body)] = static_cast<int>(island.bodies.size());
       island.bodies.push_back(body);
       for (Pair* pair : near_)
-        if ((pair->a == body || pair->b == body) && std::find(island.pairs.begin(), island.pairs.end(), pair) == island.pairs.end())
+        if ((pair->a == body || pair->b == body) && is_stepped(*pair) &&
+            std::find(island.pairs.begin(), island.pairs.end(), pair) == island.pairs.end())
           island.pairs.push_back(pair);
     }
   return any;

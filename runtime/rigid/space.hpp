@@ -209,7 +209,8 @@ class Space {
   struct Pace {
     double slow_s = 0.0;           // it has been slow for so long
     double crowded_until_s = 0.0;  // its impacts come all at once until then
-    double next_proof_s = 0.0;     // when rest may be looked for again
+    double next_proof_s = 0.0;     // when rest may be looked for again,
+    double next_part_s = 0.0;      // that of a part of its group
     double next_guess_s = 0.0;     // when factorisation may be tried again
   };
   /// A contact by its place in a pair.
@@ -409,6 +410,7 @@ class Space {
   std::vector<char> asleep_, flying_, in_ringing_;
   std::vector<int> stride_;  // small steps of the window that a body takes at once
   std::vector<Pace> paces_;
+  std::set<int> struck_;  // sleeping bodies that an impact reached, to be woken
   std::vector<double> reach_m_s_;
   std::vector<State> flew_from_;
   std::optional<Ground> ground_;

@@ -1,6 +1,7 @@
 // What sleeps in a group that moves elsewhere, and what wakes it. Oracle: the same bodies in one problem, in which none sleeps by itself.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -91,6 +92,52 @@ TEST(sleep, what_it_stands_on_tips_and_it_wakes) {
   EXPECT_GT(whole.state(box).centre[2], 0.15) << "it went up with the board";
   for (std::size_t i = 2; i < table.solids.size(); ++i)
     EXPECT_LT(norm(space.state(static_cast<int>(i)).centre - whole.state(static_cast<int>(i)).centre), 5e-4) << i;
+}
+
+TEST(sleep, what_it_lies_on_goes_down_and_it_falls) {
+  // The same board; the box sleeps on the end that goes down.
+  Table table;
+  for (const double x : {-0.4, 0.0}) {
+    Solid support = make_box(1.0, {0.04, 0.2, 0.1});
+    support.fixed = true;
+    table.add(std::move(support), {x, 0, 0.35});
+  }
+  table.add(make_box(1.0, {1.0, 0.2, 0.02}), {0, 0, 0.41});
+  const int box = table.add(make_box(0.1, kSides), {0.25, -0.05, 0.44});
+  table.add(make_smooth_box(1.0), {-0.1, 0.05, 0.44}, {0.5, 0, 0});
+  Space space = table.begin(), whole = table.begin(false);
+  const double before_j = space.calc_books().motion_j;
+  move(space, 0.2);
+  EXPECT_TRUE(space.is_still(box));
+  move(space, 0.6);
+  move(whole, 0.6);
+  EXPECT_LT(whole.state(box).centre[2], 0.43) << "it went down with the board";
+  EXPECT_NEAR(space.state(box).centre[2], whole.state(box).centre[2], 1e-3);
+  const Books after = space.calc_books();
+  EXPECT_NEAR(after.motion_j + after.lost_j, before_j, 1e-5 * before_j);
+}
+
+TEST(sleep, columns_that_are_relieved_are_not_pushed_up) {
+  // A board on two columns of two blocks; what slides off one of them and to the other.
+  Table table;
+  std::vector<int> blocks;
+  for (const double x : {-0.3, 0.3})
+    for (const double z : {0.025, 0.075}) blocks.push_back(table.add(make_box(0.2, {0.06, 0.1, 0.05}), {x, 0, z}));
+  const int board = table.add(make_box(0.5, {0.8, 0.1, 0.02}), {0, 0, 0.11});
+  const int slider = table.add(make_smooth_box(1.0), {-0.28, 0, 0.14}, {0.25, 0, 0});
+  Space space = table.begin(), whole = table.begin(false);
+  const double before_j = space.calc_books().motion_j;
+  double highest = 0.0;
+  while (space.get_time() < 2.2) {
+    space.step(2.2);
+    highest = std::max(highest, space.state(board).centre[2] - 0.11);
+  }
+  move(whole, 2.2);
+  EXPECT_LT(highest, 2e-6);
+  for (const int block : blocks) EXPECT_LT(norm(space.state(block).centre - whole.state(block).centre), 1e-5) << block;
+  EXPECT_NEAR(space.state(slider).centre[0], whole.state(slider).centre[0], 1e-3);
+  const Books after = space.calc_books();
+  EXPECT_NEAR(after.motion_j + after.lost_j, before_j, 1e-5 * before_j);
 }
 
 TEST(sleep, a_row_that_is_struck_takes_part_in_the_impact) {
