@@ -1,6 +1,5 @@
-// Method: what has been slow for a while sleeps if contact forces exist that balance it at rest. A group sleeps as a whole; bodies of a
-// group
-//   of which others move sleep by themselves, with the forces of the others on them as they are. These forces are watched: where they
+// Method: what has been slow for a while sleeps if contact forces exist that balance it at rest. A group sleeps as a whole. Where others of
+//   the group move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched: where they
 //   change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
 // Deviations: none.
@@ -22,7 +21,7 @@ using impact::dot;
 constexpr double kSlow = 5e-3;          // m/s; of what may be about to rest
 constexpr double kPatience = 0.02;      // s; for so long
 constexpr double kLong = 0.3;           // s; what was slow for so long is no faster than kSlow: less balance is enough
-constexpr double kApart = 0.1;          // s; slow for so long, a body may sleep beside others that move,
+constexpr double kApart = 0.1;          // s; slow for so long, a body may sleep among others that move,
 constexpr double kCalm = 0.05;          // s; if those that it touches have been slow for so long
 constexpr double kStill = 5e-4;         // m/s; and nothing is faster where it touches
 constexpr double kShift = 0.05;         // of its weight: change of the forces on it that wakes it
@@ -157,7 +156,7 @@ Space::Rest Space::rest(Island& island, double h, const std::vector<joints::Spat
   return !balanced ? Rest::none : stands ? Rest::stands : Rest::leans;
 }
 
-/// Puts bodies to sleep whose group goes on moving elsewhere. At the beginning of a window, on the contacts of the last step.
+/// Puts bodies to sleep whose group keeps moving elsewhere. At the beginning of a window, on the contacts of the last step.
 void Space::rest_apart() {
   const auto get_slow = [&](int body) { return paces_[static_cast<std::size_t>(body)].slow_s; };
   std::vector<char> may(solids_.size(), 0);
@@ -191,7 +190,7 @@ void Space::rest_apart() {
     if (is_one(pair->a) && is_one(pair->b) && touches(*pair)) groups.join(pair->a, pair->b);
   struct Part {
     Island island;
-    std::vector<Pair*> bounds;  // to what goes on moving
+    std::vector<Pair*> bounds;  // to what keeps moving
   };
   std::map<int, Part> parts;
   for (Pair* pair : near_) {
@@ -246,6 +245,14 @@ void Space::add_loads(const Island& island, double h) {
   }
 }
 
+/// What the loads on the nth body of the group do on its way through a part of a step, at whose end it is at `to` [J].
+double Space::calc_load_work(std::size_t n, const State& to, double part_s, double step_s) const {
+  const auto i = static_cast<std::size_t>((*stepped_)[n]);
+  const double part = part_s / step_s;
+  const Vec3 turn = part_s * (placed_[i].spin + (0.5 * part) * (movers_[n].spin - placed_[i].spin));
+  return (1.0 / step_s) * (dot(loads_[n].linear, to.centre - states_[i].centre) + dot(loads_[n].angular, turn));
+}
+
 /// Adds a force at a contact, as a's or b's body feels it.
 void Space::add_pull(const Contact& c, bool is_a, const Vec3& force_n, joints::Spatial& pull) const {
   const Vec3 force = (is_a ? 1.0 : -1.0) * force_n;
@@ -253,7 +260,7 @@ void Space::add_pull(const Contact& c, bool is_a, const Vec3& force_n, joints::S
   pull.angular = pull.angular + cross(c.touch.where_m - state(is_a ? c.a : c.b).centre, force);
 }
 
-/// Wakes the bodies that sleep beside others whose forces on them are no longer those under which they rest.
+/// Wakes the bodies that sleep among others whose forces on them are no longer those under which they rest.
 void Space::wake_unbalanced() {
   struct Change {
     joints::Spatial pull;

@@ -334,6 +334,7 @@ class Space {
   enum class Rest { none, stands, leans };  // leans: only with the forces of others
   Rest rest(Island& island, double h, const std::vector<joints::Spatial>& pulls = {});
   void add_loads(const Island& island, double h);
+  double calc_load_work(std::size_t n, const State& to, double part_s, double step_s) const;
   void rest_apart();
   void add_pull(const Contact& contact, bool is_a, const Vec3& force_n, joints::Spatial& pull) const;
   void wake_unbalanced();

@@ -425,11 +425,14 @@ void Space::move_bodies(const Island& island, double to_s, double part_s, double
   bool rings = false;
   std::vector<State> moved;
   std::vector<char> is_ringing;  // one that ends in this part has been moved by it, too
+  double loads_j = 0.0;          // done by what sleeps on them
   for (std::size_t n = 0; n < island.bodies.size(); ++n) {
     is_ringing.push_back(has_impact(island.bodies[n]) ? 1 : 0);
     rings = rings || is_ringing.back() != 0;
     moved.push_back(movers_[n].linkage == nullptr ? calc_moved(n, part_s, h) : State{});
+    if (is_ringing.back() == 0 && movers_[n].linkage == nullptr) loads_j += calc_load_work(n, moved.back(), part_s, h);
   }
+  lost_j_ -= loads_j;  // as long as that does not fall with them, its weight gives what it loses
   std::vector<Linked*> flown;
   for_linked(island, [&](Linked& linked) {
     if (linked.ringing < 0) flown.push_back(&linked);
@@ -446,7 +449,7 @@ void Space::move_bodies(const Island& island, double to_s, double part_s, double
     check_finite(body);
     place_body(body);
   }
-  if (!rings) take_gain(island, before_j);
+  if (!rings) take_gain(island, before_j + loads_j);
 }
 
 /// Kinetic and of gravity [J].

@@ -182,10 +182,20 @@ std::vector<std::array<double, 2>> make_profile(int steps, const F& f) {
   return out;
 }
 
+/// In a folder of this process, which is removed at its end.
 inline std::filesystem::path get_path(const std::string& name) {
-  const auto folder = std::filesystem::temp_directory_path() / ("carillon_mesher_test_" + std::to_string(static_cast<long>(::getpid())));
-  std::filesystem::create_directories(folder);
-  return folder / name;
+  struct Folder {
+    pid_t owner = ::getpid();
+    std::filesystem::path path =
+        std::filesystem::temp_directory_path() / ("carillon_mesher_test_" + std::to_string(static_cast<long>(owner)));
+    Folder() { std::filesystem::create_directories(path); }
+    ~Folder() {
+      std::error_code error;
+      if (::getpid() == owner) std::filesystem::remove_all(path, error);
+    }
+  };
+  static const Folder folder;
+  return folder.path / name;
 }
 
 inline std::filesystem::path write_text(const std::string& name, const std::string& text) {
