@@ -169,12 +169,9 @@ void Space::rest_apart() {
     any = any || is_slow;
   }
   if (!any) return;
-  const auto touches = [](const Pair& pair) {
-    return std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.touching; });
-  };
   const auto is_one = [&](int body) { return body >= 0 && may[static_cast<std::size_t>(body)] != 0; };
   for (const Pair* pair : near_) {
-    if ((!is_one(pair->a) && !is_one(pair->b)) || !touches(*pair)) continue;
+    if ((!is_one(pair->a) && !is_one(pair->b)) || !pair->touches()) continue;
     const bool moves_there = std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) {
       return c.touching && norm(calc_velocity(c.a, c.touch.where_m) - calc_velocity(c.b, c.touch.where_m)) > kStill;
     });
@@ -187,7 +184,7 @@ void Space::rest_apart() {
   }
   Groups groups(static_cast<int>(solids_.size()));
   for (const Pair* pair : near_)
-    if (is_one(pair->a) && is_one(pair->b) && touches(*pair)) groups.join(pair->a, pair->b);
+    if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
   struct Part {
     Island island;
     std::vector<Pair*> bounds;  // to what keeps moving
@@ -199,7 +196,7 @@ void Space::rest_apart() {
     const bool is_bound = (moves(pair->a) && !is_one(pair->a)) || (pair->b >= 0 && moves(pair->b) && !is_one(pair->b));
     if (!is_bound)
       part.island.pairs.push_back(pair);
-    else if (touches(*pair))
+    else if (pair->touches())
       part.bounds.push_back(pair);
   }
   for (int i = 0; i < static_cast<int>(solids_.size()); ++i)
@@ -260,6 +257,26 @@ void Space::add_pull(const Contact& c, bool is_a, const Vec3& force_n, joints::S
   pull.angular = pull.angular + cross(c.touch.where_m - state(is_a ? c.a : c.b).centre, force);
 }
 
+/// The touches of a pair, good for a step. What sleeps of it wakes where what it rested on has gone away, or where another is about to
+/// touch it.
+void Space::watch(Pair& pair, double step_s) {
+  const auto resting = std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests; });
+  update(pair, step_s);
+  const bool a_moves = moves(pair.a);
+  const int body = a_moves ? pair.b : pair.a, by = a_moves ? pair.a : pair.b;
+  if (is_fixed(body) || moves(body)) return;
+  const auto left =
+      std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests && c.touch.gap_m <= kDeep; });
+  if (left < resting) return wake(body, by, find_linked(body) == nullptr);
+  const double fallen_m = 0.5 * norm(gravity_) * step_s * step_s;
+  const bool comes = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) {
+    const double approach = calc_approach(c);
+    // Where the two rest on each other wake_unbalanced() watches what is slow.
+    return (resting == 0 || approach > kSlowest) && c.touch.gap_m - approach * step_s - fallen_m <= kTouch;
+  });
+  if (comes) wake(body, by);
+}
+
 /// Wakes the bodies that sleep among others whose forces on them are no longer those under which they rest.
 void Space::wake_unbalanced() {
   struct Change {
@@ -296,8 +313,7 @@ bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
     return std::any_of(near_.begin(), near_.end(), [&](const Pair* pair) {
       if (pair->a != body && pair->b != body) return false;
       const int other = pair->a == body ? pair->b : pair->a;
-      return moves(other) && index_[static_cast<std::size_t>(other)] < 0 &&
-             std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touching; });
+      return moves(other) && index_[static_cast<std::size_t>(other)] < 0 && pair->touches();
     });
   };
   bool any = false;

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "runtime/config/error.hpp"
@@ -342,9 +341,8 @@ void Space::wake(int body, int by, bool alone) {
       if (key.first != i && key.second != i) continue;
       add_pair(key.first, key.second);
       const int other = key.first == i ? key.second : key.first;
-      const bool touching = std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.touching; });
       const bool sleeps = other >= 0 && asleep_[static_cast<std::size_t>(other)];
-      if (!alone && touching && sleeps) woken.push_back(other);
+      if (!alone && pair.touches() && sleeps) woken.push_back(other);
       for (Contact& c : pair.contacts)
         if (!sleeps)
           c.rests = c.is_load = false;
@@ -477,27 +475,7 @@ void Space::step(double end_s) {
       const int stride =
           std::max(a_moves ? stride_[static_cast<std::size_t>(pair.a)] : 1, b_moves ? stride_[static_cast<std::size_t>(pair.b)] : 1);
       const double step_s = find_time(step_in_window_ + stride) - from;
-      const auto count_resting = [&](double most_gap_m) {
-        return std::count_if(pair.contacts.begin(), pair.contacts.end(),
-                             [&](const Contact& c) { return c.rests && c.touch.gap_m <= most_gap_m; });
-      };
-      const auto rested = pair.b < 0 || (a_moves && b_moves) ? 0 : count_resting(std::numeric_limits<double>::infinity());
-      update(pair, step_s);
-      if (pair.b < 0 || (a_moves && b_moves)) continue;
-      const bool rests = rested > 0;
-      // What bears it, or lay on it, has gone away.
-      if (const int body = a_moves ? pair.b : pair.a; rests && !is_fixed(body) && count_resting(kDeep) < rested)
-        wake(body, a_moves ? pair.a : pair.b, find_linked(body) == nullptr);
-      for (const int body : {pair.a, pair.b}) {
-        if (!asleep_[static_cast<std::size_t>(body)]) continue;
-        for (const Contact& c : pair.contacts) {
-          const double approach = calc_approach(c);
-          if (rests && approach <= kSlowest) continue;  // wake_unbalanced() watches them
-          if (c.touch.gap_m - approach * step_s - 0.5 * norm(gravity_) * step_s * step_s > kTouch) continue;
-          wake(body, a_moves ? pair.a : pair.b);
-          break;
-        }
-      }
+      watch(pair, step_s);
     }
     wake_unbalanced();
     sort_near();

@@ -10,6 +10,7 @@
 // all else is as for others. A cord is a contact that pulls.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <list>
@@ -186,7 +187,10 @@ class Space {
     bool searched = false;
     std::int64_t window = -1;  // in which it was last near
     int cord = -1;             // it is one
-    double sag_m = 0.0;        // so deep an impact with modes left it: what it rests on has given way, and need not bring it up
+    bool touches() const {
+      return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });
+    }
+    double sag_m = 0.0;  // so deep an impact with modes left it: what it rests on has given way, and need not bring it up
   };
   /// Bodies on joints. What of it is of a step stands below the line.
   struct Linked {
@@ -337,6 +341,7 @@ class Space {
   double calc_load_work(std::size_t n, const State& to, double part_s, double step_s) const;
   void rest_apart();
   void add_pull(const Contact& contact, bool is_a, const Vec3& force_n, joints::Spatial& pull) const;
+  void watch(Pair& pair, double step_s);
   void wake_unbalanced();
   bool wake_struck(Island& island, const std::vector<Ref>& taken);
 

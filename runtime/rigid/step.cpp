@@ -1,4 +1,3 @@
-// One step from its prediction to its rest, on the rows that all its parts share; longer than most files.
 // Method: one group through one small step. A touch that lasts is a row of one velocity problem; impulses act at the middle of the step and
 //   places follow from the mean of the velocities at its two ends. With the arm from x0 + h v0 / 2 momentum and angular momentum of a free
 //   group are conserved to rounding, and a contact that neither slides nor strikes does no work. Rest is proven by a solution with zero
@@ -6,6 +5,7 @@
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the step with the impulse at its middle.
 // Deviations: fast touches end the step at their instant (strike.cpp).
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -432,7 +432,7 @@ void Space::move_bodies(const Island& island, double to_s, double part_s, double
     moved.push_back(movers_[n].linkage == nullptr ? calc_moved(n, part_s, h) : State{});
     if (is_ringing.back() == 0 && movers_[n].linkage == nullptr) loads_j += calc_load_work(n, moved.back(), part_s, h);
   }
-  lost_j_ -= loads_j;  // as long as that does not fall with them, its weight gives what it loses
+  lost_j_ -= loads_j;  // what lies on them does not fall as they do: until it wakes, within kDeep, this energy comes from nowhere
   std::vector<Linked*> flown;
   for_linked(island, [&](Linked& linked) {
     if (linked.ringing < 0) flown.push_back(&linked);

@@ -64,7 +64,7 @@ BODIES = {
     "matrices_two_materials": {"element": "T10", "band_hz": [20, 20e3], "materials": {"1": STEEL, "2": ALUMINIUM}, "write": write_two_halves},
     "matrices_orthotropic": {"element": "T10", "band_hz": [20, 20e3], "material": SPRUCE, "body": {"shape": "box", "length_m": 0.085, "width_m": 0.065, "height_m": 0.05, "nodes": 700}},
     "matrices_near_incompressible": {"element": "T10", "band_hz": [20, 1.2e3], "material": RUBBER, "body": {"shape": "sphere", "radius_m": 0.05, "nodes": 900}},
-    "matrices_held": {"element": "T10", "band_hz": [20, 20e3], "material": ALUMINIUM, "fixed": "x-min",
+    "matrices_fixed": {"element": "T10", "band_hz": [20, 20e3], "material": ALUMINIUM, "fixed": "x-min",
                       "body": {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 900}},
     "matrices_bunny": {"element": "T4", "band_hz": [20, 20e3], "material": CERAMIC, "mesh": ["--height", 0.13, "--wall", 0.012, "--nodes", 1500]},
 }

@@ -28,6 +28,14 @@ struct Table {
     states.push_back(s);
     return static_cast<int>(solids.size()) - 1;
   }
+  /// Two fixed blocks, 0.1 m high, for a board.
+  void add_supports(double height_m) {
+    for (const double x : {-0.4, 0.0}) {
+      Solid support = make_box(1.0, {0.04, 0.2, 0.1});
+      support.fixed = true;
+      add(std::move(support), {x, 0, height_m});
+    }
+  }
   Space begin(bool islands = true) const {
     const Ground ground{.restitution = 0.2, .friction = 0.4, .young_modulus_pa = 10e9, .poisson_ratio = 0.3};
     Options options;
@@ -75,11 +83,7 @@ TEST(sleep, bodies_of_a_group_sleep_while_others_of_it_move) {
 TEST(sleep, what_it_stands_on_tips_and_it_wakes) {
   // A board on two supports; what slides along it beyond the second one tips it, and the box that slept on its other end.
   Table table;
-  for (const double x : {-0.4, 0.0}) {
-    Solid support = make_box(1.0, {0.04, 0.2, 0.1});
-    support.fixed = true;
-    table.add(std::move(support), {x, 0, 0.05});
-  }
+  table.add_supports(0.05);
   table.add(make_box(1.0, {1.0, 0.2, 0.02}), {0, 0, 0.11});
   const int box = table.add(make_box(0.1, kSides), {-0.3, 0, 0.14});
   table.add(make_smooth_box(1.0), {-0.1, 0, 0.14}, {0.5, 0, 0});
@@ -97,11 +101,7 @@ TEST(sleep, what_it_stands_on_tips_and_it_wakes) {
 TEST(sleep, what_it_lies_on_goes_down_and_it_falls) {
   // The same board; the box sleeps on the end that goes down.
   Table table;
-  for (const double x : {-0.4, 0.0}) {
-    Solid support = make_box(1.0, {0.04, 0.2, 0.1});
-    support.fixed = true;
-    table.add(std::move(support), {x, 0, 0.35});
-  }
+  table.add_supports(0.35);
   table.add(make_box(1.0, {1.0, 0.2, 0.02}), {0, 0, 0.41});
   const int box = table.add(make_box(0.1, kSides), {0.25, -0.05, 0.44});
   table.add(make_smooth_box(1.0), {-0.1, 0.05, 0.44}, {0.5, 0, 0});
