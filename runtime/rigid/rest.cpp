@@ -156,6 +156,11 @@ Space::Rest Space::rest(Island& island, double h, const std::vector<joints::Spat
   return !balanced ? Rest::none : stands ? Rest::stands : Rest::leans;
 }
 
+/// Is one of its gaps so small that it counts as closed when the other body sleeps?
+bool Space::is_close(const Pair& pair) {
+  return pair.touches() || std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
+}
+
 /// Puts bodies to sleep whose group keeps moving elsewhere. At the beginning of a window, on the contacts of the last step.
 void Space::rest_apart() {
   const auto get_slow = [&](int body) { return paces_[static_cast<std::size_t>(body)].slow_s; };
@@ -187,7 +192,7 @@ void Space::rest_apart() {
     if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
   struct Part {
     Island island;
-    std::vector<Pair*> bounds;  // to what keeps moving
+    std::vector<Pair*> bounds;  // to what keeps moving, with or without forces
   };
   std::map<int, Part> parts;
   for (Pair* pair : near_) {
@@ -196,7 +201,7 @@ void Space::rest_apart() {
     const bool is_bound = (moves(pair->a) && !is_one(pair->a)) || (pair->b >= 0 && moves(pair->b) && !is_one(pair->b));
     if (!is_bound)
       part.island.pairs.push_back(pair);
-    else if (pair->touches())
+    else if (is_close(*pair))
       part.bounds.push_back(pair);
   }
   for (int i = 0; i < static_cast<int>(solids_.size()); ++i)
@@ -268,9 +273,9 @@ void Space::watch(Pair& pair, double step_s) {
   const auto left =
       std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests && c.touch.gap_m <= kDeep; });
   if (left < resting) return wake(body, by, find_linked(body) == nullptr);
-  const double fallen_m = 0.5 * norm(gravity_) * step_s * step_s;
   const bool comes = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) {
-    const double approach = calc_approach(c);
+    const double approach = calc_approach(c), pull = (a_moves ? -1.0 : 1.0) * dot(gravity_, c.touch.normal);
+    const double fallen_m = 0.5 * std::max(pull, 0.0) * step_s * step_s;
     // Where the two rest on each other wake_unbalanced() watches what is slow.
     return (resting == 0 || approach > kSlowest) && c.touch.gap_m - approach * step_s - fallen_m <= kTouch;
   });
@@ -294,7 +299,7 @@ void Space::wake_unbalanced() {
       if (!c.rests && !c.touching) continue;
       Change& change = changes[body];
       change.by = other;
-      change.is_struck = change.is_struck || has_impact(other) || struck_.contains(body);
+      change.is_struck = change.is_struck || has_impact(other);
       add_pull(c, is_a, calc_force(c) - (c.rests ? c.rest_n : Vec3{}), change.pull);
     }
   }
@@ -303,35 +308,29 @@ void Space::wake_unbalanced() {
     const double size = norm(change.pull.linear) + norm(change.pull.angular) / solid.radius_m;
     if (change.is_struck || size > kShift * solid.mass_kg * norm(gravity_)) wake(body, change.by, find_linked(body) == nullptr);
   }
-  std::erase_if(struck_, [&](int body) { return asleep_[static_cast<std::size_t>(body)] == 0; });
 }
 
-/// Bodies of an impact that slept until now move from here on, in the group that is being stepped. True if there were any. What another
-/// group touches, too, stays a wall for this impact, and wakes before the next step.
+/// Bodies of an impact that slept until now move from here on, in the group that is being stepped. True if there were any. If another group
+/// touches them, too, that touch waits for the next step, in which the groups are one.
 bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
-  const auto is_touched_elsewhere = [&](int body) {
-    return std::any_of(near_.begin(), near_.end(), [&](const Pair* pair) {
-      if (pair->a != body && pair->b != body) return false;
-      const int other = pair->a == body ? pair->b : pair->a;
-      return moves(other) && index_[static_cast<std::size_t>(other)] < 0 && pair->touches();
-    });
-  };
   bool any = false;
+  const auto take = [&](int body) {
+    index_[static_cast<std::size_t>(body)] = static_cast<int>(island.bodies.size());
+    island.bodies.push_back(body);
+    for (Pair* pair : near_)
+      if ((pair->a == body || pair->b == body) && is_stepped(*pair) &&
+          std::find(island.pairs.begin(), island.pairs.end(), pair) == island.pairs.end())
+        island.pairs.push_back(pair);
+  };
   for (const Ref& ref : taken)
     for (const int body : {ref.pair->a, ref.pair->b}) {
       if (is_fixed(body) || moves(body)) continue;
-      if (find_linked(body) != nullptr || is_touched_elsewhere(body)) {
-        struck_.insert(body);
-        continue;
-      }
       any = true;
       wake(body, island.bodies.front(), true);
-      index_[static_cast<std::size_t>(body)] = static_cast<int>(island.bodies.size());
-      island.bodies.push_back(body);
-      for (Pair* pair : near_)
-        if ((pair->a == body || pair->b == body) && is_stepped(*pair) &&
-            std::find(island.pairs.begin(), island.pairs.end(), pair) == island.pairs.end())
-          island.pairs.push_back(pair);
+      if (const Linked* linked = find_linked(body); linked != nullptr)
+        std::for_each(linked->bodies.begin(), linked->bodies.end(), take);
+      else
+        take(body);
     }
   return any;
 }

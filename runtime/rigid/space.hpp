@@ -339,6 +339,7 @@ class Space {
   Rest rest(Island& island, double h, const std::vector<joints::Spatial>& pulls = {});
   void add_loads(const Island& island, double h);
   double calc_load_work(std::size_t n, const State& to, double part_s, double step_s) const;
+  static bool is_close(const Pair& pair);
   void rest_apart();
   void add_pull(const Contact& contact, bool is_a, const Vec3& force_n, joints::Spatial& pull) const;
   void watch(Pair& pair, double step_s);
@@ -416,7 +417,6 @@ class Space {
   std::vector<char> asleep_, flying_, in_ringing_;
   std::vector<int> stride_;  // small steps of the window that a body takes at once
   std::vector<Pace> paces_;
-  std::set<int> struck_;  // sleeping bodies that an impact reached, to be woken
   std::vector<double> reach_m_s_;
   std::vector<State> flew_from_;
   std::optional<Ground> ground_;

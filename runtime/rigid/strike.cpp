@@ -290,7 +290,11 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
       movers_[n].member = get_member(island.bodies[n]);
     }
   }
-  for_linked(island, [](Linked& linked) { linked.linkage.set(*linked.mechanism, linked.now); });
+  for_linked(island, [this](Linked& linked) {
+    linked.linkage.set(*linked.mechanism, linked.now);
+    linked.linkage.movers.clear();
+    for (const int body : linked.bodies) linked.linkage.movers.push_back(find_index(body));
+  });
   std::vector<Point> points;
   double scale = kSlowest;
   for (const Ref& ref : taken) {

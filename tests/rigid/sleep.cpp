@@ -159,6 +159,36 @@ TEST(sleep, a_row_that_is_struck_takes_part_in_the_impact) {
   EXPECT_NEAR(momentum, 0.05, 1e-6) << "nothing else is pushed along";
 }
 
+TEST(sleep, what_another_group_touches_takes_part_in_the_impact) {
+  // A board on which something slides lies on two blocks. A box that touches one of these is struck.
+  Table table;
+  const int struck = table.add(make_smooth_box(0.1), {-0.06, 0, 0.02}), carrier = table.add(make_smooth_box(1.0), {0, 0, 0.02});
+  const int other = table.add(make_smooth_box(1.0), {0.8, 0, 0.02});
+  Solid board = make_box(0.2, {0.86, 0.05, 0.04});
+  board.friction = 0.0;
+  table.add(std::move(board), {0.425, 0, 0.06});
+  const int slider = table.add(make_smooth_box(0.02), {0.1, 0, 0.1}, {0.25, 0, 0});
+  const int striker = table.add(make_smooth_box(0.1), {-0.4, 0, 0.02}, {0.5, 0, 0});
+  Space space = table.begin(), whole = table.begin(false);
+  const double before_j = space.calc_books().motion_j;
+  move(space, 0.55);
+  for (const int body : {struck, carrier, other}) EXPECT_TRUE(space.is_still(body)) << body;
+  EXPECT_FALSE(space.is_still(slider));
+  const auto calc_momentum = [&] {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < table.solids.size(); ++i) sum += table.solids[i].mass_kg * space.state(static_cast<int>(i)).velocity[0];
+    return sum;
+  };
+  const double momentum = calc_momentum();
+  move(space, 0.6);
+  move(whole, 0.6);
+  EXPECT_NEAR(calc_momentum(), momentum, 1e-4 * momentum);
+  for (const int body : {struck, carrier, striker, slider})
+    EXPECT_NEAR(space.state(body).velocity[0], whole.state(body).velocity[0], 1e-3) << body;
+  const Books after = space.calc_books();
+  EXPECT_NEAR(after.motion_j + after.lost_j, before_j, 1e-8 * before_j);
+}
+
 TEST(sleep, load_that_comes_slowly_wakes_and_what_carries_it_sleeps_again) {
   // A board on two blocks; the weight of what slides along it goes from one block to the other.
   Table table;
