@@ -80,9 +80,9 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
     const double sign = side == 0 ? 1.0 : -1.0;
     // Where one hit is alone, the place is known; where there are more, it is on the same face or near.
     const std::optional<shape::Place>& known = first.places[static_cast<std::size_t>(side)];
-    const Spotted place = known && hits.size() == 1
-                              ? Spotted{known->triangle, known->barycentric}
-                              : find_place(space.solid(body), state, where, (-sign) * normal, known ? known->triangle : -1);
+    const std::int32_t near = first.triangles[static_cast<std::size_t>(side)];
+    const Spotted place = known && hits.size() == 1 ? Spotted{known->triangle, known->barycentric}
+                                                    : find_place(space.solid(body), state, where, (-sign) * normal, near);
     pulse.body = body;
     pulse.other = side == 0 ? first.b : first.a;
     pulse.triangle = place.triangle;

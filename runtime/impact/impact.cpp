@@ -19,7 +19,8 @@ namespace {
 constexpr double kSlowest = 1e-6;  // m/s: speed for which the step is chosen where nothing approaches
 constexpr double kTaper = 0.05;    // of how long a contact has pressed: time constant with which a rebound comes to its limit
 constexpr double kStill = 1e-3;    // m/s: what rests and moves no faster has settled
-constexpr int kLimitings = 8;      // rounds in which contacts that share bodies settle on it
+constexpr int kLimitings = 8;      // rounds in which contacts that share bodies settle on it,
+constexpr double kOver = 1e-4;     // to this part of the force of a step
 
 std::size_t pad(int n) { return static_cast<std::size_t>((n + kLanes - 1) / kLanes * kLanes); }
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
@@ -409,7 +410,7 @@ bool Impact::limit_forces() {
     for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
     const double left = limit - before, allowed = left > 0.0 ? before - left * std::expm1(-h_ / (kTaper * (pressed_s_[c] + h_))) : limit;
     const double over = (parting - allowed) / gain;
-    if (over <= 1e-9 * force_[row]) continue;
+    if (over <= kOver * force_[row]) continue;
     t.most_n = std::max(0.0, force_[row] - over);
     any = true;
   }

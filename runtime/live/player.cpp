@@ -198,7 +198,7 @@ void play(const PlayerOptions& options) {
   synth::LoadKeeper keeper;
   double least_lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound
   for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
-    const double until = now + options.look_ahead_s;
+    const double until = now + options.look_ahead_s, known = course.get_time_s();
     advance_to(until);
     least_lead_s = std::min(least_lead_s, course.get_time_s() - synthesiser.get_time_s());
     synthesiser.collect();
@@ -209,7 +209,8 @@ void play(const PlayerOptions& options) {
     course.hand_on(now + handed_s, synthesiser);
     walk.hand_on(now + kHandedS, synthesiser);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
-    if (course.get_time_s() >= until) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    // Physics goes by whole windows, the last of which may have to wait for the sound.
+    if (course.get_time_s() >= until || course.get_time_s() == known) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   device.stop();
   const DeviceStatistics card = device.get_statistics();

@@ -92,12 +92,14 @@ Space::Ring& Space::ring_until(int body, double time_s) {
 
 /// Of a body of a hit; looked for once.
 const shape::Place& Space::find_place(Hit& hit, bool is_a) const {
-  std::optional<shape::Place>& place = hit.places[is_a ? 0 : 1];
+  const std::size_t side = is_a ? 0 : 1;
+  std::optional<shape::Place>& place = hit.places[side];
   if (place) return *place;
   const auto i = static_cast<std::size_t>(is_a ? hit.a : hit.b);
   const Mat3 back = transpose(placed_[i].rotation);
   place = solids_[i].shape->find_place(solids_[i].centre_m + back * (hit.touch.where_m - states_[i].centre),
-                                       back * ((is_a ? -1.0 : 1.0) * hit.touch.normal));
+                                       back * ((is_a ? -1.0 : 1.0) * hit.touch.normal), hit.triangles[side]);
+  hit.triangles[side] = place->triangle;
   return *place;
 }
 

@@ -86,6 +86,7 @@ struct Contact {
   bool rests = false;        // it did when a body of it fell asleep,
   Vec3 rest_n{};             // and gave a this force,
   bool is_load = false;      // which acts on whichever body is awake, and `impulse` is that and what it takes in addition
+  std::array<std::int32_t, 2> triangles{-1, -1};  // of a and b, where it struck last
 };
 
 /// One point of an impact. Momentum and place in the world.
@@ -97,6 +98,7 @@ struct Hit {
   bool is_cord = false;                                 // comes taut
   double linked_mass_kg = 0.0;                          // that meets there, where bodies are on joints
   std::array<std::optional<shape::Place>, 2> places{};  // on a and b, where they were looked for
+  std::array<std::int32_t, 2> triangles{-1, -1};        // on which they may be
 };
 
 /// An instant of impact: its points, and the bodies that it moved, before and after.

@@ -32,11 +32,12 @@ constexpr double kLoose = 1000.0;                            // times the tolera
 constexpr double kLooseOfSpeed = 1e-3;                       // of the fastest of its bodies, where that is more,
 constexpr double kLoosest = 0.3 * kSlowest;                  // and no more than this: what stands must not strike
 constexpr int kGuesses = 6;                                  // of a factorised problem in a step
-constexpr double kRetry = 4e-3;                              // s; a group whose guesses failed goes by sweeps for so long
+constexpr double kRetry = 4e-3;                              // s; a group whose guesses failed goes by sweeps for so long,
+constexpr double kRetrySmall = 1e-3;                         // s; a small one for so long
 constexpr int kMostMissed = 30;                              // in a step: instants at which nothing struck after all
-constexpr int kMostImpacts = 8;                              // of a group in a step, each at its instant; a group with more is crowded
+constexpr int kMostImpacts = 4;                              // of a group in a step, each at its instant; a group with more is crowded
 constexpr int kLeastImpacts = 2;                             // the same of the largest groups, each of whose impacts costs more
-constexpr int kStruckBodies = 96;                            // bodies of a group times its impacts in a step
+constexpr int kStruckBodies = 48;                            // bodies of a group times its impacts in a step
 constexpr double kCrowded = 2e-3;                            // s; for so long after
 
 }  // namespace
@@ -315,10 +316,12 @@ void Space::solve(double tolerance_m_s) {
   const int count = static_cast<int>(movers_.size());
   const bool settles = fastest < kSettling;
   const bool is_small = count <= options_.most_direct && points_.size() <= kMostDirect;
+  const bool rolls = std::any_of(points_.begin(), points_.end(), [](const Point& p) { return p.rolling_m > 0.0; });
   const auto factorise = [&](bool are_swept) {
     if (solver_.solve_directly(movers_, points_, is_small ? kMostGuesses : kGuesses, are_swept) && !gains()) return true;
-    if (!is_small)
-      for (const int body : *stepped_) paces_[static_cast<std::size_t>(body)].next_guess_s = time_s_ + kRetry;
+    // What rolls keeps its energy better that way, even where a guess fails now and then.
+    const double pause_s = !is_small ? kRetry : rolls ? 0.0 : kRetrySmall;
+    for (const int body : *stepped_) paces_[static_cast<std::size_t>(body)].next_guess_s = time_s_ + pause_s;
     return false;
   };
   const auto sweep = [&](int most) {
@@ -333,7 +336,6 @@ void Space::solve(double tolerance_m_s) {
   const bool at_once = is_small || (settles && count <= kMostAtOnce);
   if (at_once && may_guess) {
     // What slid in the last step is guessed to slide; what rolls is guessed anew.
-    const bool rolls = std::any_of(points_.begin(), points_.end(), [](const Point& p) { return p.rolling_m > 0.0; });
     if (factorise(is_small && !rolls)) return;
     movers_ = free;
     points_ = begun;

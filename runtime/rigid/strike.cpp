@@ -194,7 +194,7 @@ std::vector<Space::Ref> Space::gather_points(const Island& island, const std::ve
 
 /// A point of an impact of the group's bodies, which have their velocities in `movers_`; `p` gets the velocity that it is to have.
 Hit Space::make_hit(const Contact& c, Point& p) const {
-  Hit hit{.a = c.a, .b = c.b, .touch = c.touch};
+  Hit hit{.a = c.a, .b = c.b, .touch = c.touch, .triangles = c.triangles};
   hit.approach_m_s = -dot(calc_relative_velocity(movers_, p), p.normal);
   hit.is_cord = c.cord >= 0;
   if (find_linked(c.a) != nullptr || find_linked(c.b) != nullptr) {
@@ -302,7 +302,11 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
     record.hits.push_back(make_hit(ref.get(), points.back()));
     scale = std::max(scale, std::abs(record.hits.back().approach_m_s));
   }
-  if (!record.hits.empty() && predict_hits(taken, record.hits, points) && begin_ringing(taken, record.hits, time_s)) return;
+  const auto keep_triangles = [&] {
+    for (std::size_t n = 0; n < taken.size(); ++n) taken[n].get().triangles = record.hits[n].triangles;
+  };
+  if (!record.hits.empty() && predict_hits(taken, record.hits, points) && begin_ringing(taken, record.hits, time_s))
+    return keep_triangles();
   // A rigid impact ends the impacts with modes that its bodies were moved by.
   for (const Hit& hit : record.hits)
     for (const int body : {hit.a, hit.b})
@@ -320,6 +324,7 @@ void Space::strike(Island& island, const std::vector<Ref>& first, double time_s)
     record.after.push_back(state(body));
     reach_out(body);
   }
+  keep_triangles();
   for (std::size_t n = 0; n < taken.size(); ++n) {
     Contact& c = taken[n].get();
     const bool rebounds = record.hits[n].restitution > 0.0;

@@ -14,7 +14,8 @@ namespace carillon::shape {
 
 namespace {
 
-constexpr double kOnFace = 1e-4;  // of the size of the body: what is as near to a face is on it
+constexpr double kOnFace = 1e-3;  // of the size of the body: what is as near to a face is on it,
+constexpr double kFaces = -0.2;   // unless it looks away from the way asked: cosine
 
 }  // namespace
 
@@ -53,9 +54,11 @@ Box Shape::calc_box(const Frame& frame) const {
 
 Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hint) const {
   if (hint >= 0) {
-    const Nearest on = mesh_->find_nearest_on_face(point, hint);
-    if (on.distance2 < kOnFace * kOnFace * size_m_ * size_m_ && dot(mesh_->normals[hint], outward) > 0.0)
-      return choose_face(on, point, outward);
+    const Nearest on = mesh_->walk_nearest(point, hint);
+    if (on.distance2 < kOnFace * kOnFace * size_m_ * size_m_) {
+      const Place place = choose_face(on, point, outward);
+      if (dot(mesh_->normals[place.triangle], outward) > kFaces) return place;
+    }
   }
   const Nearest nearest = mesh_->find_nearest(point, Box::kFar, -1);
   // At an edge or a corner, and under a curved skin, several faces are near: the one that looks the way asked.
@@ -75,7 +78,7 @@ Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hin
 
 /// Of the faces that meet where a point of the surface was found, the one that looks the way asked.
 Place Shape::choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const {
-  constexpr double kEdge = 1e-6;
+  constexpr double kEdge = 1e-3;  // of a triangle's height
   int face = on.face, zeros = 0, whole = 0;
   double most = dot(mesh_->normals[face], outward);
   const auto look = [&](int f) {
