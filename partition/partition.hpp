@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::partition {
 

@@ -20,8 +20,8 @@
 #include "precompute/io/validate.hpp"
 #include "precompute/petsc/blas_kernels.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
@@ -39,7 +39,7 @@ int fail(MPI_Comm comm, int rank, int code, const std::string& message) {
     MPI_Test(&request, &all_here, MPI_STATUS_IGNORE);
     if (all_here == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  if (rank == 0 || all_here == 0) fmt::print(stderr, "carillon-precompute: error: {}\n", config::printable(message));
+  if (rank == 0 || all_here == 0) fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(message));
   std::fflush(stderr);
   if (all_here == 0) MPI_Abort(MPI_COMM_WORLD, code);
   return code;
@@ -71,7 +71,7 @@ struct CommandLine {
   CommandLine(int argc, char** argv) {
     const CLI::Validator named([](const std::string& file) { return file.empty() ? "the name of the file is empty" : ""; }, "FILE");
     app.failure_message(
-        [](const CLI::App* asked, const CLI::Error& error) { return config::printable_lines(CLI::FailureMessage::simple(asked, error)); });
+        [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
     app.add_option("JOB", job, "job file (JSON with // comments)")->required();
     app.add_flag("-q,--quiet", options.quiet, "nothing on standard output; warnings and errors are on standard error");
     app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
@@ -128,19 +128,19 @@ int carry_out(const petsc::Session& session, const CommandLine& words) {
   petsc::reserve_blas_memory(PETSC_COMM_WORLD);
   if (words.options.validate) {
     const std::string text = io::validate_job(PETSC_COMM_WORLD, words.job, words.options);
-    if (speaks) fmt::print("{}\n", words.options.json ? text : config::printable_lines(text));
+    if (speaks) fmt::print("{}\n", words.options.json ? text : base::printable_lines(text));
     return 0;
   }
   const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, words.job, words.options);
   if (summary.is_stopped) {
-    if (speaks) fmt::print(stderr, "carillon-precompute: {}\n", config::printable(summary.result));
+    if (speaks) fmt::print(stderr, "carillon-precompute: {}\n", base::printable(summary.result));
     return kExitCheckpointed;
   }
   if (speaks && words.options.quiet && !summary.warning.empty())
-    fmt::print(stderr, "carillon-precompute: warning: {}\n", config::printable(summary.warning));
+    fmt::print(stderr, "carillon-precompute: warning: {}\n", base::printable(summary.warning));
   if (speaks && !words.options.quiet) {
-    if (!summary.warning.empty()) fmt::print("warning: {}\n", config::printable(summary.warning));
-    fmt::print("{}\n{}\n", config::printable(summary.bank.string()), config::printable_lines(summary.result));
+    if (!summary.warning.empty()) fmt::print("warning: {}\n", base::printable(summary.warning));
+    fmt::print("{}\n{}\n", base::printable(summary.bank.string()), base::printable_lines(summary.result));
   }
   return 0;
 }
@@ -184,7 +184,7 @@ int main(int argc, char** argv) {
     if (session.rank() == 0) words.app.exit(*words.error);
     return kExitInput;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "carillon-precompute: error: {}\n", carillon::config::printable(error.what()));
+    fmt::print(stderr, "carillon-precompute: error: {}\n", carillon::base::printable(error.what()));
     return kExitSystem;
   }
 }

@@ -9,12 +9,10 @@
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -22,7 +20,8 @@
 #include <string_view>
 
 #include "jobs/store/store.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/command.hpp"
+#include "runtime/base/file.hpp"
 
 extern "C" char** environ;
 
@@ -85,7 +84,7 @@ std::vector<std::string> make_environment(const std::string& token, const Scratc
 
 /// Whether the solver knows an option.
 bool has_option(const fs::path& program, const char* option) {
-  return config::read_file(program, "program", std::uint64_t{1} << 32).find(option) != std::string::npos;
+  return base::read_file(program, "program", std::uint64_t{1} << 32).find(option) != std::string::npos;
 }
 
 int open_output(const fs::path& file, int mode) {
@@ -94,32 +93,6 @@ int open_output(const fs::path& file, int mode) {
     throw SystemError(
         fmt::format("{}: cannot write this: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(errno)));
   return output;
-}
-
-std::vector<const char*> to_pointers(const std::vector<std::string>& texts) {
-  std::vector<const char*> pointers;
-  for (const std::string& text : texts) pointers.push_back(text.c_str());
-  pointers.push_back(nullptr);
-  return pointers;
-}
-
-/// In the child, between fork and exec: only what is allowed there (signal-safety(7)). Never returns.
-[[noreturn]] void become(const char* const* arguments, const char* const* environment, const char* folder, int output, int log,
-                         pid_t parent, int report) {
-  ::setpgid(0, 0);
-  ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-  sigset_t none;
-  ::sigemptyset(&none);
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGCHLD, SIGPIPE}) ::signal(signal, SIG_DFL);
-  ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  const int adjust = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
-  if (adjust >= 0) (void)!::write(adjust, "500", 3);  // when memory runs out the solver goes, not the service
-  const int input = ::open("/dev/null", O_RDONLY);
-  if (::getppid() == parent && input >= 0 && ::dup2(input, 0) == 0 && ::dup2(output, 1) == 1 && ::dup2(log, 2) == 2 && ::chdir(folder) == 0)
-    ::execve(arguments[0], const_cast<char* const*>(arguments), const_cast<char* const*>(environment));
-  const int error = errno;
-  (void)!::write(report, &error, sizeof error);
-  ::_exit(127);
 }
 
 }  // namespace
@@ -152,18 +125,8 @@ void Scratch::remove_left(const std::string& token) {
 }
 
 fs::path find_program(const std::string& name) {
-  std::error_code error;
-  const fs::path beside = fs::read_symlink("/proc/self/exe", error).parent_path() / name;
-  if (!error && ::access(beside.c_str(), X_OK) == 0) return beside;
-  const char* path = std::getenv("PATH");
-  std::string_view rest = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
-  while (!rest.empty()) {
-    const std::string_view folder = rest.substr(0, rest.find(':'));
-    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
-    const fs::path candidate = fs::path(folder) / name;
-    if (candidate.is_absolute() && fs::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0) return candidate;
-  }
-  throw SystemError(fmt::format("{} is neither beside this program nor in PATH; install it", name));
+  if (const auto program = base::find_program(name)) return *program;
+  throw SystemError(fmt::format("{} is neither next to this program nor in PATH; install it", name));
 }
 
 bool is_under_slurm() { return std::getenv("SLURM_JOB_ID") != nullptr; }
@@ -203,25 +166,28 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
 bool can_predict() { return has_option(find_program("carillon-precompute"), "--validate"); }
 
 pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, const fs::path& output) {
-  const std::vector<const char*> arguments = to_pointers(launch.arguments), environment = to_pointers(launch.environment);
   const int error_file = open_output(log, O_APPEND);
   const int output_file = output.empty() ? error_file : open_output(output, O_TRUNC);
-  std::array<int, 2> report{-1, -1};
-  int error = ::pipe2(report.data(), O_CLOEXEC) == 0 ? 0 : errno;
-  pid_t child = -1;
-  if (error == 0) {
-    const pid_t parent = ::getpid();
-    child = ::fork();
-    if (child == 0) become(arguments.data(), environment.data(), folder.c_str(), output_file, error_file, parent, report[1]);
-    if (child < 0) error = errno;
-    ::close(report[1]);
-    if (child > 0 && ::read(report[0], &error, sizeof error) != sizeof error) error = 0;
-    ::close(report[0]);
+  const auto close_files = [&] {
+    ::close(error_file);
+    if (output_file != error_file) ::close(output_file);
+  };
+  try {
+    // When memory runs out the solver goes, not the service.
+    const pid_t child = base::start({.words = launch.arguments,
+                                     .environment = launch.environment,
+                                     .folder = folder,
+                                     .output = output_file,
+                                     .errors = error_file,
+                                     .group = base::Command::Group::own,
+                                     .signal_at_end = SIGTERM,
+                                     .yields_memory = true});
+    close_files();
+    return child;
+  } catch (...) {
+    close_files();
+    throw;
   }
-  ::close(error_file);
-  if (output_file != error_file) ::close(output_file);
-  if (error != 0) throw SystemError(fmt::format("{}: cannot be started: {}", launch.arguments[0], std::strerror(error)));
-  return child;
 }
 
 }  // namespace carillon::attempt

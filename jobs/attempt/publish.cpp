@@ -16,7 +16,7 @@
 #include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
 #include "runtime/bank/bank.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::attempt {
 namespace {
@@ -35,7 +35,7 @@ bool take_copy(const fs::path& from, const fs::path& to) {
     return false;
   }
   try {
-    config::WholeFile whole(to);
+    base::WholeFile whole(to);
     std::string piece(1 << 20, '\0');
     for (ssize_t got = 0; (got = ::read(file, piece.data(), piece.size())) > 0;)
       whole.append(std::string_view(piece.data(), static_cast<std::size_t>(got)));
@@ -110,7 +110,7 @@ bool repair_records(const store::Store& store, const store::Request& request) {
     return false;
   }
   if (store::find_origin_fault(record, request)) return false;
-  config::write_file(temporary / store::kJobFile, record + "\n");
+  base::write_file(temporary / store::kJobFile, record + "\n");
   store::write_request(temporary.path(), request);
   outcome::Outcome outcome;  // how the attempt went is lost with its record; that it was done is not
   outcome.cause = outcome::Cause::done;

@@ -9,7 +9,7 @@
 #include "jobs/cli/shared.hpp"
 #include "jobs/cli/slurm.hpp"
 #include "jobs/queue/settle.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "jobs/cli/status.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {

@@ -9,8 +9,8 @@
 #include <iterator>
 #include <set>
 
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -37,7 +37,7 @@ Source keep_error(const std::string& job_file, const Read& read) {
 }
 
 Source read_file_source(const fs::path& file) {
-  return keep_error(name_of(file), [&] { return spec::read_job(file, spec::BankKey::optional); });
+  return keep_error(name_of(file), [&] { return job::read_job(file, job::BankKey::optional); });
 }
 
 std::vector<Source> read_folder(const fs::path& folder) {
@@ -64,7 +64,7 @@ Source read_line(const std::string& line, const fs::path& manifest, int number) 
   const std::string place = fmt::format("{}:{}", manifest.string(), number);
   if (line.starts_with('{')) {
     return keep_error(fmt::format("{}#{}", name_of(manifest), number),
-                      [&] { return spec::parse_job(line, manifest, spec::BankKey::optional, number); });
+                      [&] { return job::parse_job(line, manifest, job::BankKey::optional, number); });
   }
   const fs::path file = fs::path(line).is_absolute() ? fs::path(line) : manifest.parent_path() / line;
   Source source = read_file_source(file);
@@ -77,7 +77,7 @@ std::vector<Source> read_manifest(const std::string& word) {
   const fs::path manifest = is_stdin ? fs::current_path() / "standard input" : fs::absolute(word);
   std::string text =
       is_stdin ? std::string(std::istreambuf_iterator<char>(std::cin), {})
-               : config::read_file(word, "manifest", kMostManifestBytes, "a job file ends in .json, and a manifest names one on each line");
+               : base::read_file(word, "manifest", kMostManifestBytes, "a job file ends in .json, and a manifest names one on each line");
   if (text.find('\0') != std::string::npos)
     throw InputError(fmt::format("{}: this is no text; a job file ends in .json, and a manifest names one on each line", word));
   std::vector<Source> sources;
@@ -127,7 +127,7 @@ std::vector<Source> gather(const std::vector<std::string>& words, const std::str
 Source gather_one(const std::string& word, const std::string& solver) {
   Source source;
   source.job_file = name_of(word);
-  source.job = spec::read_job(word, spec::BankKey::optional);
+  source.job = job::read_job(word, job::BankKey::optional);
   source.request = store::RequestMaker(solver).make(source.job);
   source.request.job_file = source.job_file;
   return source;

@@ -7,15 +7,15 @@
 #include <vector>
 
 #include "jobs/cli/shared.hpp"
-#include "jobs/spec/job_spec.hpp"
 #include "jobs/store/identity.hpp"
+#include "precompute/job/job_spec.hpp"
 
 namespace carillon::cli {
 
 /// One job as it was named, or why it cannot be used.
 struct Source {
   std::string job_file;  // store::to_text() of an absolute path, with "#7" for line 7 of a manifest
-  spec::JobSpec job;
+  job::JobSpec job;
   store::Request request;
   std::string error;  // empty: it can be used
 };

@@ -20,7 +20,7 @@
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/open_folder.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {

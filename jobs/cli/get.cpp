@@ -9,8 +9,8 @@
 #include "jobs/cli/shared.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -27,7 +27,7 @@ void copy_to(const fs::path& from, const fs::path& wanted) {
   std::error_code error;
   const fs::path to = fs::is_directory(wanted, error) ? wanted / from.filename() : wanted;
   if (fs::equivalent(from, to, error)) throw InputError(fmt::format("{}: this is the bank in the store; name another file", to.string()));
-  config::check_writable(to, "copy of the bank");
+  base::check_writable(to, "copy of the bank");
   const fs::path temporary = to.parent_path() / fmt::format(".{}.tmp.{}", to.filename().string().substr(0, 200), ::getpid());
   const auto refuse = [&](int code) {
     ::unlink(temporary.c_str());

@@ -10,8 +10,8 @@
 #include <thread>
 
 #include "jobs/cli/shared.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/printable.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -75,7 +75,7 @@ int run_log(Shared& shared, const Options& options) {
         at -= static_cast<off_t>(bytes.size() - whole);
         bytes.resize(whole);
       }
-      fmt::print("{}", config::printable_lines(bytes));
+      fmt::print("{}", base::printable_lines(bytes));
     }
     if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
     if (is_last) break;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "jobs/cli/shared.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/version/version.hpp"
 
 namespace carillon::cli {
@@ -74,7 +74,7 @@ void check_command(CLI::App& app, int argc, char** argv) {
     if (command->get_name() == argv[at]) return;
     if (!command->get_group().empty()) known.push_back(command->get_name());
   }
-  const std::string near = config::find_nearest(argv[at], known);
+  const std::string near = base::find_nearest(argv[at], known);
   throw InputError(fmt::format("\"{}\" is no command{}; carillon --help lists them", show(argv[at]),
                                near.empty() ? "" : ", did you mean \"" + near + "\"?"));
 }

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "jobs/cli/shared.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {

@@ -10,17 +10,11 @@
 #include "jobs/cli/slurm.hpp"
 #include "jobs/queue/settle.hpp"
 #include "jobs/slurm/inside.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/command.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace fs = std::filesystem;
-
-fs::path find_self() {
-  std::error_code error;
-  const fs::path self = fs::read_symlink("/proc/self/exe", error);
-  if (error) throw SystemError("/proc does not show this program; mount it");
-  return self;
-}
 
 void Shared::settle() {
   if (!store().may_write() || is_disk_full_) {
@@ -40,7 +34,7 @@ void Shared::settle() {
 
 int run_until_done(Shared& shared, const std::vector<store::Id>& ids) {
   queue::RunOptions options;
-  options.program = find_self();
+  options.program = base::find_self();
   options.quiet = shared.json;
   options.mpirun_options = shared.profile().mpirun_options;
   if (const int code = queue::run(shared.store(), options); code != 0) return code;
@@ -73,7 +67,7 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
         return 0;
       }
       options->mpirun_options = shared.profile().mpirun_options;
-      options->program = find_self();
+      options->program = base::find_self();
       options->json = shared.json;
       return queue::run(shared.store(), *options);
     };

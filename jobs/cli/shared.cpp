@@ -10,8 +10,8 @@
 #include "jobs/cli/gather.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -36,10 +36,10 @@ Profile read_profile(const std::string& option) {
   Profile profile;
   profile.file = option.empty() ? find_profile_file() : fs::path(option);
   if (option.empty() && (profile.file.empty() || !is_there(profile.file))) return {};
-  config::Object root = config::read_document(profile.file).root();
+  base::Object root = base::read_document(profile.file).root();
   if (root.has("store")) profile.store = root.path("store");
   profile.engine = root.choice_or("on", {"local", "slurm"}, "local");
-  for (const config::Entry& entry : root.entries("mpirun_options", kMostOptions)) {
+  for (const base::Entry& entry : root.entries("mpirun_options", kMostOptions)) {
     if (entry.object) throw InputError(entry.place + ": \"mpirun_options\" is a list of words for mpirun");
     profile.mpirun_options.push_back(entry.text);
   }

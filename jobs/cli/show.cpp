@@ -9,14 +9,14 @@
 
 #include "jobs/cli/shared.hpp"
 #include "jobs/store/records.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/printable.hpp"
 
 namespace carillon::cli {
 namespace {
 
 std::string escape(const std::string& raw, std::size_t most) {
-  const std::string text = config::printable(store::to_text(raw));
+  const std::string text = base::printable(store::to_text(raw));
   std::size_t end = std::min(most, text.size());
   while (end < text.size() && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) ++end;  // cut only where a character begins
   return end < text.size() ? text.substr(0, end) + "..." : text;

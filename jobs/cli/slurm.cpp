@@ -9,6 +9,7 @@
 #include "jobs/queue/display.hpp"
 #include "jobs/slurm/engine.hpp"
 #include "jobs/slurm/needs.hpp"
+#include "runtime/base/command.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -22,8 +23,9 @@ slurm::Engine& find_engine(Shared& shared) {
   if (!shared.slurm_engine) {
     slurm::Settings settings = shared.profile().slurm;
     settings.has_pictures = settings.has_pictures && shared.has_pictures;
-    shared.slurm_engine = std::make_shared<slurm::Engine>(
-        shared.store(), settings, find_self(), [](const std::string& line) { fmt::print(stderr, "carillon: {}\n", show_message(line)); });
+    shared.slurm_engine = std::make_shared<slurm::Engine>(shared.store(), settings, base::find_self(), [](const std::string& line) {
+      fmt::print(stderr, "carillon: {}\n", show_message(line));
+    });
   }
   return *shared.slurm_engine;
 }
@@ -37,8 +39,9 @@ std::vector<Job> list_open(Shared& shared) {
 }
 
 std::vector<Job> hand_over(Shared& shared) {
-  return find_engine(shared).hand_over(
-      shared.registry(), [&](const Job& job) { return slurm::find_resources(shared.store(), job, shared.profile().slurm, find_self()); });
+  return find_engine(shared).hand_over(shared.registry(), [&](const Job& job) {
+    return slurm::find_resources(shared.store(), job, shared.profile().slurm, base::find_self());
+  });
 }
 
 }  // namespace

@@ -22,7 +22,4 @@ queue::Said cancel_in_slurm(Shared& shared, const store::Id& id);
 /// ever). Of the options those count that are no matter of this machine: keep, quiet, has_pictures.
 void run_with_slurm(Shared& shared, const queue::RunOptions& options);
 
-/// /proc/self/exe.
-std::filesystem::path find_self();
-
 }  // namespace carillon::cli

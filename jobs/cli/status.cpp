@@ -9,7 +9,7 @@
 
 #include "jobs/cli/follow.hpp"
 #include "jobs/process/process.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {

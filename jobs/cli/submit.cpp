@@ -11,7 +11,7 @@
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
 #include "jobs/cli/slurm.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {

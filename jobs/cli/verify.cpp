@@ -10,7 +10,7 @@
 #include "jobs/process/process.hpp"
 #include "jobs/queue/repair.hpp"
 #include "jobs/store/identity.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {

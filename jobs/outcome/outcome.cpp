@@ -8,8 +8,8 @@
 #include <ctime>
 #include <utility>
 
-#include "runtime/config/document.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::outcome {
 namespace {
@@ -59,14 +59,14 @@ void write_outcome(const std::filesystem::path& work, const Outcome& o) {
                                    {"host", o.host},
                                    {"started", o.started},
                                    {"ended", o.ended}}) {
-    if (!value.empty()) text += fmt::format(",\n  \"{}\": {}", key, config::quote(value));
+    if (!value.empty()) text += fmt::format(",\n  \"{}\": {}", key, base::quote(value));
   }
-  config::write_file(work / "outcome.json", text + "\n}\n");
+  base::write_file(work / "outcome.json", text + "\n}\n");
 }
 
 std::optional<Outcome> read_outcome(const std::filesystem::path& work) {
   try {
-    config::Object root = config::read_document(work / "outcome.json").root();
+    base::Object root = base::read_document(work / "outcome.json").root();
     const std::optional<Cause> cause = find_cause(root.string("cause"));
     if (!cause) return std::nullopt;
     Outcome o;
@@ -98,16 +98,16 @@ Outcome make_killed(const std::string& token) {
 }
 
 void write_attempt(const std::filesystem::path& work, const Attempt& a) {
-  config::write_file(work / "attempt.json",
-                     fmt::format("{{\n  \"token\": {},\n  \"host\": {},\n  \"boot\": {},\n  \"pid\": {},\n  \"start_ticks\": {},\n"
-                                 "  \"ranks\": {},\n  \"memory_gb\": {:.6f},\n  \"started\": {}\n}}\n",
-                                 config::quote(a.token), config::quote(a.process.host), config::quote(a.process.boot), a.process.pid,
-                                 a.process.start_ticks, a.ranks, finite(a.memory_gb), config::quote(a.started)));
+  base::write_file(work / "attempt.json",
+                   fmt::format("{{\n  \"token\": {},\n  \"host\": {},\n  \"boot\": {},\n  \"pid\": {},\n  \"start_ticks\": {},\n"
+                               "  \"ranks\": {},\n  \"memory_gb\": {:.6f},\n  \"started\": {}\n}}\n",
+                               base::quote(a.token), base::quote(a.process.host), base::quote(a.process.boot), a.process.pid,
+                               a.process.start_ticks, a.ranks, finite(a.memory_gb), base::quote(a.started)));
 }
 
 std::optional<Attempt> read_attempt(const std::filesystem::path& work) {
   try {
-    config::Object root = config::read_document(work / "attempt.json").root();
+    base::Object root = base::read_document(work / "attempt.json").root();
     Attempt a;
     a.token = root.string("token");
     a.process.host = root.string("host");

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::process {
 

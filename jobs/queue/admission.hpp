@@ -10,9 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "jobs/queue/host.hpp"
+#include "runtime/base/host.hpp"
 
 namespace carillon::queue {
+
+using base::Host;
 
 inline constexpr double kSmallSeconds = 30.0;
 inline constexpr double kSecondsPerRank = 10.0;  // no rank is worth its start for less

@@ -12,8 +12,8 @@
 
 #include "jobs/process/process.hpp"
 #include "jobs/store/records.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/printable.hpp"
 
 namespace carillon::queue {
 namespace {
@@ -26,8 +26,8 @@ int find_columns() {
   return kOtherwiseColumns;
 }
 
-std::string clean(const std::string& text) { return config::printable(text); }
-std::string quote(const std::string& text) { return store::to_plain_json(config::quote(text)); }
+std::string clean(const std::string& text) { return base::printable(text); }
+std::string quote(const std::string& text) { return store::to_plain_json(base::quote(text)); }
 
 std::string format_left(double seconds) {
   if (seconds < 0.0) return "";

@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "jobs/attempt/attempt.hpp"
-#include "runtime/config/document.hpp"
+#include "runtime/base/document.hpp"
 
 namespace carillon::queue {
 namespace {
@@ -32,8 +32,8 @@ struct Size {
 Size find_size(const store::Store& store, const store::Request& request) {
   Size size;
   try {
-    config::Object job = config::parse_document(request.job, "request.json").root();
-    if (std::optional<config::Object> body = job.object_if("body"); body && body->has_number("nodes")) size = {body->number("nodes"), true};
+    base::Object job = base::parse_document(request.job, "request.json").root();
+    if (std::optional<base::Object> body = job.object_if("body"); body && body->has_number("nodes")) size = {body->number("nodes"), true};
     std::error_code error;
     if (request.input_kind == "mesh") {
       const double bytes = static_cast<double>(
@@ -52,11 +52,11 @@ bool read_prediction(const fs::path& folder, Need& need) {
   std::error_code error;
   if (!fs::exists(folder / attempt::kPredictionFile, error)) return false;
   try {
-    config::Object root = config::read_document(folder / attempt::kPredictionFile).root();
-    config::Object bytes = root.object("memory_bytes");
+    base::Object root = base::read_document(folder / attempt::kPredictionFile).root();
+    base::Object bytes = root.object("memory_bytes");
     std::vector<double> memory_gb;
     for (int ranks = 1; bytes.has(std::to_string(ranks)); ranks *= 2)
-      memory_gb.push_back(kPredictionMargin * 1e-9 * bytes.number(std::to_string(ranks), config::kPositive));
+      memory_gb.push_back(kPredictionMargin * 1e-9 * bytes.number(std::to_string(ranks), base::kPositive));
     if (memory_gb.empty()) return false;
     need.predicted_gb = memory_gb;
     need.seconds = root.number_or("cpu_seconds", 0.0);

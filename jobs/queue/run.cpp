@@ -191,7 +191,7 @@ class Runner {
   }
 
   Host find_room() const {
-    Host host = find_host();
+    Host host = base::find_host();
     if (options_.cores > 0) host.cores = std::min(host.cores, options_.cores);
     if (options_.memory_gb > 0.0) {
       host.total_gb = std::min(host.total_gb, options_.memory_gb / kMemoryShare);
@@ -222,7 +222,7 @@ class Runner {
       return known->second;
     }
     JobNeeds needs = find_needs(store_, job);
-    if (options_.has_pictures && find_host().total_gb > kDrawingHosts * attempt::kDrawGb) needs.need.least_gb = attempt::kDrawGb;
+    if (options_.has_pictures && base::find_host().total_gb > kDrawingHosts * attempt::kDrawGb) needs.need.least_gb = attempt::kDrawGb;
     if (needs.wants_prediction && !can_predict_) can_predict_ = attempt::can_predict();
     if (needs.wants_prediction) needs.wants_prediction = *can_predict_;
     return needs_.emplace(job.id.text(), needs).first->second;

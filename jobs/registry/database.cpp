@@ -10,8 +10,8 @@
 #include <string_view>
 
 #include "jobs/store/files.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::registry {
 namespace {
@@ -85,7 +85,7 @@ void Database::fail(int code) const {
   std::string what = fmt::format("{}: {}", file_.string(), handle_ != nullptr ? sqlite3_errmsg(handle_) : sqlite3_errstr(code));
   // A full disk shows itself in many ways: no log, no shared memory, no journal. A quota is told by errno alone.
   const int number = handle_ != nullptr ? sqlite3_system_errno(handle_) : 0;
-  const bool is_refused = (code & 0xFF) == SQLITE_IOERR && config::is_full_error(number);
+  const bool is_refused = (code & 0xFF) == SQLITE_IOERR && base::is_full_error(number);
   if (is_refused) what += fmt::format(" ({})", std::strerror(number));
   const bool is_full = is_refused || (file_.has_parent_path() && store::is_disk_full(file_.parent_path()));
   if (is_full && (code & 0xFF) != SQLITE_FULL && (code & 0xFF) != SQLITE_BUSY && (code & 0xFF) != SQLITE_CORRUPT &&

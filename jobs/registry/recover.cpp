@@ -19,8 +19,8 @@
 #include "jobs/outcome/outcome.hpp"
 #include "jobs/registry/rows.hpp"
 #include "jobs/store/files.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::registry {
 namespace {
@@ -215,7 +215,7 @@ std::vector<Submission> read_submission_log(const store::Store& store) {
 void rewrite_submission_log(const store::Store& store, const std::vector<Submission>& submissions) {
   std::string text;
   for (const Submission& submission : submissions) text += store::format_request(submission.request, true);
-  config::write_file(store.root() / kLogName, text);
+  base::write_file(store.root() / kLogName, text);
 }
 
 std::size_t fill_from_store(Database& database, const store::Store& store) {

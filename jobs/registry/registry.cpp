@@ -17,7 +17,7 @@
 #include "jobs/registry/recover.hpp"
 #include "jobs/registry/rows.hpp"
 #include "jobs/store/files.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::registry {
 namespace {

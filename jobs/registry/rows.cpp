@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::registry {
 namespace {

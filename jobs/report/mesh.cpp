@@ -41,7 +41,7 @@ SurfaceQuality measure_surface(const bank::Bank& bank) {
       const auto a = static_cast<std::size_t>(triangle[i]), b = static_cast<std::size_t>(triangle[(i + 1) % 3]);
       is_inside = is_inside && a < bank.vertices_m.size() && b < bank.vertices_m.size();
       if (!is_inside) break;
-      const bank::Vec3 &x = bank.vertices_m[a], &y = bank.vertices_m[b];
+      const Vec3 &x = bank.vertices_m[a], &y = bank.vertices_m[b];
       edge[i] = std::hypot(y[0] - x[0], y[1] - x[1], y[2] - x[2]);
     }
     const auto [shortest, longest] = std::minmax({edge[0], edge[1], edge[2]});

@@ -10,7 +10,7 @@
 #include <memory>
 #include <sstream>
 
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::report {
 namespace {
@@ -73,7 +73,7 @@ Record read_record(const std::filesystem::path& resolved_job, const std::string&
   Record record;
   if (!resolved_job.empty()) {
     try {
-      record.job = parse_json(config::read_file(resolved_job, "resolved job", kMostBytes));
+      record.job = parse_json(base::read_file(resolved_job, "resolved job", kMostBytes));
       if (!record.job.isObject()) record.remarks.emplace_back("The file of the resolved job is no JSON object.");
     } catch (const InputError&) {
       record.remarks.emplace_back("The file of the resolved job cannot be read.");

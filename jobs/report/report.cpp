@@ -7,7 +7,7 @@
 
 #include "jobs/report/draw.hpp"
 #include "jobs/report/sections.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::report {
 namespace {
@@ -91,7 +91,7 @@ void write_report(const fs::path& bank, const fs::path& resolved_job, const fs::
                                   error ? error.message() : "something else has that name"));
   const Html pictures = make_picture_section(subject, folder, options);
   const std::string title = options.title.empty() ? find_title(subject) : options.title;
-  config::write_file(folder / kPageFile, make_page(subject, pictures, title).text());
+  base::write_file(folder / kPageFile, make_page(subject, pictures, title).text());
 }
 
 }  // namespace carillon::report

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::report {
 

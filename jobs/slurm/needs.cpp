@@ -7,9 +7,9 @@
 
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/queue/admission.hpp"
-#include "jobs/queue/host.hpp"
 #include "jobs/queue/needs.hpp"
 #include "jobs/slurm/command.hpp"
+#include "runtime/base/host.hpp"
 
 namespace carillon::slurm {
 namespace {
@@ -20,7 +20,7 @@ constexpr double kMargin = 1.2, kProcessGb = 0.1;
 
 void predict(const store::Store& store, const registry::Job& job, const queue::Need& guess, const std::filesystem::path& program) {
   const double memory_gb = queue::calc_memory(guess, 1);
-  if (memory_gb > queue::find_host().available_gb || !attempt::can_predict()) return;
+  if (memory_gb > base::find_host().available_gb || !attempt::can_predict()) return;
   attempt::Options attempt;
   attempt.work = store.work_folder(job.id);
   attempt.is_prediction = true;

@@ -8,8 +8,8 @@
 
 #include "jobs/slurm/script.hpp"
 #include "jobs/store/open_folder.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::slurm {
 namespace {
@@ -28,16 +28,16 @@ bool is_name(const std::string& text) { return text.size() == 32 && text.find_fi
 }  // namespace
 
 void write_handed(const fs::path& work, const Handed& handed) {
-  config::write_file(work / kHandedFile,
-                     fmt::format("{{\"batch\": {}, \"title\": {}, \"task\": {}, \"before\": {}}}\n", config::quote(handed.batch),
-                                 config::quote(handed.title), handed.task, config::quote(handed.before.empty() ? kNobody : handed.before)));
+  base::write_file(work / kHandedFile,
+                   fmt::format("{{\"batch\": {}, \"title\": {}, \"task\": {}, \"before\": {}}}\n", base::quote(handed.batch),
+                               base::quote(handed.title), handed.task, base::quote(handed.before.empty() ? kNobody : handed.before)));
 }
 
 std::optional<Handed> read_handed(const fs::path& work) {
   std::error_code error;
   if (!fs::exists(work / kHandedFile, error)) return std::nullopt;
   try {
-    config::Object root = config::read_document(work / kHandedFile).root();
+    base::Object root = base::read_document(work / kHandedFile).root();
     Handed handed;
     handed.batch = root.string("batch");
     handed.title = root.string("title");
@@ -56,14 +56,14 @@ void remove_handed(const fs::path& work) {
 }
 
 void write_failures(const fs::path& work, int failures) {
-  config::write_file(work / kRetriesFile, fmt::format("{{\"failures\": {}}}\n", failures));
+  base::write_file(work / kRetriesFile, fmt::format("{{\"failures\": {}}}\n", failures));
 }
 
 int read_failures(const fs::path& work) {
   std::error_code error;
   if (!fs::exists(work / kRetriesFile, error)) return 0;
   try {
-    return static_cast<int>(config::read_document(work / kRetriesFile).root().integer("failures", 0, 1 << 20));
+    return static_cast<int>(base::read_document(work / kRetriesFile).root().integer("failures", 0, 1 << 20));
   } catch (const InputError&) {
     return 0;
   }
@@ -73,8 +73,8 @@ void make_batch_folder(const store::Store& store, const std::string& batch, cons
   const store::Temporary temporary = store.make_temporary();
   std::string ids;
   for (const store::Id& id : jobs) ids += id.text() + "\n";
-  config::write_file(temporary / kJobsFile, ids);
-  config::write_file(temporary / "job.sh", script);
+  base::write_file(temporary / kJobsFile, ids);
+  base::write_file(temporary / "job.sh", script);
   store.publish_batch(batch, temporary);
 }
 
@@ -90,7 +90,7 @@ std::vector<store::Id> read_jobs(const fs::path& root, const std::string& batch)
 void write_number(const fs::path& root, const std::string& batch, const std::string& number) {
   const auto all = store::OpenFolder::open(root).find("slurm");
   const auto folder = all && is_name(batch) ? all->find(batch) : std::nullopt;
-  if (folder) config::write_file(folder->path() / kNumberFile, number + "\n");
+  if (folder) base::write_file(folder->path() / kNumberFile, number + "\n");
 }
 
 std::string read_number(const fs::path& root, const std::string& batch) {

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <utility>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slurm {
 namespace {

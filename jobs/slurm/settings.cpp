@@ -7,9 +7,9 @@ namespace {
 
 constexpr std::size_t kMostWords = 100;
 
-std::vector<std::string> read_texts(config::Object& object, std::string_view key) {
+std::vector<std::string> read_texts(base::Object& object, std::string_view key) {
   std::vector<std::string> texts;
-  for (config::Entry& entry : object.entries(key, kMostWords)) {
+  for (base::Entry& entry : object.entries(key, kMostWords)) {
     if (entry.object || entry.text.find('\0') != std::string::npos) throw InputError(entry.place + ": must be a text");
     texts.push_back(entry.text);
   }
@@ -18,7 +18,7 @@ std::vector<std::string> read_texts(config::Object& object, std::string_view key
 
 }  // namespace
 
-Settings read_settings(std::optional<config::Object> object) {
+Settings read_settings(std::optional<base::Object> object) {
   Settings settings;
   if (!object) return settings;
   settings.partition = object->string_or("partition", settings.partition);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/document.hpp"
+#include "runtime/base/document.hpp"
 
 namespace carillon::slurm {
 
@@ -25,6 +25,6 @@ struct Settings {
 };
 
 /// Throws InputError "file:line: ...". `object` may be none: all defaults.
-Settings read_settings(std::optional<config::Object> object);
+Settings read_settings(std::optional<base::Object> object);
 
 }  // namespace carillon::slurm

@@ -9,7 +9,7 @@
 
 #include "jobs/slurm/script.hpp"
 #include "jobs/slurm/settings.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slurm {
 

@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::store {
 namespace {
@@ -36,7 +36,7 @@ void make_folder(const fs::path& folder) {
 }
 
 void throw_errno(const fs::path& path, const std::string& verb, int error) {
-  const char* advice = config::is_full_error(error)                          ? kFullAdvice
+  const char* advice = base::is_full_error(error)                            ? kFullAdvice
                        : error == EACCES || error == EPERM || error == EROFS ? "check owner, group and rights"
                                                                              : "check the disk";
   throw SystemError(fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), advice));

@@ -20,7 +20,7 @@ void make_folder(const std::filesystem::path& folder);
 /// Appends to a regular file, which is made unless it is there; follows no link and waits for no pipe. False when that cannot be.
 bool append_text(const std::filesystem::path& file, const std::string& text);
 
-/// What to do on config::is_full_error(), as the end of a message.
+/// What to do on base::is_full_error(), as the end of a message.
 inline constexpr const char* kFullAdvice = "the disk or quota is full: make room on it (carillon gc lists what could go) and try again";
 
 /// Whether hardly a byte is free on the file system of `folder`.

@@ -4,14 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 
 namespace carillon::store {
 
-/// 64 lower-case hex digits; there is no other way to make one than parse_id(), require_id() and Hasher.
+/// 64 lower-case hex digits; there is no other way to make one than parse_id(), require_id() and the hashes below.
 class Id {
  public:
   const std::string& text() const { return text_; }
@@ -29,22 +28,6 @@ class Id {
 std::optional<Id> parse_id(std::string_view text);
 /// The same; throws InputError "where: ..." otherwise.
 Id require_id(std::string_view text, const std::string& where);
-
-/// SHA-256 of bytes that come in pieces.
-class Hasher {
- public:
-  Hasher();
-  ~Hasher();
-  Hasher(const Hasher&) = delete;
-  Hasher& operator=(const Hasher&) = delete;
-  void add(std::string_view bytes);
-  /// Ends the hash; call it once.
-  Id finish();
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
 
 Id hash_text(std::string_view text);
 

@@ -22,8 +22,8 @@
 
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::store {
 namespace {
@@ -129,7 +129,7 @@ std::string find_user() {
   return found != nullptr ? to_text(found->pw_name) : fmt::format("{}", ::geteuid());
 }
 
-const fs::path& get_input(const spec::JobSpec& job) { return job.body ? job.body->surface : job.mesh; }
+const fs::path& get_input(const job::JobSpec& job) { return job.body ? job.body->surface : job.mesh; }
 
 /// Copies a file to `target` while it is hashed.
 Id copy_hashed(const fs::path& file, const char* what, const fs::path& target) {
@@ -184,7 +184,7 @@ void take_snapshot(const Store& store, const fs::path& input, const Request& req
 using Inputs = std::map<std::string, bool>;
 
 /// True when the input was not there, or damaged, and is whole now.
-bool ensure_input(const Store& store, const spec::JobSpec& job, const Request& request, Inputs& known) {
+bool ensure_input(const Store& store, const job::JobSpec& job, const Request& request, Inputs& known) {
   if (request.input_kind == "shape") return false;
   const auto [entry, is_new] = known.try_emplace(request.input_sha256 + "." + request.input_format, false);
   if (is_new && find_input_fault(store, request)) {
@@ -204,21 +204,21 @@ void write_unsynced(const fs::path& file, const std::string& text) {
 }
 
 /// Writes the files of a job into its folder, which is to become work/ab/<id>.
-void fill_work(const Store& store, const spec::JobSpec& job, const Request& request, const Id& id, const fs::path& folder) {
-  spec::JobSpec inner = job;
+void fill_work(const Store& store, const job::JobSpec& job, const Request& request, const Id& id, const fs::path& folder) {
+  job::JobSpec inner = job;
   const fs::path work = store.work_folder(id);
   if (request.input_kind != "shape") {
     const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
     (job.body ? inner.body->surface : inner.mesh) = input;
   }
   inner.bank = work / kBankFile;
-  write_unsynced(folder / kJobFile, spec::resolved_json(inner, work, ""));
+  write_unsynced(folder / kJobFile, job::resolved_json(inner, work, ""));
   write_unsynced(folder / kRequestFile, format_request(request));
   write_unsynced(folder / kStandingFile, format_standing({}));
 }
 
 /// The job of a request, with its input in the store and its bank where carillon-precompute is to write it.
-spec::JobSpec make_job(const Store& store, const Request& request, const Id& id) {
+job::JobSpec make_job(const Store& store, const Request& request, const Id& id) {
   Json::Value root = parse_json(request.job);
   const fs::path work = store.work_folder(id);
   if (request.input_kind != "shape") {
@@ -229,7 +229,7 @@ spec::JobSpec make_job(const Store& store, const Request& request, const Id& id)
   Json::StreamWriterBuilder writer;
   writer["precision"] = 17;
   writer["emitUTF8"] = true;
-  return spec::parse_job(Json::writeString(writer, root), work / kJobFile);
+  return job::parse_job(Json::writeString(writer, root), work / kJobFile);
 }
 
 /// A folder of work that is not what was submitted, and in which no attempt runs.
@@ -244,10 +244,10 @@ bool is_spoilt(const Store& store, const Id& id) {
 
 }  // namespace
 
-std::string make_canonical_job(const spec::JobSpec& job) {
-  spec::JobSpec bare = job;
+std::string make_canonical_job(const job::JobSpec& job) {
+  job::JobSpec bare = job;
   bare.bank.clear();
-  return make_canonical(parse_json(spec::resolved_json(bare, "/", "")));
+  return make_canonical(parse_json(job::resolved_json(bare, "/", "")));
 }
 
 const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const std::string& what) {
@@ -265,7 +265,7 @@ const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const 
   return known_.insert_or_assign(file, Known{id, head, stamp}).first->second;
 }
 
-Request RequestMaker::make(const spec::JobSpec& job) {
+Request RequestMaker::make(const job::JobSpec& job) {
   Request request;
   request.job = make_canonical_job(job);
   request.solver = solver_;
@@ -330,8 +330,8 @@ std::optional<std::string> find_job_fault(const Store& store, const Id& id, cons
     const std::optional<Request> request = read_request(folder);
     if (!request) return "its request.json is missing";
     if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
-    const spec::JobSpec job =
-        spec::parse_job(config::read_file(folder / kJobFile, "job file", kMostJobBytes), store.work_folder(id) / kJobFile);
+    const job::JobSpec job =
+        job::parse_job(base::read_file(folder / kJobFile, "job file", kMostJobBytes), store.work_folder(id) / kJobFile);
     if (make_canonical_job(job) != request->job) return "its job.json asks for something else than was submitted";
     if (job.bank != store.work_folder(id) / kBankFile) return "its job.json names another bank than was submitted";
     const fs::path wanted = request->input_kind == "shape"
@@ -369,7 +369,7 @@ std::optional<std::string> find_resolved_fault(const fs::path& folder, const Id&
   if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
   std::string text;
   try {
-    text = config::read_file(folder / kJobFile, "record", kMostJobBytes);
+    text = base::read_file(folder / kJobFile, "record", kMostJobBytes);
   } catch (const InputError&) {
     return "its job.json is missing, or cannot be read";
   }
@@ -398,7 +398,7 @@ std::vector<std::string> read_warnings(const Store& store, const Id& id, const s
   std::vector<std::string> texts;
   const fs::path folder = store.bank_folder(id);
   try {
-    const Json::Value root = parse_object(config::read_file(folder / kJobFile, "record", kMostJobBytes));
+    const Json::Value root = parse_object(base::read_file(folder / kJobFile, "record", kMostJobBytes));
     const Json::Value& list = root["run"]["warnings"];
     if (list.empty()) return texts;
     const std::optional<Request> request = read_request(folder);

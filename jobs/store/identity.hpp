@@ -6,16 +6,16 @@
 #include <map>
 #include <string>
 
-#include "jobs/spec/job_spec.hpp"
 #include "jobs/store/id.hpp"
 #include "jobs/store/records.hpp"
 #include "jobs/store/store.hpp"
+#include "precompute/job/job_spec.hpp"
 
 namespace carillon::store {
 
 /// The resolved job as one line of JSON with sorted keys, without paths, "run" and "resources": the same for all job files that ask for the
 /// same.
-std::string make_canonical_job(const spec::JobSpec& job);
+std::string make_canonical_job(const job::JobSpec& job);
 
 /// Makes requests; a file that many jobs name is hashed once as long as it does not change.
 class RequestMaker {
@@ -23,7 +23,7 @@ class RequestMaker {
   /// `solver`: the line that carillon-precompute --version prints.
   explicit RequestMaker(std::string solver) : solver_(std::move(solver)) {}
   /// Hashes the input and fills the request but its engine. Throws InputError for a mesh or surface that cannot be read.
-  Request make(const spec::JobSpec& job);
+  Request make(const job::JobSpec& job);
 
  private:
   struct Known {
@@ -38,7 +38,7 @@ class RequestMaker {
 
 /// A job and the request made of it.
 struct Asked {
-  const spec::JobSpec* job = nullptr;
+  const job::JobSpec* job = nullptr;
   const Request* request = nullptr;
 };
 

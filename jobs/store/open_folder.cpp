@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "jobs/store/files.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::store {
 namespace {

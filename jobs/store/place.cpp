@@ -11,7 +11,7 @@
 
 #include "jobs/store/files.hpp"
 #include "jobs/store/store.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::store {
 namespace {

@@ -11,8 +11,8 @@
 #include <sstream>
 
 #include "jobs/store/store.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::store {
 namespace {
@@ -29,15 +29,15 @@ std::string write_json(const Json::Value& root, const char* indentation) {
   return Json::writeString(writer, root);
 }
 
-std::optional<config::Object> read_root(const fs::path& file) {
+std::optional<base::Object> read_root(const fs::path& file) {
   struct stat info {};
   if (::lstat(file.c_str(), &info) != 0) return std::nullopt;
-  return config::read_document(file, "the store is damaged here; remove the job's folder and submit again").root();
+  return base::read_document(file, "the store is damaged here; remove the job's folder and submit again").root();
 }
 
-std::string read_empty_or(config::Object& object, std::string_view key) { return object.has(key) ? object.string_or(key, "") : ""; }
+std::string read_empty_or(base::Object& object, std::string_view key) { return object.has(key) ? object.string_or(key, "") : ""; }
 
-Request read_request_root(config::Object root, const std::string& where) {
+Request read_request_root(base::Object root, const std::string& where) {
   Request request;
   request.id = require_id(root.string("id"), where).text();
   request.job = root.string("job");
@@ -118,7 +118,7 @@ std::string format_request(const Request& request, bool one_line) {
 }
 
 Request parse_request(std::string_view text, const fs::path& name) {
-  return read_request_root(config::parse_document(text, name).root(), name.string());
+  return read_request_root(base::parse_document(text, name).root(), name.string());
 }
 
 std::optional<Request> read_request(const fs::path& folder) {
@@ -127,7 +127,7 @@ std::optional<Request> read_request(const fs::path& folder) {
   return read_request_root(*root, (folder / kRequestFile).string());
 }
 
-void write_request(const fs::path& folder, const Request& request) { config::write_file(folder / kRequestFile, format_request(request)); }
+void write_request(const fs::path& folder, const Request& request) { base::write_file(folder / kRequestFile, format_request(request)); }
 
 std::optional<Standing> read_standing(const fs::path& folder) {
   auto root = read_root(folder / kStandingFile);
@@ -150,7 +150,7 @@ std::string format_standing(const Standing& standing) {
 }
 
 void write_standing(const fs::path& folder, const Standing& standing) {
-  config::write_file(folder / kStandingFile, format_standing(standing));
+  base::write_file(folder / kStandingFile, format_standing(standing));
 }
 
 std::optional<Progress> read_progress(const fs::path& folder) {

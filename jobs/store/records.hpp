@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "jobs/spec/job_spec.hpp"
 #include "jobs/store/id.hpp"
+#include "precompute/job/job_spec.hpp"
 
 namespace carillon::store {
 
-using spec::Resources;
+using job::Resources;
 
 /// request.json: the parts of the id, and what is not part of it.
 struct Request {

@@ -26,8 +26,8 @@
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
 #include "runtime/bank/bank.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::store {
 namespace {
@@ -65,7 +65,7 @@ fs::path find_root(const fs::path& folder) {
 void make_root(const fs::path& root) {
   std::error_code error;
   fs::create_directories(root, error);
-  if (config::is_full_error(error.value())) throw_errno(root, "make this store", error.value());
+  if (base::is_full_error(error.value())) throw_errno(root, "make this store", error.value());
   if (error || !fs::is_directory(root, error))
     throw InputError(fmt::format("{}: cannot make this store: {}; choose another folder with --store", root.string(),
                                  error ? error.message() : "this is no folder"));
@@ -73,7 +73,7 @@ void make_root(const fs::path& root) {
 
 void check_version(const fs::path& root) {
   const std::string text =
-      config::read_file(root / "VERSION", "version file of the store", kMostVersionBytes, "this is no store of Carillon");
+      base::read_file(root / "VERSION", "version file of the store", kMostVersionBytes, "this is no store of Carillon");
   if (text == kVersionText) return;
   throw InputError(fmt::format("{}: holds \"{}\", and this program knows \"{}\"; use the newer Carillon, or another store",
                                (root / "VERSION").string(), text.substr(0, text.find('\n')),
@@ -94,7 +94,7 @@ void check_rights(const fs::path& folder) {
   const int error = errno;
   struct stat info {};
   ::stat(folder.c_str(), &info);
-  if (config::is_full_error(error) || error == EROFS) throw_errno(folder, "write to this store", error);
+  if (base::is_full_error(error) || error == EROFS) throw_errno(folder, "write to this store", error);
   throw InputError(
       fmt::format("{}: you (user {}) may not write to this store: its folder belongs to user {} and group {}, rights {:04o}; a store for a "
                   "group is made with "
@@ -116,7 +116,7 @@ void make_content(const fs::path& root) {
   const int fd = ::open((root / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0664);
   if (fd < 0) throw_errno(root / "lock", "make this file", errno);
   ::close(fd);
-  config::write_file(root / "VERSION", kVersionText);
+  base::write_file(root / "VERSION", kVersionText);
 }
 
 /// Throws where something else than a folder, or a regular file, lies under a name of the store's own.
@@ -282,7 +282,7 @@ void write_sum(const OpenFolder& folder, const Sum& sum) {
   for (const char* name : kRecords) {
     if (const std::string sha256 = hash_record(folder, name); !sha256.empty()) text += fmt::format("{} {}\n", name, sha256);
   }
-  config::write_file(folder.path() / kSumFile, text);
+  base::write_file(folder.path() / kSumFile, text);
 }
 
 Sum calc_sum(const OpenFolder& folder, const Id& id) {

@@ -17,7 +17,7 @@
 #include "precompute/eigen/local_columns.hpp"
 #include "precompute/petsc/diagonal.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {

@@ -9,7 +9,7 @@
 #include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 // PETSc declares no dsygvd.
 extern "C" void dsygvd_(const PetscBLASInt* type, const char* job, const char* half, const PetscBLASInt* n, double* a,

@@ -17,7 +17,7 @@
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {

@@ -12,6 +12,7 @@
 #include "precompute/eigen/rigid_modes.hpp"
 #include "precompute/eigen/scaling.hpp"
 #include "precompute/petsc/session.hpp"
+#include "runtime/base/cpu_clock.hpp"
 
 namespace carillon::eigen {
 namespace {
@@ -23,12 +24,6 @@ constexpr double kZeroFraction = 1e-7;  // Of high_hz: what is below is lost in 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
   return omega_rad_s * omega_rad_s;
-}
-
-double find_cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace
@@ -98,18 +93,18 @@ Outlook look_ahead(const Problem& problem, const Options& options, const std::fu
   FactorStatistics statistics;
   InertiaCounter counter(problem, unlimited, rigid, seconds, statistics,
                          [&](double lambda) { return std::sqrt(std::max(scaling.from_scaled(lambda), 0.0)) / (2 * std::numbers::pi); });
-  double start = find_cpu_seconds();
+  double start = base::get_process_cpu_s();
   const ShiftedFactor& factor = counter.analyse();
-  outlook.analyse_seconds = find_cpu_seconds() - start;
+  outlook.analyse_seconds = base::get_process_cpu_s() - start;
   outlook.entries = factor.get_entries();
   outlook.flops = factor.get_flops();
   outlook.factor_bytes = factor.get_peak_bytes();
   outlook.factor_kept_bytes = 8 * outlook.entries;
   if (!may_count(outlook)) return outlook;
-  start = find_cpu_seconds();
+  start = base::get_process_cpu_s();
   const Slice band = count_between([&](double lambda, double reach, Want want) { return counter.take(lambda, reach, want); },
                                    scaling.to_scaled(ends.low), scaling.to_scaled(ends.high));
-  outlook.factor_seconds = (find_cpu_seconds() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
+  outlook.factor_seconds = (base::get_process_cpu_s() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
   outlook.modes = std::min(band.count(), options.max_modes.value_or(band.count()));
   return outlook;
 }

@@ -14,7 +14,7 @@
 #include <cmath>
 
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {

@@ -1,7 +1,7 @@
 #include "precompute/eigen/scaling.hpp"
 
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 

@@ -34,7 +34,7 @@
 #include "precompute/eigen/slices.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {

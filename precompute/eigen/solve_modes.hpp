@@ -13,10 +13,9 @@
 
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/petsc/handle.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::eigen {
-
-using Vec3 = std::array<double, 3>;
 
 /// Where the free nodes of the system are: what the rigid modes need beyond K and M.
 struct NodeLayout {

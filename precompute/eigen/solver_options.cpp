@@ -11,7 +11,7 @@
 #include "precompute/eigen/block_lanczos.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {

@@ -23,7 +23,6 @@
 namespace carillon::estimate {
 namespace {
 
-using fem::Vec3;
 using Matrix10 = Eigen::Matrix<double, 10, 10>;
 
 MassBounds find_bounds(const Matrix10& mass) {
@@ -34,9 +33,9 @@ MassBounds find_bounds(const Matrix10& mass) {
 
 MassBounds find_element_bounds(const std::array<Vec3, 10>& x) {
   fem::ElementMatrices element;
-  spec::Material unit;
+  job::Material unit;
   unit.young_modulus_pa = unit.density_kg_m3 = 1.0;
-  if (!fem::calc_element(x, unit, spec::Mass::consistent, element)) return {0.0, std::numeric_limits<double>::infinity()};
+  if (!fem::calc_element(x, unit, job::Mass::consistent, element)) return {0.0, std::numeric_limits<double>::infinity()};
   return find_bounds(Eigen::Map<const Matrix10>(element.mass.data()));
 }
 
@@ -116,8 +115,8 @@ std::vector<double> calc_bounds(std::span<const double> lambda, const std::vecto
 
 }  // namespace
 
-MassBounds find_mass_bounds(MPI_Comm comm, const fem::LocalMesh& local, spec::Mass mass_kind) {
-  if (mass_kind == spec::Mass::lumped) return {};
+MassBounds find_mass_bounds(MPI_Comm comm, const fem::LocalMesh& local, job::Mass mass_kind) {
+  if (mass_kind == job::Mass::lumped) return {};
   if (local.order == 1) return {0.5, 2.5};
   std::array<Vec3, 10> x{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   for (int e = 0; e < 6; ++e)

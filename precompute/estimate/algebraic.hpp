@@ -17,7 +17,7 @@ struct MassBounds {
 };
 
 /// From the elements: M = sum M_e and D = sum D_e, so the extreme eigenvalues of all D_e^-1 M_e bound those of D^-1 M. Collective.
-MassBounds find_mass_bounds(MPI_Comm comm, const fem::LocalMesh& local, spec::Mass mass_kind);
+MassBounds find_mass_bounds(MPI_Comm comm, const fem::LocalMesh& local, job::Mass mass_kind);
 
 /// The bound per mode in cents; see ErrorBars::algebraic_cents. Collective.
 std::vector<double> calc_algebraic_cents(MPI_Comm comm, Mat stiffness, Mat mass, const MassBounds& bounds, const Solution& solution);

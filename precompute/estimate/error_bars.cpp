@@ -22,8 +22,6 @@
 namespace carillon::estimate {
 namespace {
 
-using fem::Vec3;
-
 void check_arguments(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
                      std::span<const std::int32_t> material_of_tet, const Solution& solution) {
   petsc::run_agreed(comm, [&] {
@@ -77,7 +75,7 @@ void load_displacement(const fem::LocalMesh& local, const std::vector<std::int32
 constexpr int kSums = 7;
 using Sums = std::array<DoubleLanes, kSums>;
 
-Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, spec::Mass mass_kind, const DoubleLanes& lambda) {
+Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, job::Mass mass_kind, const DoubleLanes& lambda) {
   const Elements& elements = recovery.elements;
   Sums sums{};
   const void* displacement = room.displacement.data();
@@ -88,7 +86,7 @@ Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, spec::Ma
     recovery.nodes.copy_to_halo(reinterpret_cast<float*>(room.displacement.data()), 3 * kLanes);
   }
   std::fill(room.patches.begin(), room.patches.end(), Strain{});
-  kernels.add_strains(elements, mass_kind == spec::Mass::lumped, displacement, room.strains.data(), room.patches.data(), sums[2]);
+  kernels.add_strains(elements, mass_kind == job::Mass::lumped, displacement, room.strains.data(), room.patches.data(), sums[2]);
   recovery.vertices.sum(reinterpret_cast<float*>(room.patches.data()),
                         static_cast<std::size_t>(elements.terms) * elements.materials * 6 * kLanes);
   const Strain* values = room.patches.data();
@@ -109,7 +107,7 @@ Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, spec::Ma
 }
 
 /// (modes, kSums), shares of lambda, summed over the ranks.
-std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recovery& recovery, spec::Mass mass_kind,
+std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recovery& recovery, job::Mass mass_kind,
                               const Solution& solution) {
   const Elements& elements = recovery.elements;
   const std::size_t count = solution.lambda.size(), materials = static_cast<std::size_t>(elements.materials);
@@ -170,7 +168,7 @@ bool is_curved(MPI_Comm comm, const fem::LocalMesh& local) {
 }  // namespace
 
 ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffness, Mat mass, std::span<const Solid> solids,
-                          std::span<const std::int32_t> material_of_tet, spec::Mass mass_kind, const Solution& solution) {
+                          std::span<const std::int32_t> material_of_tet, job::Mass mass_kind, const Solution& solution) {
   check_arguments(comm, local, solids, material_of_tet, solution);
   ErrorBars bars;
   if (solution.lambda.empty()) return bars;

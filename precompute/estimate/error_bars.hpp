@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "jobs/spec/job_spec.hpp"
 #include "precompute/fem/distribute.hpp"
+#include "precompute/job/job_spec.hpp"
 
 namespace carillon::estimate {
 
@@ -68,7 +68,7 @@ struct ErrorBars {
 /// Results do not depend on the number of ranks beyond rounding. Collective. Throws InputError when the arguments do not fit one another,
 /// SystemError when memory runs out; on all ranks alike.
 ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffness, Mat mass, std::span<const Solid> solids,
-                          std::span<const std::int32_t> material_of_tet, spec::Mass mass_kind, const Solution& solution);
+                          std::span<const std::int32_t> material_of_tet, job::Mass mass_kind, const Solution& solution);
 
 /// The elasticity of an isotropic solid.
 Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3);

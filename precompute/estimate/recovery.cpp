@@ -32,8 +32,6 @@
 namespace carillon::estimate {
 namespace {
 
-using fem::Vec3;
-
 constexpr double kRidgeT4 = 1e-3, kRidgeT10 = 1e-2;  // of 1e-4 ... 1: the least scatter on the training bodies of docs/error-bars.md
 // Depth of the layer in sizes of an element over the surface, which has seen a part of it: the least scatter on strips and training bodies.
 constexpr double kLayer = 0.125;
@@ -111,7 +109,7 @@ std::array<float, 36> calc_root(const Solid& solid) {
 float find_dilatation(const Solid& solid) {
   const double mean = fem::calc_mean_lambda(solid.elasticity_pa);
   if (mean == 0.0) return 1.0F;
-  const double full = (fem::kFullLambda + 2.0 / 3) * spec::calc_mean_shear_pa(solid.elasticity_pa);
+  const double full = (fem::kFullLambda + 2.0 / 3) * job::calc_mean_shear_pa(solid.elasticity_pa);
   return static_cast<float>(std::sqrt(full / (full + mean)));
 }
 
@@ -328,7 +326,7 @@ void find_tractions(const std::vector<FreeFace>& faces, const fem::LocalMesh& lo
     for (int i = 0; i < 3; ++i) {
       const int edge = mesh::find_edge(mesh::kFaces[face.face][i], mesh::kFaces[face.face][(i + 1) % 3]);
       const std::int32_t node = local.tets[static_cast<std::size_t>(face.tet) * elements.nodes + 4 + edge];
-      const fem::Vec3& n = face.normal[i];
+      const Vec3& n = face.normal[i];
       volumes[{recovery.place[node] * elements.materials + material,
                material,
                {static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])}}] += depth * face.area_m2 / 3;
@@ -346,7 +344,7 @@ void find_tractions(const std::vector<FreeFace>& faces, const fem::LocalMesh& lo
 }  // namespace
 
 Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
-                       std::span<const std::int32_t> material_of_tet, spec::Mass mass_kind) {
+                       std::span<const std::int32_t> material_of_tet, job::Mass mass_kind) {
   const std::vector<std::int32_t> order = order_elements(local), place = find_places(local, order, false),
                                   vertex_place = find_places(local, order, true);
   Recovery recovery{
@@ -386,7 +384,7 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
     if (local.order == 2) find_middles(local, *patches, recovery);
     recovery.shifts = find_shifts(surface.edges, local, material_of_tet, recovery);
     recovery.doubts = find_shifts(doubtful, local, material_of_tet, recovery);
-    if (local.order == 2 && mass_kind == spec::Mass::consistent) find_tractions(surface.free_faces, local, material_of_tet, recovery);
+    if (local.order == 2 && mass_kind == job::Mass::consistent) find_tractions(surface.free_faces, local, material_of_tet, recovery);
   });
   return recovery;
 }

@@ -30,6 +30,6 @@ struct Recovery {
 
 /// Collective. Throws InputError naming an element without volume and a material that is not positive definite, on all ranks alike.
 Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
-                       std::span<const std::int32_t> material_of_tet, spec::Mass mass_kind);
+                       std::span<const std::int32_t> material_of_tet, job::Mass mass_kind);
 
 }  // namespace carillon::estimate

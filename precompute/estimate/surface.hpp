@@ -23,9 +23,9 @@ struct SurfaceEdge {
 
 /// A face of the surface on which nothing is fixed, so that no traction acts on it.
 struct FreeFace {
-  std::int32_t tet = 0;               // local element
-  std::int8_t face = 0;               // of mesh::kFaces
-  std::array<fem::Vec3, 3> normal{};  // unit, of the smooth surface, in the middles of its edges
+  std::int32_t tet = 0;          // local element
+  std::int8_t face = 0;          // of mesh::kFaces
+  std::array<Vec3, 3> normal{};  // unit, of the smooth surface, in the middles of its edges
   double area_m2 = 0.0;
   double height_m = 0.0;  // of the element over it
 };

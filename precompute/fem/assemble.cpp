@@ -60,11 +60,11 @@ std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
 
 }  // namespace
 
-System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, Form form) {
-  LocalRows rows = make_rows(comm, local, mass == spec::Mass::lumped);
+System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, Form form) {
+  LocalRows rows = make_rows(comm, local, mass == job::Mass::lumped);
   petsc::run_agreed(comm, [&] {
     std::vector<Solid> solids;
-    for (const spec::Material& material : materials.list) solids.emplace_back(material, form == Form::displacement);
+    for (const job::Material& material : materials.list) solids.emplace_back(material, form == Form::displacement);
     ElementMatrices element;
     std::array<Vec3, kMaxNodes> x;
     for (const std::int32_t e : order_by_row(local)) {

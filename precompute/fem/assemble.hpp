@@ -3,9 +3,9 @@
 
 #include <mpi.h>
 
-#include "jobs/spec/job_spec.hpp"
 #include "precompute/fem/distribute.hpp"
 #include "precompute/fem/materials.hpp"
+#include "precompute/job/job_spec.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::fem {
@@ -32,7 +32,7 @@ struct RigidBody {
 /// their pattern cannot be changed. Nodes that no tetrahedron of `local` uses have empty rows.
 /// Collective. Throws on every rank: InputError naming an element whose Jacobian is not positive everywhere (inside out, or a mid-side node
 /// out of place); SystemError when memory runs out.
-System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, Form form = Form::automatic);
+System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, Form form = Form::automatic);
 
 /// Integrates the rigid-body data over the tetrahedra. Collective.
 RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials& materials);

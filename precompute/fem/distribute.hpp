@@ -11,8 +11,6 @@
 
 namespace carillon::fem {
 
-using mesh::Vec3;
-
 /// What one rank holds of the mesh: its own tetrahedra, the nodes it owns and the halo, which is the other nodes of its tetrahedra.
 struct LocalMesh {
   int order = 1;                           // 1 or 2

@@ -291,7 +291,7 @@ void lump_hrz(ElementMatrices& out, double mass_kg) {
 
 }  // namespace
 
-double calc_mean_lambda(const spec::Elasticity& c) {
+double calc_mean_lambda(const job::Elasticity& c) {
   // C s = 1 for the normal strains s under a unit pressure, by elimination; C is positive definite.
   std::array<std::array<double, 7>, 6> row{};
   for (int i = 0; i < 6; ++i) {
@@ -307,10 +307,10 @@ double calc_mean_lambda(const spec::Elasticity& c) {
   double dilatation = 0.0;
   for (int i = 0; i < 3; ++i) dilatation += row[i][6] / row[i][i];
   const double bulk = 1 / dilatation;
-  return std::max(bulk - (kFullLambda + 2.0 / 3) * spec::calc_mean_shear_pa(c), 0.0);
+  return std::max(bulk - (kFullLambda + 2.0 / 3) * job::calc_mean_shear_pa(c), 0.0);
 }
 
-Solid::Solid(const spec::Material& material, bool full)
+Solid::Solid(const job::Material& material, bool full)
     : isotropic(!material.orthotropic), lame_mu_pa(material.lame_mu_pa()), density_kg_m3(material.density_kg_m3) {
   if (isotropic) {
     mean_lambda_pa = full ? 0.0 : std::max(material.lame_lambda_pa() - kFullLambda * lame_mu_pa, 0.0);
@@ -318,7 +318,7 @@ Solid::Solid(const spec::Material& material, bool full)
     return;
   }
   constexpr int kVoigt[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
-  const spec::Elasticity c = material.calc_elasticity_pa();
+  const job::Elasticity c = material.calc_elasticity_pa();
   mean_lambda_pa = full ? 0.0 : calc_mean_lambda(c);
   for (int r = 0; r < 3; ++r)
     for (int s = 0; s < 3; ++s)
@@ -327,7 +327,7 @@ Solid::Solid(const spec::Material& material, bool full)
           tensor_pa[27 * r + 9 * s + 3 * b + d] = c[6 * kVoigt[r][b] + kVoigt[s][d]] - (r == b && s == d ? mean_lambda_pa : 0.0);
 }
 
-bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, ElementMatrices& out) {
+bool calc_element(std::span<const Vec3> x, const Solid& solid, job::Mass mass, ElementMatrices& out) {
   const int n = out.nodes = static_cast<int>(x.size());
   std::array<Vec3, 4> b;
   const double volume = calc_linear(x.first(4), b);
@@ -370,7 +370,7 @@ bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, 
     mass_kg = solid.density_kg_m3 * calc_curved_mass(x, out.mass);
     for (double& m : out.mass) m *= solid.density_kg_m3;
   }
-  if (mass == spec::Mass::lumped) lump_hrz(out, mass_kg);  // for the T4, whose diagonal is constant, this is the row sum
+  if (mass == job::Mass::lumped) lump_hrz(out, mass_kg);  // for the T4, whose diagonal is constant, this is the row sum
   return true;
 }
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <span>
 
-#include "jobs/spec/job_spec.hpp"
 #include "precompute/fem/quadrature.hpp"
+#include "precompute/job/job_spec.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 
 namespace carillon::fem {
@@ -32,12 +32,12 @@ inline constexpr double kFullLambda = 10.0;
 /// What the mean of the dilatation alone meets in a T10 [Pa]: the part of the bulk modulus (Reuss' average) above (kFullLambda + 2/3) times
 /// the shear modulus (Voigt's average), for an isotropic solid lambda - kFullLambda mu; 0 if there is none. C less this part of every
 /// normal pair is still positive definite.
-double calc_mean_lambda(const spec::Elasticity& elasticity_pa);
+double calc_mean_lambda(const job::Elasticity& elasticity_pa);
 
 /// A material as the elements use it, made once for many elements.
 struct Solid {
   /// full: all of the dilatation within an element meets all of the elasticity, near incompressibility too.
-  Solid(const spec::Material& material, bool full = false);  // NOLINT(google-explicit-constructor): a material is a solid
+  Solid(const job::Material& material, bool full = false);  // NOLINT(google-explicit-constructor): a material is a solid
 
   bool isotropic = true;
   double full_lambda_pa = 0.0;  // of isotropic solids: what all of the dilatation in a T10 meets;
@@ -54,7 +54,7 @@ struct Solid {
 /// T10 of nearly incompressible solids: mean dilatation for Solid::mean_lambda_pa.
 /// Returns false, with `out` unusable, when the Jacobian is not positive at every node and integration point of the stiffness; each of them
 /// is one that mesh::is_folded tests. Not collective.
-[[nodiscard]] bool calc_element(std::span<const Vec3> x, const Solid& solid, spec::Mass mass, ElementMatrices& out);
+[[nodiscard]] bool calc_element(std::span<const Vec3> x, const Solid& solid, job::Mass mass, ElementMatrices& out);
 
 /// Calculates the moments of the element; exact for straight and curved T10. Not collective.
 ElementMoments calc_moments(std::span<const Vec3> x, double density_kg_m3);

@@ -65,7 +65,7 @@ std::vector<double> normalise(const std::vector<std::vector<double>>& by_materia
 
 }  // namespace
 
-Decay calc_decay(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, std::span<const double> lambda,
+Decay calc_decay(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, std::span<const double> lambda,
                  Mat shapes) {
   Decay decay;
   if (materials.list.size() == 1 || lambda.empty()) {

@@ -9,7 +9,7 @@
 
 #include "precompute/fem/element.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::fem {
 namespace {
@@ -77,7 +77,7 @@ std::string describe(const std::vector<std::int32_t>& tags, const std::map<std::
 
 /// The material of each region by its place in the list. Throws InputError.
 std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regions, const std::map<std::int32_t, std::string>& names,
-                                           const spec::JobSpec& job, Materials& out) {
+                                           const job::JobSpec& job, Materials& out) {
   std::map<std::int32_t, std::int32_t> place;
   for (const auto& [key, material] : job.materials) {
     const auto is_named = [&, &key = key](std::int32_t tag) {
@@ -116,7 +116,7 @@ std::map<std::int32_t, std::int32_t> match(const std::vector<std::int32_t>& regi
 
 }  // namespace
 
-Materials find_materials(MPI_Comm comm, const LocalMesh& local, const spec::JobSpec& job,
+Materials find_materials(MPI_Comm comm, const LocalMesh& local, const job::JobSpec& job,
                          const std::map<std::int32_t, std::string>& region_names) {
   if (job.materials.empty()) return job.material;
   const std::vector<std::int32_t> regions = find_regions(comm, local);

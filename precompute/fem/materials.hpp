@@ -8,17 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "jobs/spec/job_spec.hpp"
 #include "precompute/fem/distribute.hpp"
+#include "precompute/job/job_spec.hpp"
 
 namespace carillon::fem {
 
 /// The materials of a body; a single one for all of it converts to this.
 struct Materials {
   Materials() = default;
-  Materials(spec::Material material) : list{std::move(material)} {}  // NOLINT(google-explicit-constructor)
+  Materials(job::Material material) : list{std::move(material)} {}  // NOLINT(google-explicit-constructor)
 
-  std::vector<spec::Material> list;  // the same on every rank
+  std::vector<job::Material> list;   // the same on every rank
   std::vector<std::string> region;   // of each in `list`: as the job names it, "" for the rest of the mesh; empty when there is one
   std::vector<std::int32_t> of_tet;  // (this rank's tetrahedra) place in `list`; empty: all 0
 
@@ -30,7 +30,7 @@ struct Materials {
 /// Collective. Throws InputError on every rank, naming the job's line and the regions there are: a region that the job names and the mesh
 /// does not have; one that the job names twice, by tag and by name; one without material. SystemError on every rank when memory runs out on
 /// one, or its tetrahedra lack region tags.
-Materials find_materials(MPI_Comm comm, const LocalMesh& local, const spec::JobSpec& job,
+Materials find_materials(MPI_Comm comm, const LocalMesh& local, const job::JobSpec& job,
                          const std::map<std::int32_t, std::string>& region_names = {});
 
 /// Volume of the tetrahedra of each material [m^3], the same on every rank. Collective.

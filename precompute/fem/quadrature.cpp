@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "runtime/base/vector.hpp"
+
 namespace carillon::fem {
 
 const std::vector<Point>& get_rule_of_degree_5() {
@@ -106,9 +108,6 @@ std::array<Vec3, 3> calc_tangents(std::span<const Vec3> x, const Shape& shape) {
       for (int k = 0; k < 3; ++k) j[d][k] += shape.derivative[i][d] * x[i][k];
   return j;
 }
-
-Vec3 cross(const Vec3& a, const Vec3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 }  // namespace
 

@@ -9,8 +9,6 @@
 
 namespace carillon::fem {
 
-using mesh::Vec3;
-
 inline constexpr int kMaxNodes = 10;
 
 using Barycentric = std::array<double, 4>;

@@ -18,6 +18,7 @@
 #include "precompute/mesh/faces.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::fem {
 namespace {
@@ -25,8 +26,6 @@ namespace {
 constexpr PetscInt kBlock = 16;              // modes at a time
 constexpr std::size_t kMostSupports = 1000;  // more patches than this are one for each entry
 constexpr double kOpenShare = 0.05;          // of the area: a patch whose faces sum up to less is closed and has no normal
-
-Vec3 cross(const Vec3& a, const Vec3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 
 double calc_norm(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
 
@@ -446,7 +445,7 @@ void add_element(const Sums& sums, const Near& near, const ElementMatrices& elem
 
 }  // namespace
 
-Supports calc_supports(MPI_Comm comm, const LocalMesh& local, const Materials& materials, spec::Mass mass, std::span<const double> lambda,
+Supports calc_supports(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, std::span<const double> lambda,
                        Mat shapes) {
   Supports supports;
   int is_fixed = std::any_of(local.fixed_by.begin(), local.fixed_by.end(), [](std::int32_t entry) { return entry >= 0; }) ? 1 : 0;

@@ -48,7 +48,7 @@ double calc_mean_edge(MPI_Comm comm, const fem::LocalMesh& local) {
   std::array<double, 2> sum{};  // of lengths, of edges
   for (auto tet = local.tets.begin(); tet != local.tets.end(); tet += local.nodes_per_tet())
     for (const auto& [a, b] : mesh::kEdges) {
-      const mesh::Vec3 &p = local.nodes_m[tet[a]], &q = local.nodes_m[tet[b]];
+      const Vec3 &p = local.nodes_m[tet[a]], &q = local.nodes_m[tet[b]];
       sum[0] += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
       sum[1] += 1;
     }
@@ -114,7 +114,7 @@ class Search {
   Decision decide();
   Decision decide_on_body();
   Decision decide_on_file();
-  Setting make_setting(spec::Element element, double ratio) const;
+  Setting make_setting(job::Element element, double ratio) const;
   const Trial* find_before(const Trial& trial) const;
   double measure_exponent(double Trial::*quantity, double fallback, double least, double most) const;
   double find_dimension() const;
@@ -166,7 +166,7 @@ Forecast Search::forecast(const Setting& setting, double ratio) const {
   return next;
 }
 
-Setting Search::make_setting(spec::Element element, double ratio) const {
+Setting Search::make_setting(job::Element element, double ratio) const {
   const Trial& last = report_.trials.back();
   Setting setting = last.setting;
   setting.element = element;
@@ -221,10 +221,10 @@ Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
   const estimate::ErrorBars& bars = current_.solved.bars;
   if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
-  if (last.setting.element == spec::Element::T4 && quadratic_) {
+  if (last.setting.element == job::Element::T4 && quadratic_) {
     // Ten nodes were tried first; the cheaper of the two forecasts goes on.
     const double ratio = find_ratio(bars, kGoal * asked_, kFinestStep / 4);
-    const Forecast linear = forecast(make_setting(spec::Element::T4, ratio), ratio);
+    const Forecast linear = forecast(make_setting(job::Element::T4, ratio), ratio);
     const bool is_linear_cheaper = linear.worst_cents <= asked_ && linear.cpu_seconds < quadratic_forecast_.cpu_seconds;
     run_.stations.say(fmt::format("T4 would take about {:.0f} nodes, T10 {:.0f}: {} it is", linear.nodes, quadratic_forecast_.nodes,
                                   is_linear_cheaper ? "T4" : "T10"));
@@ -246,7 +246,7 @@ Decision Search::decide_on_body() {
     quadratic_ = last;
     quadratic_forecast_ = next;
     Setting linear = last.setting;
-    linear.element = spec::Element::T4;
+    linear.element = job::Element::T4;
     return {0, linear};
   }
   return {0, next.setting};
@@ -257,8 +257,8 @@ Decision Search::decide_on_file() {
   const Trial& last = report_.trials.back();
   Setting setting = last.setting;
   setting.tolerance = tolerance_;
-  if (last.setting.element == spec::Element::T4) {
-    setting.element = spec::Element::T10;
+  if (last.setting.element == job::Element::T4) {
+    setting.element = job::Element::T10;
     return {0, setting};
   }
   if (!is_refinable_) give_up("this mesh file is read by all ranks in parts and is not refined; make a finer one");
@@ -349,8 +349,8 @@ Forecast Search::forecast_next() const {
     return forecast(make_setting(last.setting.element, ratio), ratio);
   }
   Setting setting = last.setting;
-  if (last.setting.element == spec::Element::T4) {
-    setting.element = spec::Element::T10;
+  if (last.setting.element == job::Element::T4) {
+    setting.element = job::Element::T10;
     constexpr double kMidNodes = 7.0;  // times the nodes; twice the couplings of a row
     return {setting,
             false,
@@ -407,7 +407,7 @@ AccurateBody Search::solve() {
 
 Json::Value describe_setting(const Setting& setting) {
   Json::Value value;
-  value["element"] = spec::to_text(setting.element);
+  value["element"] = job::to_text(setting.element);
   value["tolerance"] = setting.tolerance;
   if (setting.nodes) value["body_nodes"] = Json::Int64(*setting.nodes);
   if (setting.edge_m) value["body_edge_m"] = *setting.edge_m;
@@ -420,7 +420,7 @@ Json::Value describe_setting(const Setting& setting) {
 Setting find_first_setting(const Run& run) {
   Setting setting;
   setting.tolerance = std::clamp(2e-8 * run.job.accuracy_cents.value_or(0), 1e-10, 1e-6);
-  setting.element = run.job.body ? spec::Element::T10 : spec::Element::T4;
+  setting.element = run.job.body ? job::Element::T10 : job::Element::T4;
   if (run.job.body) setting.nodes = run.job.body->shape.empty() ? kCoarseSurfaceNodes : kCoarseShapeNodes;
   return setting;
 }
@@ -463,7 +463,7 @@ Body make_trial_body(Run& run, Setting& setting, Patience* patience) {
 AccurateBody solve_to_accuracy(Run& run) { return Search(run).solve(); }
 
 std::string describe(const Setting& setting) {
-  std::string text = spec::to_text(setting.element);
+  std::string text = job::to_text(setting.element);
   if (setting.nodes) text += fmt::format(", meshed with {} nodes", *setting.nodes);
   if (setting.edge_m) text += fmt::format(", meshed with edges of {:.3g} m", *setting.edge_m);
   if (setting.refinements > 0) text += fmt::format(", refined {} time{}", setting.refinements, setting.refinements == 1 ? "" : "s");

@@ -18,25 +18,25 @@ bank::Damping make_damping(const fem::Materials& materials) {
     damping.law = "mixed";
     return damping;
   }
-  const spec::Material& material = materials.list[0];
+  const job::Material& material = materials.list[0];
   switch (material.law) {
-    case spec::DampingLaw::rayleigh:
+    case job::DampingLaw::rayleigh:
       damping.law = "rayleigh";
       break;
-    case spec::DampingLaw::internal_friction:
+    case job::DampingLaw::internal_friction:
       damping.law = "internal_friction";
       damping.coefficient = {material.tan_phi};
       break;
-    case spec::DampingLaw::caughey:
+    case job::DampingLaw::caughey:
       damping.law = "caughey";
-      for (const spec::CaugheyTerm& term : material.caughey) {
+      for (const job::CaugheyTerm& term : material.caughey) {
         damping.coefficient.push_back(term.coefficient);
         damping.power.push_back(term.power);
       }
       break;
-    case spec::DampingLaw::loss_table:
+    case job::DampingLaw::loss_table:
       damping.law = "loss_table";
-      for (const spec::LossRow& row : material.loss_table) {
+      for (const job::LossRow& row : material.loss_table) {
         damping.freq_hz.push_back(row.freq_hz);
         damping.loss_factor.push_back(row.loss_factor);
       }
@@ -51,12 +51,12 @@ bank::Material make_material(const SolvedBody& solved) {
   bank::Material material;
   if (list.size() == 1) {
     material = {list[0].young_modulus_pa, list[0].poisson_ratio, list[0].density_kg_m3, 0.0, 0.0};
-    if (list[0].law == spec::DampingLaw::rayleigh) {
+    if (list[0].law == job::DampingLaw::rayleigh) {
       material.alpha1_s = list[0].alpha1_s;
       material.alpha2_per_s = list[0].alpha2_per_s;
     }
   } else {
-    const spec::Equivalent equivalent = spec::calc_equivalent(list, solved.volume_m3);
+    const job::Equivalent equivalent = job::calc_equivalent(list, solved.volume_m3);
     material = {equivalent.young_modulus_pa, equivalent.poisson_ratio, equivalent.density_kg_m3, 0.0, 0.0};
   }
   return material;
@@ -69,16 +69,16 @@ std::string make_regions(const SolvedBody& solved) {
 }
 
 /// Names are those of the job, or what the nodes are; of several patches of one entry each has a number.
-bank::Supports make_supports(const spec::JobSpec& job, const fem::Supports& found) {
+bank::Supports make_supports(const job::JobSpec& job, const fem::Supports& found) {
   bank::Supports supports;
   std::map<std::int32_t, int> patches, seen;
   for (const fem::Support& support : found.list) ++patches[support.entry];
   for (const fem::Support& support : found.list) {
-    const spec::Fixed& fixed = job.fixed[static_cast<std::size_t>(support.entry)];
+    const job::Fixed& fixed = job.fixed[static_cast<std::size_t>(support.entry)];
     std::string name = !fixed.name.empty() ? fixed.name : fixed.node_set ? *fixed.node_set : fmt::format("box {}", support.entry + 1);
     if (patches[support.entry] > 1) name += fmt::format(":{}", ++seen[support.entry]);
-    const std::string members = config::write_fixing(fixed.fixing);
-    supports.text += fmt::format("{}{{\"name\": {}{}{}}}", supports.text.empty() ? "{\"supports\": [" : ", ", config::quote(name),
+    const std::string members = material::write_fixing(fixed.fixing);
+    supports.text += fmt::format("{}{{\"name\": {}{}{}}}", supports.text.empty() ? "{\"supports\": [" : ", ", base::quote(name),
                                  members.empty() ? "" : ", ", members);
     supports.centre_m.push_back(support.centre_m);
     supports.normal.push_back(support.normal);
@@ -112,7 +112,7 @@ bank::Proof make_proof(const eigen::Modes& modes) {
 
 }  // namespace
 
-bank::Bank make_bank(const spec::JobSpec& job, const Setting& setting, Body& body, const SolvedBody& solved, SurfaceModes& surface_modes) {
+bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body, const SolvedBody& solved, SurfaceModes& surface_modes) {
   const eigen::Modes& modes = solved.modes;
   bank::Bank bank;
   bank.vertices_m = std::move(body.surface.vertices_m);
@@ -134,8 +134,8 @@ bank::Bank make_bank(const spec::JobSpec& job, const Setting& setting, Body& bod
   bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
   bank.band_hz = {find_low_hz(job, modes), job.band_hz[1]};
   bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
-  bank.element = spec::to_text(setting.element);
-  bank.mass = spec::to_text(job.mass);
+  bank.element = job::to_text(setting.element);
+  bank.mass = job::to_text(job.mass);
   return bank;
 }
 

@@ -7,6 +7,6 @@
 namespace carillon::io {
 
 /// Makes the bank without its provenance; takes the surface out of `body` and the steps out of `surface_modes`. Rank 0 only.
-bank::Bank make_bank(const spec::JobSpec& job, const Setting& setting, Body& body, const SolvedBody& solved, SurfaceModes& surface_modes);
+bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body, const SolvedBody& solved, SurfaceModes& surface_modes);
 
 }  // namespace carillon::io

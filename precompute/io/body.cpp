@@ -27,10 +27,10 @@ struct FixedNode {
 };
 
 /// The nodes of all sets and boxes that the job fixes, each once, ascending.
-std::vector<FixedNode> find_fixed_nodes(const mesh::TetMesh& mesh, const spec::JobSpec& job) {
+std::vector<FixedNode> find_fixed_nodes(const mesh::TetMesh& mesh, const job::JobSpec& job) {
   std::vector<FixedNode> list;
   for (std::size_t entry = 0; entry < job.fixed.size(); ++entry) {
-    const spec::Fixed& fixed = job.fixed[entry];
+    const job::Fixed& fixed = job.fixed[entry];
     try {
       const auto nodes = fixed.node_set ? mesh::find_fixed_nodes(mesh, *fixed.node_set)
                                         : mesh::find_fixed_nodes(mesh, (*fixed.box_m)[0], (*fixed.box_m)[1]);
@@ -70,14 +70,14 @@ void warn_of_mesh(Run& run, const Body& body) {
 
 /// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
 mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Patience* patience) {
-  const bool quadratic = setting.element == spec::Element::T10;
-  const spec::JobSpec& job = run.job;
+  const bool quadratic = setting.element == job::Element::T10;
+  const job::JobSpec& job = run.job;
   mesh::TetMesh mesh =
       job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, patience) : mesh::read_mesh(job.mesh);
   if (patience != nullptr && patience->estimate) return {};
   if (job.mesh_scale != 1.0) {
-    for (std::vector<mesh::Vec3>* lengths : {&mesh.nodes, &mesh.doubt_m}) {
-      for (mesh::Vec3& length : *lengths) {
+    for (std::vector<Vec3>* lengths : {&mesh.nodes, &mesh.doubt_m}) {
+      for (Vec3& length : *lengths) {
         for (double& x : length) x *= job.mesh_scale;
       }
     }
@@ -107,8 +107,8 @@ void say_size(const Run& run, std::int64_t nodes, std::int64_t tets, int compone
 
 /// CHOLMOD and MUMPS want the elimination order of the whole graph, which costs rank 0 time and memory; the factorisation of this project
 /// orders by itself, and MUMPS does so with more fill where it has to stand in for it.
-bool wants_elimination_order(const spec::JobSpec& job) {
-  return job.factorisation == spec::Factorisation::mumps || job.factorisation == spec::Factorisation::cholmod;
+bool wants_elimination_order(const job::JobSpec& job) {
+  return job.factorisation == job::Factorisation::mumps || job.factorisation == job::Factorisation::cholmod;
 }
 
 /// Every rank reads its part of the file.
@@ -118,8 +118,8 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   run.stations.begin("read", body.source + ", by all ranks");
   slabs::Wish wish;
   wish.scale = run.job.mesh_scale;
-  wish.order = setting.element == spec::Element::T10 ? 2 : 1;
-  for (const spec::Fixed& fixed : run.job.fixed)
+  wish.order = setting.element == job::Element::T10 ? 2 : 1;
+  for (const job::Fixed& fixed : run.job.fixed)
     wish.hold.push_back({fixed.node_set, fixed.box_m, (fixed.place.empty() ? run.job.file.string() : fixed.place) + ": key 'fixed'"});
   slabs::ParallelMesh mesh = slabs::read_parallel(run.comm, run.job.mesh, wish);
   body.pieces = std::move(mesh.pieces);
@@ -178,7 +178,7 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
 
 }  // namespace
 
-std::string describe_scale_key(const spec::JobSpec& job) {
+std::string describe_scale_key(const job::JobSpec& job) {
   if (!job.body)
     return job.mesh_scale == 1.0 ? "\"mesh_scale\": 0.001 in the job takes the mesh file's numbers for millimetres"
                                  : fmt::format("\"mesh_scale\" of the job, metres per unit of the mesh file, is {:g}: {:g} for that",
@@ -190,7 +190,7 @@ std::string describe_scale_key(const spec::JobSpec& job) {
   return fmt::format("\"scale\" inside \"body\", metres per unit of the surface, is {:g}: {:g} for that", scale, 0.001 * scale);
 }
 
-Setting get_setting(const spec::JobSpec& job) {
+Setting get_setting(const job::JobSpec& job) {
   Setting setting;
   setting.element = job.element;
   setting.tolerance = job.tolerance;
@@ -203,8 +203,8 @@ Setting get_setting(const spec::JobSpec& job) {
 
 Extent find_extent(const Run& run, const Setting& setting, const Body& body) {
   Extent extent;
-  extent.is_quadratic = setting.element == spec::Element::T10;
-  extent.is_lumped = run.job.mass == spec::Mass::lumped;
+  extent.is_quadratic = setting.element == job::Element::T10;
+  extent.is_lumped = run.job.mass == job::Mass::lumped;
   extent.modes = run.job.max_modes.value_or(0);
   extent.nodes = body.pieces.nodes;
   extent.tets = body.pieces.tets;

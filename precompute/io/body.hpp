@@ -17,7 +17,7 @@ namespace carillon::io {
 
 /// How the body is cut into elements.
 struct Setting {
-  spec::Element element = spec::Element::T10;
+  job::Element element = job::Element::T10;
   double tolerance = 1e-8;            // of the solver
   std::optional<std::int64_t> nodes;  // of a body that is meshed here: so many, mid-side nodes among them,
   std::optional<double> edge_m;       // or edges so long; neither: the mesher's default
@@ -25,7 +25,7 @@ struct Setting {
 };
 
 /// The setting that a job gives itself, without "accuracy_cents".
-Setting get_setting(const spec::JobSpec& job);
+Setting get_setting(const job::JobSpec& job);
 
 struct Body {
   fem::Distribution pieces;
@@ -38,7 +38,7 @@ struct Body {
 };
 
 /// The key of the job that says in which unit its mesh is, and how, for messages about its size.
-std::string describe_scale_key(const spec::JobSpec& job);
+std::string describe_scale_key(const job::JobSpec& job);
 
 /// What is known of the cost of solving it: of a body that was not read yet (pieces empty) by the job and the size of the file. Rank 0.
 Extent find_extent(const Run& run, const Setting& setting, const Body& body);

@@ -25,8 +25,9 @@
 #include "precompute/io/interrupt.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/sha256.hpp"
 
 namespace carillon::io {
 namespace {
@@ -67,7 +68,7 @@ std::int64_t find_data_start(std::int64_t settings_bytes, std::int64_t numbers_b
 
 Fingerprint seal(RawHeader header, const std::string& text) {
   header.sha256 = {};
-  return calc_sha256(std::string(reinterpret_cast<const char*>(&header), sizeof header) + text);
+  return base::calc_sha256(std::string(reinterpret_cast<const char*>(&header), sizeof header) + text);
 }
 
 std::uint64_t sum_records(const std::vector<double>& records, std::int64_t first, int group, int width) {

@@ -130,25 +130,25 @@ Json::Value describe_effort(const petsc::WorkTable& table) {
   return phases;
 }
 
-Json::Value describe_damping(const spec::Material& material) {
+Json::Value describe_damping(const job::Material& material) {
   Json::Value damping;
   switch (material.law) {
-    case spec::DampingLaw::rayleigh:
+    case job::DampingLaw::rayleigh:
       damping["rayleigh"]["alpha1_s"] = material.alpha1_s;
       damping["rayleigh"]["alpha2_per_s"] = material.alpha2_per_s;
       break;
-    case spec::DampingLaw::internal_friction:
+    case job::DampingLaw::internal_friction:
       damping["internal_friction"]["tan_phi"] = material.tan_phi;
       break;
-    case spec::DampingLaw::caughey:
-      for (const spec::CaugheyTerm& term : material.caughey) {
+    case job::DampingLaw::caughey:
+      for (const job::CaugheyTerm& term : material.caughey) {
         Json::Value& entry = damping["caughey"].append(Json::Value());
         entry["power"] = term.power;
         entry["coefficient"] = term.coefficient;
       }
       break;
-    case spec::DampingLaw::loss_table:
-      for (const spec::LossRow& row : material.loss_table) {
+    case job::DampingLaw::loss_table:
+      for (const job::LossRow& row : material.loss_table) {
         Json::Value& entry = damping["loss_table"].append(Json::Value());
         entry["freq_hz"] = row.freq_hz;
         entry["loss_factor"] = row.loss_factor;
@@ -165,7 +165,7 @@ Json::Value describe_warnings(const Run& run) { return make_list(run.stations.ge
 Json::Value describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3) {
   Json::Value list(Json::arrayValue);
   for (std::size_t i = 0; i < materials.list.size(); ++i) {
-    const spec::Material& material = materials.list[i];
+    const job::Material& material = materials.list[i];
     Json::Value& entry = list.append(Json::Value());
     entry["region"] = i < materials.region.size() ? materials.region[i] : "";
     if (!material.name.empty()) entry["name"] = material.name;
@@ -174,7 +174,7 @@ Json::Value describe_materials(const fem::Materials& materials, const std::vecto
     entry["young_modulus_pa"] = material.young_modulus_pa;
     entry["poisson_ratio"] = material.poisson_ratio;
     if (material.orthotropic) {
-      const spec::Orthotropic& own = *material.orthotropic;
+      const job::Orthotropic& own = *material.orthotropic;
       Json::Value& orthotropic = entry["orthotropic"];
       orthotropic["young_modulus_pa"] = make_list(own.young_modulus_pa);
       orthotropic["shear_modulus_pa"] = make_list(own.shear_modulus_pa);
@@ -213,7 +213,7 @@ Json::Value describe_run(const Run& run, const Setting& setting, const Body& bod
   root["effort"] = describe_effort(measured.work);
   for (const std::int64_t bytes : measured.peak_bytes) root["peak_bytes_by_rank"].append(Json::Int64(bytes));
   root["solver_options"] = make_list(run.options.solver_options);
-  root["chosen"]["element"] = spec::to_text(setting.element);
+  root["chosen"]["element"] = job::to_text(setting.element);
   root["chosen"]["tolerance"] = setting.tolerance;
   root["mesh"] = describe_mesh(body, setting);
   root["materials"] = describe_materials(solved.materials, solved.volume_m3);

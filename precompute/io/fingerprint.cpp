@@ -5,14 +5,13 @@
 #include "precompute/io/fingerprint.hpp"
 
 #include <json/json.h>
-#include <openssl/evp.h>
 
 #include <bit>
 #include <sstream>
 
 #include "precompute/io/run_record.hpp"
 #include "precompute/petsc/noise.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/version/version.hpp"
 
 namespace carillon::io {
@@ -20,12 +19,6 @@ namespace carillon::io {
 void Mixer::add(double value) { add(std::bit_cast<std::uint64_t>(value)); }
 
 std::uint64_t Mixer::get() const { return petsc::scramble(state_); }
-
-Fingerprint calc_sha256(std::string_view bytes) {
-  Fingerprint digest{};
-  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), nullptr, EVP_sha256(), nullptr) != 1) throw SystemError("SHA-256 fails");
-  return digest;
-}
 
 std::string find_program_version() { return std::string(version::get_number()) + " (" + version::get_git_id() + ")"; }
 
@@ -39,7 +32,7 @@ void write_setting(eigen::NumberWriter& to, const Setting& setting) {
 
 Setting read_setting(eigen::NumberReader& from) {
   Setting setting;
-  setting.element = from.get_count(0, 1) == 0 ? spec::Element::T4 : spec::Element::T10;
+  setting.element = from.get_count(0, 1) == 0 ? job::Element::T4 : job::Element::T10;
   setting.tolerance = from.get_double();
   const std::int64_t nodes = from.get_count(0, std::int64_t{1} << 40);
   const double edge_m = from.get_double();
@@ -50,8 +43,8 @@ Setting read_setting(eigen::NumberReader& from) {
   return setting;
 }
 
-Fingerprint find_job_fingerprint(const spec::JobSpec& job, const std::vector<std::string>& solver_options) {
-  std::istringstream stream(spec::resolved_json(job, "/", ""));
+Fingerprint find_job_fingerprint(const job::JobSpec& job, const std::vector<std::string>& solver_options) {
+  std::istringstream stream(job::resolved_json(job, "/", ""));
   Json::Value root;
   std::string errors;
   if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors)) throw SolveError("internal: the resolved job is not JSON");
@@ -59,7 +52,7 @@ Fingerprint find_job_fingerprint(const spec::JobSpec& job, const std::vector<std
   if (root.isMember("body")) root["body"].removeMember("surface");
   std::string text = find_program_version() + "\n" + Json::writeString(Json::StreamWriterBuilder(), root);
   for (const std::string& word : solver_options) text += "\n" + word;
-  return calc_sha256(text);
+  return base::calc_sha256(text);
 }
 
 Fingerprint find_system_fingerprint(MPI_Comm comm, const Fingerprint& job, const Setting& setting, const fem::LocalMesh& local) {
@@ -86,7 +79,7 @@ Fingerprint find_system_fingerprint(MPI_Comm comm, const Fingerprint& job, const
   all.bytes.assign(reinterpret_cast<const char*>(job.data()), job.size());
   for (const std::uint64_t sum : sums) all.add(static_cast<std::int64_t>(sum));
   write_setting(all, setting);
-  return calc_sha256(all.bytes);
+  return base::calc_sha256(all.bytes);
 }
 
 }  // namespace carillon::io

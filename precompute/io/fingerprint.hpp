@@ -12,16 +12,14 @@
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/fem/distribute.hpp"
 #include "precompute/io/body.hpp"
+#include "runtime/base/sha256.hpp"
 
 namespace carillon::io {
 
-using Fingerprint = std::array<unsigned char, 32>;
-
-/// SHA-256 of the bytes. Not collective.
-Fingerprint calc_sha256(std::string_view bytes);
+using Fingerprint = base::Sha256::Hash;
 
 /// Of all that is asked for, where the files lie left out, and of the program. Not collective.
-Fingerprint find_job_fingerprint(const spec::JobSpec& job, const std::vector<std::string>& solver_options);
+Fingerprint find_job_fingerprint(const job::JobSpec& job, const std::vector<std::string>& solver_options);
 
 /// Of the job, the setting, and every node and element of the mesh with the bits of its numbers. The same on every rank and for every
 /// number of ranks. Collective.

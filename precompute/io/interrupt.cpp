@@ -10,7 +10,7 @@
 #include <atomic>
 #include <cstring>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::io {
 namespace {

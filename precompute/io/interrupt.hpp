@@ -8,7 +8,7 @@
 namespace carillon::io {
 
 /// From now on such a signal ends this process at once with exit code 128 + signal: rank 0 says so in one line, and what keep_for_cleanup()
-/// was told of is removed. Nothing else needs to be undone: outputs have no name before they are whole (config::write_file). mpirun ends
+/// was told of is removed. Nothing else needs to be undone: outputs have no name before they are whole (base::write_file). mpirun ends
 /// the other ranks when one of them is ended like this. Call once, before the work.
 void end_on_signals(int rank);
 

@@ -18,7 +18,7 @@
 
 #include "precompute/io/node_order.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::io {
 namespace {
@@ -46,7 +46,7 @@ void write_in_turn(MPI_Comm comm, const fs::path& file, const std::string& head,
       error = std::current_exception();
     }
   };
-  std::optional<config::WholeFile> whole;
+  std::optional<base::WholeFile> whole;
   if (rank == 0) {
     attempt([&] {
       whole.emplace(file);
@@ -153,7 +153,7 @@ void check_matrices(const Run& run) {
   if (folder.empty()) return;
   petsc::run_agreed(run.comm, [&] {
     if (run.rank != 0) return;
-    for (const char* name : {"stiffness.mtx", "mass.mtx", "nodes.csv"}) config::check_writable(folder / name, "file of the matrices");
+    for (const char* name : {"stiffness.mtx", "mass.mtx", "nodes.csv"}) base::check_writable(folder / name, "file of the matrices");
   });
 }
 

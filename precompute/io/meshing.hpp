@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "jobs/spec/job_spec.hpp"
+#include "precompute/job/job_spec.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 
 namespace carillon::io {
@@ -38,9 +38,9 @@ struct Patience {
 /// Not collective. Throws InputError naming the job's line for what cannot be meshed, SystemError when carillon-mesh does not start or
 /// dies. With `patience`, a surface that is not meshed in time gives an empty mesh and patience->estimate; InputError when not even that
 /// can be told some seconds later.
-mesh::TetMesh make_body_mesh(const spec::Body& body, int order, const Fineness& fineness, Patience* patience = nullptr);
+mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, Patience* patience = nullptr);
 
 /// "bar, 20000 nodes" or "bunny.obj, edges of 0.002 m", for people.
-std::string describe(const spec::Body& body, const Fineness& fineness);
+std::string describe(const job::Body& body, const Fineness& fineness);
 
 }  // namespace carillon::io

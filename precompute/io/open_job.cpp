@@ -7,7 +7,7 @@
 
 #include "precompute/eigen/solver_options.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::io {
 namespace {
@@ -17,39 +17,39 @@ namespace fs = std::filesystem;
 constexpr std::uint64_t kMaxJobBytes = 16 << 20;
 
 /// Rank 0 reads the text; all ranks parse it, so that all fail alike.
-spec::JobSpec read_shared_job(const Run& run, const fs::path& file, spec::BankKey bank) {
+job::JobSpec read_shared_job(const Run& run, const fs::path& file, job::BankKey bank) {
   std::string text;
   petsc::run_agreed(run.comm, [&] {
-    if (run.rank == 0) text = config::read_file(file, "job file", kMaxJobBytes);
+    if (run.rank == 0) text = base::read_file(file, "job file", kMaxJobBytes);
   });
   auto size = static_cast<std::int64_t>(text.size());
   MPI_Bcast(&size, 1, MPI_INT64_T, 0, run.comm);
   text.resize(static_cast<std::size_t>(size));
   MPI_Bcast(text.data(), static_cast<int>(size), MPI_CHAR, 0, run.comm);
-  spec::JobSpec job;
-  petsc::run_agreed(run.comm, [&] { job = spec::parse_job(text, fs::absolute(file), bank); });
+  job::JobSpec job;
+  petsc::run_agreed(run.comm, [&] { job = job::parse_job(text, fs::absolute(file), bank); });
   return job;
 }
 
 void check_job(const Run& run) {
   petsc::run_agreed(run.comm, [&] {
     eigen::check_solver_options();
-    if (run.ranks > 1 && run.job.factorisation == spec::Factorisation::cholmod) {
+    if (run.ranks > 1 && run.job.factorisation == job::Factorisation::cholmod) {
       throw InputError(
           fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
                       run.job.file.string(), run.ranks));
     }
     if (run.rank != 0 || run.job.bank.empty()) return;
     const fs::path bank = run.options.bank.empty() ? run.job.bank : run.options.bank;  // as it is opened
-    config::check_writable(bank, "bank");
-    config::check_writable(spec::find_resolved_path(bank), "resolved job");
+    base::check_writable(bank, "bank");
+    base::check_writable(job::find_resolved_path(bank), "resolved job");
   });
 }
 
 }  // namespace
 
-void open_job(Run& run, const fs::path& file, spec::BankKey bank) {
-  run.job = read_shared_job(run, file, run.options.bank.empty() ? bank : spec::BankKey::optional);
+void open_job(Run& run, const fs::path& file, job::BankKey bank) {
+  run.job = read_shared_job(run, file, run.options.bank.empty() ? bank : job::BankKey::optional);
   if (!run.options.bank.empty()) run.job.bank = fs::absolute(run.options.bank).lexically_normal();
   check_job(run);
   for (const std::string& warning : run.job.warnings) run.stations.warn(warning);

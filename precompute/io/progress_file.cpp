@@ -11,7 +11,7 @@
 #include <cstring>
 
 #include "precompute/io/worker.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::io {
 namespace {

@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "precompute/io/worker.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/printable.hpp"
 
 namespace carillon::io {
 
@@ -50,7 +50,7 @@ void Pulse::begin(const std::string& step) {
     const std::lock_guard lock(mutex_);
     step_ = step;
     is_new_ = true;
-    fmt::print(stderr, "carillon-precompute: {}\n", config::printable(step_));
+    fmt::print(stderr, "carillon-precompute: {}\n", base::printable(step_));
   }
   wake_.notify_one();
 }
@@ -63,7 +63,7 @@ void Pulse::beat() {
   for (int beats = 1; !is_done_; ++beats) {
     if (!wake_.wait_for(lock, beats <= kFirst ? kEvery : kSeldom, [&] { return is_done_ || is_new_; })) {
       const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - begun;
-      fmt::print(stderr, "carillon-precompute: still {}, {:.0f} s\n", config::printable(step_), gone.count());
+      fmt::print(stderr, "carillon-precompute: still {}, {:.0f} s\n", base::printable(step_), gone.count());
       continue;
     }
     is_new_ = false;

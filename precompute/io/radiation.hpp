@@ -8,7 +8,6 @@ namespace carillon::io {
 using bank::calc_normal;
 using bank::find_outer_triangles;
 using bank::Triangle;
-using bank::Vec3;
 
 /// Calculates the pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s):
 ///   g = rho0 omega / (4 pi sqrt(1 + (k a)^2)) * flow,   k = omega / c0,  a = sqrt(A / 4 pi),

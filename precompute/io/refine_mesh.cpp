@@ -14,7 +14,6 @@
 namespace carillon::io {
 namespace {
 
-using mesh::Vec3;
 using Barycentric = std::array<double, 4>;
 
 /// The four tetrahedra at the corners, in nodes of the old element.

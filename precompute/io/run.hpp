@@ -6,11 +6,11 @@
 #include <memory>
 #include <string>
 
-#include "jobs/spec/job_spec.hpp"
 #include "precompute/io/progress_file.hpp"
 #include "precompute/io/run_options.hpp"
 #include "precompute/io/run_record.hpp"
-#include "runtime/config/error.hpp"
+#include "precompute/job/job_spec.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::io {
 
@@ -25,7 +25,7 @@ struct Run {
   MPI_Comm comm;
   int rank = 0;
   int ranks = 1;
-  spec::JobSpec job;  // the same on every rank
+  job::JobSpec job;  // the same on every rank
   RunOptions options;
   Stations stations;
   std::unique_ptr<ProgressFile> progress;      // on rank 0, if it is asked for

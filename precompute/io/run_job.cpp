@@ -24,7 +24,7 @@
 #include "precompute/io/solve_body.hpp"
 #include "precompute/io/surface_modes.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::io {
 namespace {
@@ -36,7 +36,7 @@ void open_progress(Run& run) {
   petsc::run_agreed(run.comm, [&] {
     const fs::path& file = run.options.progress;
     if (run.rank != 0 || file.empty()) return;
-    for (const fs::path& other : {run.job.file, run.job.mesh, run.job.bank, spec::find_resolved_path(run.job.bank)}) {
+    for (const fs::path& other : {run.job.file, run.job.mesh, run.job.bank, job::find_resolved_path(run.job.bank)}) {
       std::error_code error;  // One of them that does not exist is none of the others.
       if (!other.empty() && (file == other || fs::equivalent(file, other, error)))
         throw InputError(
@@ -87,7 +87,7 @@ std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, b
       "frequencies can be wrong by {:.0f} cents (estimate, mode {}; {} of {} modes by more than {:g}): {}a finer mesh, or "
       "\"accuracy_cents\" in the job, improves them",
       *worst, worst - cents.begin() + 1, wide, cents.size(), kAudibleCents,
-      setting.element == spec::Element::T4 ? "\"element\": \"T10\" (--order 2), " : "");
+      setting.element == job::Element::T4 ? "\"element\": \"T10\" (--order 2), " : "");
 }
 
 std::string describe_result(const bank::Bank& bank) {
@@ -100,14 +100,14 @@ std::string describe_result(const bank::Bank& bank) {
 RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   RunSummary summary;
   summary.bank = run.job.bank;
-  summary.resolved = spec::find_resolved_path(run.job.bank);
+  summary.resolved = job::find_resolved_path(run.job.bank);
   if (run.rank == 0) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
   const fs::path folder = fs::absolute(summary.bank).parent_path();
   const auto make_record = [&](const Measured& measured) {
     Json::Value record = describe_run(run, found.setting, found.body, found.solved, measured);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
-    return spec::resolved_json(run.job, folder, write_json(record));
+    return job::resolved_json(run.job, folder, write_json(record));
   };
   // A name without a folder stays one: it means the folder that this process is in, whatever has become of that folder's name.
   const fs::path written = run.options.bank.empty() ? run.job.bank : run.options.bank;
@@ -123,7 +123,7 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   run.stations.end();
   measured = measure(run.comm);
   petsc::run_agreed(run.comm, [&] {
-    if (run.rank == 0) config::write_file(spec::find_resolved_path(written), make_record(measured));
+    if (run.rank == 0) base::write_file(job::find_resolved_path(written), make_record(measured));
   });
   return summary;
 }
@@ -131,8 +131,8 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
 /// The files of the job itself must outlive the checkpoint.
 void check_checkpoint(const Run& run) {
   const fs::path& file = run.options.checkpoint;
-  config::check_writable(file, "checkpoint");
-  std::vector<fs::path> others{run.job.file, run.job.bank, spec::find_resolved_path(run.job.bank), run.options.progress};
+  base::check_writable(file, "checkpoint");
+  std::vector<fs::path> others{run.job.file, run.job.bank, job::find_resolved_path(run.job.bank), run.options.progress};
   others.push_back(run.job.body ? run.job.body->surface : run.job.mesh);
   for (const fs::path& other : others) {
     std::error_code ignored;

@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 #include <hdf5.h>
-#include <sys/resource.h>
 
 #include <array>
 #include <cstdio>
@@ -15,7 +14,9 @@
 #include "partition/partition.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/host.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/version/version.hpp"
 
 namespace carillon::io {
@@ -52,17 +53,17 @@ void Stations::begin(const std::string& name, const std::string& what) {
   name_ = name;
   petsc::set_work_phase(find_work_phase(name));
   start_ = std::chrono::steady_clock::now();
-  start_cpu_s_ = find_cpu_seconds();
+  start_cpu_s_ = base::get_process_cpu_s();
   if (listener_) listener_(name);
   if (!speaks_) return;
-  fmt::print("{:<10} {}\n", name, config::printable(what));
+  fmt::print("{:<10} {}\n", name, base::printable(what));
   std::fflush(stdout);
 }
 
 void Stations::say(const std::string& text) const {
   if (!speaks_) return;
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) fmt::print("           {}\n", config::printable(line));
+  for (std::string line; std::getline(lines, line);) fmt::print("           {}\n", base::printable(line));
   std::fflush(stdout);
 }
 
@@ -70,15 +71,15 @@ void Stations::warn(const std::string& text) {
   if (rank_ != 0) return;
   warnings_.push_back(text);
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-precompute: warning: {}\n", config::printable(text));
+  fmt::print(stderr, "carillon-precompute: warning: {}\n", base::printable(text));
 }
 
 const Station& Stations::end() {
   Station station;
   station.name = name_;
   station.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  station.cpu_seconds = find_cpu_seconds() - start_cpu_s_;
-  station.peak_bytes = station.peak_sum_bytes = find_peak_bytes();
+  station.cpu_seconds = base::get_process_cpu_s() - start_cpu_s_;
+  station.peak_bytes = station.peak_sum_bytes = base::find_memory().peak;
   MPI_Allreduce(MPI_IN_PLACE, &station.seconds, 1, MPI_DOUBLE, MPI_MAX, comm_);
   MPI_Allreduce(MPI_IN_PLACE, &station.cpu_seconds, 1, MPI_DOUBLE, MPI_SUM, comm_);
   MPI_Allreduce(MPI_IN_PLACE, &station.peak_bytes, 1, MPI_INT64_T, MPI_MAX, comm_);
@@ -89,26 +90,11 @@ const Station& Stations::end() {
   return stations_.back();
 }
 
-double find_cpu_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-std::int64_t find_peak_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmHWM:")) return std::strtoll(line.c_str() + 6, nullptr, 10) * 1024;  // "VmHWM:  123456 kB"
-  }
-  return petsc::get_peak_memory_bytes();
-}
-
 std::vector<std::int64_t> gather_peak_bytes(MPI_Comm comm) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
-  const std::int64_t mine = find_peak_bytes();
+  const std::int64_t mine = base::find_memory().peak;
   std::vector<std::int64_t> all(rank == 0 ? static_cast<std::size_t>(ranks) : 0);
   MPI_Gather(&mine, 1, MPI_INT64_T, all.data(), 1, MPI_INT64_T, 0, comm);
   return all;

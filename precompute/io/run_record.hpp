@@ -55,12 +55,6 @@ class Stations {
   std::function<void(const std::string& name)> listener_;
 };
 
-/// User and system seconds of this process so far.
-double find_cpu_seconds();
-
-/// Highest resident memory of this process so far [byte]: VmHWM, which knows nothing of the process that started this one.
-std::int64_t find_peak_bytes();
-
 /// The same of every rank, on rank 0; empty on the others. Collective.
 std::vector<std::int64_t> gather_peak_bytes(MPI_Comm comm);
 

@@ -17,7 +17,7 @@
 #include "precompute/io/fingerprint.hpp"
 #include "precompute/io/matrices.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::io {
 namespace {
@@ -60,26 +60,26 @@ class ProgressLines {
   std::int64_t tenth_ = 0;
 };
 
-eigen::Factorisation find_factorisation(spec::Factorisation wanted) {
+eigen::Factorisation find_factorisation(job::Factorisation wanted) {
   switch (wanted) {
-    case spec::Factorisation::ldlt:
+    case job::Factorisation::ldlt:
       return eigen::Factorisation::kLdlt;
-    case spec::Factorisation::mumps:
+    case job::Factorisation::mumps:
       return eigen::Factorisation::kMumps;
-    case spec::Factorisation::cholmod:
+    case job::Factorisation::cholmod:
       return eigen::Factorisation::kCholmod;
     default:
       return eigen::Factorisation::kAutomatic;
   }
 }
 
-eigen::Method find_method(spec::Method wanted) {
+eigen::Method find_method(job::Method wanted) {
   switch (wanted) {
-    case spec::Method::block_lanczos:
+    case job::Method::block_lanczos:
       return eigen::Method::kBlockLanczos;
-    case spec::Method::krylov_schur:
+    case job::Method::krylov_schur:
       return eigen::Method::kKrylovSchur;
-    case spec::Method::dense:
+    case job::Method::dense:
       return eigen::Method::kDense;
     default:
       return eigen::Method::kAutomatic;
@@ -89,7 +89,7 @@ eigen::Method find_method(spec::Method wanted) {
 /// Said before anything is assembled.
 void check_method(const Run& run, std::int64_t unknowns) {
   eigen::check_solver_options(petsc::to_petsc_int(unknowns));
-  if (run.job.method != spec::Method::dense || unknowns <= eigen::kMostDenseUnknowns) return;
+  if (run.job.method != job::Method::dense || unknowns <= eigen::kMostDenseUnknowns) return;
   throw InputError(fmt::format("{}: \"solver.method\": \"dense\" solves up to {} unknowns, and the body has {}; take \"automatic\"",
                                run.job.file.string(), eigen::kMostDenseUnknowns, unknowns));
 }
@@ -136,7 +136,7 @@ eigen::Modes solve_named(Run& run, const Setting& setting, const Body& body, con
 estimate::ErrorBars calc_bars(Run& run, const Body& body, const fem::System& system, const SolvedBody& solved) {
   const eigen::Modes& modes = solved.modes;
   std::vector<estimate::Solid> solids;
-  for (const spec::Material& material : solved.materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  for (const job::Material& material : solved.materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
   estimate::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
@@ -189,18 +189,18 @@ void warn_of_oddities(Run& run, const Body& body, const eigen::Modes& modes) {
 }
 
 /// Elements that cannot bend without straining in the one way that the solid hardly allows are too stiff; docs/elements.md.
-void warn_of_locking(Run& run, const spec::Material& material, bool is_linear) {
+void warn_of_locking(Run& run, const job::Material& material, bool is_linear) {
   constexpr double kStiff = 50;
   if (is_linear && material.poisson_ratio > 0.4)
     run.stations.warn(
         fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
                     material.poisson_ratio));
   if (!material.orthotropic) return;
-  spec::Elasticity c = material.calc_elasticity_pa();
+  job::Elasticity c = material.calc_elasticity_pa();
   const double mean = fem::calc_mean_lambda(c);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) c[6 * i + j] -= mean;
-  const auto stiffness = spec::calc_eigenvalues(c);
+  const auto stiffness = job::calc_eigenvalues(c);
   if (stiffness[5] > kStiff * stiffness[4])
     run.stations.warn(
         fmt::format("{}: the solid is {:.0f} times as stiff in one strain as in any other: coarse meshes lock and are some per cent sharp; "
@@ -210,7 +210,7 @@ void warn_of_locking(Run& run, const spec::Material& material, bool is_linear) {
 
 }  // namespace
 
-double find_low_hz(const spec::JobSpec& job, const eigen::Modes& modes) {
+double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes) {
   return modes.proof.counts.empty() ? job.band_hz[0] : std::max(job.band_hz[0], modes.proof.counts.front().freq_hz);
 }
 
@@ -238,16 +238,16 @@ eigen::NodeLayout make_layout(fem::Distribution& pieces) {
 
 fem::System assemble_body(Run& run, const Setting& setting, Body& body, SolvedBody& solved) {
   check_method(run, 3 * body.pieces.free_nodes);
-  const bool is_linear = setting.element == spec::Element::T4;
-  run.stations.begin("assemble", fmt::format("{} unknowns, {}, {} mass", 3 * body.pieces.free_nodes, spec::to_text(setting.element),
-                                             spec::to_text(run.job.mass)));
+  const bool is_linear = setting.element == job::Element::T4;
+  run.stations.begin("assemble", fmt::format("{} unknowns, {}, {} mass", 3 * body.pieces.free_nodes, job::to_text(setting.element),
+                                             job::to_text(run.job.mass)));
   // Errors of the materials name the job's line by themselves.
   solved.materials = fem::find_materials(run.comm, body.pieces.local, run.job, body.region_names);
   fem::System system =
       name_errors(body.source, run, [&] { return fem::assemble(run.comm, body.pieces.local, solved.materials, run.job.mass); });
   solved.volume_m3 = fem::calc_volumes(run.comm, body.pieces.local, solved.materials);
   solved.rigid = fem::calc_rigid_body(run.comm, body.pieces.local, solved.materials);
-  for (const spec::Material& material : solved.materials.list) warn_of_locking(run, material, is_linear);
+  for (const job::Material& material : solved.materials.list) warn_of_locking(run, material, is_linear);
   run.stations.end();
   return system;
 }

@@ -26,7 +26,7 @@ struct SolvedBody {
 /// The solver's, of the job.
 eigen::Options make_options(const Run& run, const Setting& setting);
 /// Where the bank's band begins: as the job says, or above it where rounding lets nothing slower be told from rigid motions.
-double find_low_hz(const spec::JobSpec& job, const eigen::Modes& modes);
+double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes);
 /// Where the free nodes are; takes the elimination order from the pieces.
 eigen::NodeLayout make_layout(fem::Distribution& pieces);
 

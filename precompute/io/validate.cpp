@@ -25,6 +25,8 @@
 #include "precompute/io/weyl.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/slabs/read_parallel.hpp"
+#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/host.hpp"
 
 namespace carillon::io {
 namespace {
@@ -42,27 +44,14 @@ constexpr const char* kGuessed =
     "memory and time are guessed by powers of the unknowns, to a factor of two for thin walls and of ten for thick bodies of a million";
 
 /// Of this process and the programs that it started and that ended.
-double find_all_cpu_seconds() {
-  rusage children{};
-  getrusage(RUSAGE_CHILDREN, &children);
-  return find_cpu_seconds() + static_cast<double>(children.ru_utime.tv_sec + children.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(children.ru_utime.tv_usec + children.ru_stime.tv_usec);
-}
-
-/// Of this process, now [byte].
-std::int64_t find_resident_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmRSS:")) return std::strtoll(line.c_str() + 6, nullptr, 10) * 1024;
-  return 0;
-}
+double find_all_cpu_seconds() { return base::get_process_cpu_s() + base::get_children_cpu_s(); }
 
 template <class Triangles>
-double calc_area(const std::vector<mesh::Vec3>& points_m, const Triangles& triangles) {
+double calc_area(const std::vector<Vec3>& points_m, const Triangles& triangles) {
   double area = 0;
   for (const auto& t : triangles) {
-    const mesh::Vec3 &a = points_m[t[0]], &b = points_m[t[1]], &c = points_m[t[2]];
-    const mesh::Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    const Vec3 &a = points_m[t[0]], &b = points_m[t[1]], &c = points_m[t[2]];
+    const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
     area += 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
   }
   return area;
@@ -71,7 +60,7 @@ double calc_area(const std::vector<mesh::Vec3>& points_m, const Triangles& trian
 class Validation {
  public:
   Validation(MPI_Comm comm, const RunOptions& options, bool tells)
-      : run_(comm, options), pulse_(tells && run_.rank == 0), base_bytes_(find_resident_bytes()) {}
+      : run_(comm, options), pulse_(tells && run_.rank == 0), base_bytes_(base::find_memory().resident) {}
 
   void look(const std::filesystem::path& job_file);
   Json::Value describe() const;
@@ -120,7 +109,7 @@ class Validation {
 
 void Validation::look(const std::filesystem::path& job_file) {
   if (run_.ranks > 1) throw InputError("--validate works on one rank: start carillon-precompute without mpirun");
-  open_job(run_, job_file, spec::BankKey::optional);
+  open_job(run_, job_file, job::BankKey::optional);
   Setting setting = get_setting(run_.job);
   if (run_.job.accuracy_cents) {
     setting = find_first_setting(run_);
@@ -180,18 +169,18 @@ bool Validation::has_time_to_read(const Setting& setting) {
     }
     const mesh::CheckReport check = mesh::check_mesh(coarse, run_.job.body->shape);
     const mesh::Surface skin = mesh::extract_boundary(coarse);
-    std::vector<mesh::Vec3> skin_m;
+    std::vector<Vec3> skin_m;
     for (const std::int32_t node : skin.nodes) skin_m.push_back(coarse.nodes[node]);
     double edges_m = 0;
     for (std::int64_t t = 0; t < coarse.tet_count(); ++t) {
-      const mesh::Vec3 &p = coarse.nodes[coarse.tets[10 * t]], &q = coarse.nodes[coarse.tets[10 * t + 1]];
+      const Vec3 &p = coarse.nodes[coarse.tets[10 * t]], &q = coarse.nodes[coarse.tets[10 * t + 1]];
       edges_m += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]) / static_cast<double>(coarse.tet_count());
     }
     BodyEstimate known;
     known.volume_m3 = check.volume_m3;
     known.area_m2 = calc_area(skin_m, skin.triangles);
     known.thickness_m = 2 * known.volume_m3 / known.area_m2;
-    const double corners = setting.element == spec::Element::T10 ? 1 : 1 / kNodesPerCorner;
+    const double corners = setting.element == job::Element::T10 ? 1 : 1 / kNodesPerCorner;
     const double finer = setting.edge_m ? std::pow(edges_m / *setting.edge_m, 3) : 1;
     known.nodes = setting.nodes.value_or(
         setting.edge_m ? std::llround(std::min(static_cast<double>(coarse.nodes.size()) * corners * finer, 1e15)) : kDefaultNodes);
@@ -204,7 +193,7 @@ bool Validation::has_time_to_read(const Setting& setting) {
   }
   if (!body_.estimate) return true;
   Extent extent;
-  extent.is_quadratic = setting.element == spec::Element::T10;
+  extent.is_quadratic = setting.element == job::Element::T10;
   extent.nodes = body_.estimate->nodes;
   extent.tets = extent.is_quadratic ? extent.nodes * 2 / 3 : extent.nodes * 4;
   const Costs costs = predict_costs(extent);
@@ -219,14 +208,14 @@ bool Validation::has_time_to_read(const Setting& setting) {
 void Validation::look_from_afar(const Setting& setting) {
   const BodyEstimate& known = *body_.estimate;
   extent_ = {};
-  extent_.is_quadratic = setting.element == spec::Element::T10;
-  extent_.is_lumped = run_.job.mass == spec::Mass::lumped;
+  extent_.is_quadratic = setting.element == job::Element::T10;
+  extent_.is_lumped = run_.job.mass == job::Mass::lumped;
   extent_.nodes = known.nodes;
   // One layer of elements has two tetrahedra of ten nodes for every four nodes, a solid two for three.
   extent_.tets = extent_.is_quadratic ? known.nodes * 3 / 5 : known.nodes * 4;
   extent_.unknowns = 3 * known.nodes;
   extent_.surface_nodes = known.nodes / 2;
-  left_bytes_ = eigen::find_memory_left() + find_resident_bytes() - base_bytes_;
+  left_bytes_ = eigen::find_memory_left() + base::find_memory().resident - base_bytes_;
   solved_.materials.list = {run_.job.material};
   solved_.volume_m3 = {known.volume_m3};
   guess();
@@ -266,7 +255,7 @@ void Validation::guess() {
   outlook_.factor_kept_bytes = 8 * outlook_.entries;
   outlook_.factor_bytes = outlook_.factor_kept_bytes * 3 / 2;  // with the update matrices
   outlook_.copies_bytes = outlook_.copies_kept_bytes = static_cast<std::int64_t>(calc_matrix_bytes());
-  held_bytes_ = find_resident_bytes() + static_cast<std::int64_t>(calc_matrix_bytes());
+  held_bytes_ = base::find_memory().resident + static_cast<std::int64_t>(calc_matrix_bytes());
   extent_.factor_flops = outlook_.flops;
   extent_.factor_entries = outlook_.entries;
   if (body_.estimate) return;
@@ -306,7 +295,7 @@ void Validation::look_ahead(const Setting& setting) {
   const double needed = calc_clock(costs.assemble + costs.analyse);
   if (needed >= find_seconds_left()) needed_s_ = needed;
   const std::int64_t left = eigen::find_memory_left();
-  left_bytes_ = left + find_resident_bytes() - base_bytes_;
+  left_bytes_ = left + base::find_memory().resident - base_bytes_;
   // K, M, and room to sort their entries.
   if (needed_s_ > 0 || 2 * calc_matrix_bytes() > kRoomUsed * static_cast<double>(left)) {
     guess();
@@ -314,9 +303,9 @@ void Validation::look_ahead(const Setting& setting) {
     is_analysed_ = true;
     pulse_.begin(fmt::format("assembling {} unknowns", extent_.unknowns));
     const fem::System system = assemble_body(run_, setting, body_, solved_);
-    held_bytes_ = find_resident_bytes();
-    read_bytes_ = find_peak_bytes();
-    assembled_s_ = find_cpu_seconds();
+    held_bytes_ = base::find_memory().resident;
+    read_bytes_ = base::find_memory().peak;
+    assembled_s_ = base::get_process_cpu_s();
     pulse_.begin("analysing the factorisation");
     outlook_ = name_errors(body_.source, run_, [&] {
       return eigen::look_ahead({system.stiffness, system.mass, make_layout(body_.pieces)}, make_options(run_, setting),

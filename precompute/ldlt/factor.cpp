@@ -21,7 +21,7 @@
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::ldlt {
 namespace {

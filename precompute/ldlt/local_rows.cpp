@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::ldlt {
 

@@ -15,7 +15,7 @@
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/local_rows.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::ldlt {
 namespace {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesh {
 

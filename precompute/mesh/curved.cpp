@@ -9,15 +9,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/base/vector.hpp"
+
 namespace carillon::mesh {
 
 namespace {
 
 using Barycentric = std::array<double, 4>;
-
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 
 /// slope[k][j]: along xi_(k+1), dx / dxi_(k+1) = sum over j of L_j slope[k][j]. From N_i = L_i (2 L_i - 1), 4 L_i L_j and sum L = 1.
 using Slopes = std::array<std::array<Vec3, 4>, 3>;
@@ -40,7 +38,7 @@ Slopes calc_slopes(const TetMesh& mesh, std::int64_t e) {
   }
   Slopes slopes{};
   for (std::size_t k = 0; k < 3; ++k)
-    for (std::size_t j = 0; j < 4; ++j) slopes[k][j] = minus(g[k + 1][j], g[0][j]);
+    for (std::size_t j = 0; j < 4; ++j) slopes[k][j] = g[k + 1][j] - g[0][j];
   return slopes;
 }
 
@@ -126,9 +124,9 @@ bool is_curved(const TetMesh& mesh, std::int64_t e) {
   constexpr double kStraight = 1e-6;  // of the edge's length
   for (std::size_t m = 0; m < 6; ++m) {
     const auto tet = mesh.tet(e);
-    const Vec3 off = minus(mesh.nodes[static_cast<std::size_t>(tet[4 + m])], calc_middle(mesh, e, m));
-    const Vec3 edge = minus(mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[m][1])])],
-                            mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[m][0])])]);
+    const Vec3 off = mesh.nodes[static_cast<std::size_t>(tet[4 + m])] - calc_middle(mesh, e, m);
+    const Vec3 edge = mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[m][1])])] -
+                      mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[m][0])])];
     if (dot(off, off) > kStraight * kStraight * dot(edge, edge)) return true;
   }
   return false;

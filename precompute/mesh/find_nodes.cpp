@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "precompute/mesh/check.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesh {
 
@@ -36,7 +36,7 @@ std::vector<std::int32_t> find_fixed_nodes(const TetMesh& mesh, const std::strin
     if (names.size() <= kMostListed) list += fmt::format("{}'{}'", list.empty() ? "" : ", ", name);
   }
   if (names.size() > kMostListed) list += fmt::format(" and {} more", names.size() - kMostListed);
-  const std::string nearest = config::find_nearest(set, names);
+  const std::string nearest = base::find_nearest(set, names);
   throw InputError(fmt::format("the mesh has no node set '{}'{}; it has {}", set,
                                nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), list));
 }

@@ -9,16 +9,11 @@
 
 #include "precompute/mesh/check_parts.hpp"
 #include "precompute/mesh/curved.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::mesh {
 
-namespace {
-
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-
-}  // namespace
+namespace {}  // namespace
 
 void straighten_folded(TetMesh& mesh, CheckReport& report) {
   report.straightened = straighten_folded_elements(mesh);
@@ -46,7 +41,7 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
     for (std::size_t f = 0; f < 4; ++f) {
       const auto [i, j, k] = kFaces[f];
       const Vec3& origin = x[static_cast<std::size_t>(i)];
-      normal[f] = cross(minus(x[static_cast<std::size_t>(j)], origin), minus(x[static_cast<std::size_t>(k)], origin));
+      normal[f] = cross(x[static_cast<std::size_t>(j)] - origin, x[static_cast<std::size_t>(k)] - origin);
       const double length = std::sqrt(dot(normal[f], normal[f]));
       for (double& value : normal[f]) value /= length;
     }
@@ -59,10 +54,10 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
     greatest = std::max(greatest, own_greatest);
     least = std::min(least, own_least);
     report.slivers += own_greatest > sliver_cosine || own_least < -sliver_cosine;
-    const double volume = dot(minus(x[1], x[0]), cross(minus(x[2], x[0]), minus(x[3], x[0]))) / 6.0;
+    const double volume = dot(x[1] - x[0], cross(x[2] - x[0], x[3] - x[0])) / 6.0;
     double squares = 0.0;
     for (const auto& [i, j] : kEdges) {
-      const Vec3 edge = minus(x[static_cast<std::size_t>(j)], x[static_cast<std::size_t>(i)]);
+      const Vec3 edge = x[static_cast<std::size_t>(j)] - x[static_cast<std::size_t>(i)];
       squares += dot(edge, edge);
       shortest = std::min(shortest, dot(edge, edge));
     }

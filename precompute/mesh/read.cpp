@@ -5,7 +5,7 @@
 #include <new>
 
 #include "precompute/mesh/assemble.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::mesh {
 
@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint64_t kMostBytes = 32ULL << 30;
 
 std::string read_bytes(const std::filesystem::path& file) {
-  std::string bytes = config::read_file(file, "mesh file", kMostBytes);
+  std::string bytes = base::read_file(file, "mesh file", kMostBytes);
   if (bytes.empty()) throw InputError(fmt::format("{}: the file is empty; write the mesh again", file.string()));
   return bytes;
 }

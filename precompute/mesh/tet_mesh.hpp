@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-namespace carillon::mesh {
+#include "runtime/base/vector.hpp"
 
-using Vec3 = std::array<double, 3>;
+namespace carillon::mesh {
 
 /// Linear (4 nodes) or quadratic (10 nodes) tetrahedra. Node order within an element: corners 0 1 2 3 with
 /// det(x1 - x0, x2 - x0, x3 - x0) > 0, then the mid-side nodes of the edges 01, 12, 02, 03, 13, 23 (VTK's order).

@@ -12,7 +12,7 @@
 
 #include "precompute/mesh/check_parts.hpp"
 #include "precompute/mesh/faces.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesh {
 

@@ -11,7 +11,7 @@
 #include <iterator>
 
 #include "precompute/mesh/assemble.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::mesh {
 
@@ -174,7 +174,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
 }
 
 void write_gmsh(const TetMesh& mesh, const std::filesystem::path& file, GmshEncoding encoding) {
-  config::write_file(file, make_gmsh(mesh, encoding));
+  base::write_file(file, make_gmsh(mesh, encoding));
 }
 
 }  // namespace carillon::mesh

@@ -8,8 +8,8 @@
 
 #include "precompute/mesher/inset_curves.hpp"
 #include "precompute/mesher/untangle_curves.hpp"
-#include "runtime/config/crossing.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/crossing.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -152,7 +152,7 @@ std::optional<Vec3> find_skin(const Body& body, const Vec3& middle, const Vec3& 
     if (high == low) return std::nullopt;
     at_high = calc(high);
   }
-  return middle + config::find_crossing(calc, low, at_low, high, at_high, 0, 1e-6 * reach_m, 40) * normal;
+  return middle + base::find_crossing(calc, low, at_low, high, at_high, 0, 1e-6 * reach_m, 40) * normal;
 }
 
 }  // namespace carillon::mesher

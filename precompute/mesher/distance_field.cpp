@@ -13,7 +13,7 @@
 #include <cmath>
 
 #include "precompute/mesher/nearest_triangle.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 namespace {

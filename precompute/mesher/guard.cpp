@@ -15,7 +15,7 @@
 #include <cstring>
 
 #include "precompute/mesher/surface.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 namespace {

@@ -19,10 +19,10 @@
 #include "precompute/mesh/write.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/shapes/shapes.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/file.hpp"
-#include "runtime/config/printable.hpp"
-#include "runtime/config/standard_output.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/standard_output.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
@@ -107,7 +107,7 @@ void check_options(const Order& order) {
   }
   if (order.nodes && order.edge) throw InputError("--nodes and --edge exclude each other; give one of them");
   if (order.straight && order.order != 2) throw InputError("--straight is for tetrahedra of ten nodes; add --order 2");
-  if (!config::is_standard_output(order.out) && std::filesystem::path(order.out).extension() != ".msh") {
+  if (!base::is_standard_output(order.out) && std::filesystem::path(order.out).extension() != ".msh") {
     throw InputError(
         fmt::format("{}: the mesh is written in Gmsh's format (.vtu, .mesh and .node are read but not written); give the output a name "
                     "that ends in .msh, "
@@ -251,7 +251,7 @@ std::string format_report(const Order& order, const Result& result, const mesh::
   std::string text;
   if (result.surface) text += mesher::describe(*result.surface);
   if (!text.empty() && text.back() != '\n') text += '\n';
-  text += fmt::format("{}: {} nodes, {} tetrahedra of {} nodes\n", config::is_standard_output(order.out) ? "standard output" : order.out,
+  text += fmt::format("{}: {} nodes, {} tetrahedra of {} nodes\n", base::is_standard_output(order.out) ? "standard output" : order.out,
                       result.mesh.nodes.size(), result.mesh.tet_count(), result.mesh.nodes_per_tet());
   text += fmt::format("  size      {:.6g} x {:.6g} x {:.6g} m, volume {:.6g} m3\n", check.box_high[0] - check.box_low[0],
                       check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2], check.volume_m3);
@@ -277,16 +277,16 @@ void make_mesh(const Order& order) {
       return;
     }
     if (order.quiet) return;
-    fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), config::printable(phase));
+    fmt::print(stderr, "[{:6.1f} s] {}\n", calc_seconds(start), base::printable(phase));
     std::fflush(stderr);
   };
   check_options(order);
-  const bool is_piped = config::is_standard_output(order.out);
+  const bool is_piped = base::is_standard_output(order.out);
   if (is_piped)
-    config::check_standard_output("mesh");
+    base::check_standard_output("mesh");
   else
-    config::check_writable(order.out, "mesh");
-  if (!order.json.empty()) config::check_writable(order.json, "report");
+    base::check_writable(order.out, "mesh");
+  if (!order.json.empty()) base::check_writable(order.json, "report");
   std::error_code none;
   if (!order.json.empty() && (std::filesystem::path(order.json).lexically_normal() == std::filesystem::path(order.out).lexically_normal() ||
                               std::filesystem::equivalent(order.json, order.out, none))) {
@@ -309,18 +309,18 @@ void make_mesh(const Order& order) {
   progress(fmt::format("writing {}", order.out));
   phase = Clock::now();
   if (is_piped)
-    config::write_standard_output(mesh::make_gmsh(result.mesh));
+    base::write_standard_output(mesh::make_gmsh(result.mesh));
   else
     mesh::write_gmsh(result.mesh, order.out);
   result.seconds.emplace_back("write", calc_seconds(phase));
 
   const double total_s = calc_seconds(start);
-  if (!order.json.empty()) config::write_file(order.json, format_json(order, result, check, total_s));
+  if (!order.json.empty()) base::write_file(order.json, format_json(order, result, check, total_s));
   std::FILE* const to = is_piped || order.quiet ? stderr : stdout;
-  if (!order.quiet) fmt::print(to, "{}", config::printable_lines(format_report(order, result, check, total_s)));
+  if (!order.quiet) fmt::print(to, "{}", base::printable_lines(format_report(order, result, check, total_s)));
   std::set<std::string> told;
   for (const std::string& note : result.notes) {
-    if (told.insert(note).second) fmt::print(to, "{}{}\n", order.quiet ? "carillon-mesh: note: " : "  note      ", config::printable(note));
+    if (told.insert(note).second) fmt::print(to, "{}{}\n", order.quiet ? "carillon-mesh: note: " : "  note      ", base::printable(note));
   }
   if (std::fflush(to) != 0) throw SystemError("the report cannot be written");
 }
@@ -334,7 +334,7 @@ void make_mesh(const Order& order) {
   std::string message = complaint;
   for (const std::string& word : app.remaining()) {
     const std::string name = word.substr(0, word.find('='));
-    const std::string nearest = name.starts_with("-") ? config::find_nearest(name, known) : "";
+    const std::string nearest = name.starts_with("-") ? base::find_nearest(name, known) : "";
     message = name.starts_with("-") ? fmt::format("unknown option {}", name) : fmt::format("unexpected argument '{}'", word);
     message += nearest.empty() ? "; see --help" : fmt::format("; did you mean {}?", nearest);
     break;
@@ -395,7 +395,7 @@ int run(int argc, char** argv) {
 
 int fail(const char* what, int code) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-mesh: {}\n", carillon::config::printable(what));
+  fmt::print(stderr, "carillon-mesh: {}\n", carillon::base::printable(what));
   return code;
 }
 

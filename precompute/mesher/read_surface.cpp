@@ -8,8 +8,8 @@
 
 #include "precompute/mesher/surface_text.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
-#include "runtime/config/error.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -108,7 +108,7 @@ TriangleSurface read_surface(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path, error)) throw InputError(fmt::format("{}: there is no such file", name));
   if (!std::filesystem::is_regular_file(path, error))
     throw InputError(fmt::format("{}: this is a folder or a device, not a file; give the file of a surface", name));
-  const std::string bytes = config::read_file(path, "surface", kMostBytes);
+  const std::string bytes = base::read_file(path, "surface", kMostBytes);
   if (bytes.empty()) throw InputError(fmt::format("{}: the file is empty", name));
   return parse_surface(bytes, name, format);
 }

@@ -15,7 +15,7 @@
 #include "precompute/mesher/repair.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 namespace {

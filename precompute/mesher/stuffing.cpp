@@ -13,7 +13,7 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 namespace {

@@ -25,7 +25,7 @@
 #include "precompute/mesher/tet_quality.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/mesher/verify.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 namespace {

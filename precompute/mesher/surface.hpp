@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "precompute/mesh/tet_mesh.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "precompute/mesher/triangle_surface.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
 

@@ -10,8 +10,6 @@
 
 namespace carillon::mesher {
 
-double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
-
 Box calc_box(const std::vector<Vec3>& points) {
   constexpr double kHuge = std::numeric_limits<double>::max();
   Box box{{kHuge, kHuge, kHuge}, {-kHuge, -kHuge, -kHuge}};

@@ -15,7 +15,6 @@ namespace carillon::mesher {
 struct SurfaceReport;  // of surface.hpp, which the slow CGAL files need not see
 struct SurfaceOptions;
 
-using mesh::Vec3;
 using Triangle = std::array<std::int32_t, 3>;
 using Polyline = std::vector<Vec3>;
 
@@ -23,15 +22,6 @@ struct TriangleSurface {
   std::vector<Vec3> points;         // (P)
   std::vector<Triangle> triangles;  // (T), counter-clockwise seen from outside once repaired
 };
-
-inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-inline Vec3 operator*(double s, const Vec3& a) { return {s * a[0], s * a[1], s * a[2]}; }
-inline double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double norm(const Vec3& a);
 
 /// The corners of the axis-aligned box around some points: lowest, highest.
 struct Box {

@@ -7,7 +7,7 @@
 
 #include "precompute/petsc/blas_kernels.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::petsc {
 namespace {

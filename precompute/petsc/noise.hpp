@@ -3,11 +3,11 @@
 
 #include <cstdint>
 
-#include "runtime/config/chance.hpp"
+#include "runtime/base/chance.hpp"
 
 namespace carillon::petsc {
 
-using config::scramble;
+using base::scramble;
 
 /// In [-1/2, 1/2), from scrambled bits.
 constexpr double to_noise(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1.0p-53 - 0.5; }

@@ -69,9 +69,6 @@ PetscInt to_petsc_int(std::int64_t value);
 /// Gives the memory of the whole pages between two addresses back to the system; what is read there afterwards is zero. Local.
 void give_back_pages(void* begin, void* end);
 
-/// Highest resident memory of this process so far [byte]. Local.
-std::int64_t get_peak_memory_bytes();
-
 /// Starts the program again, once, with OPENBLAS_CORETYPE set, when OpenBLAS took kernels for older instructions than this processor has:
 /// its releases know the processors of their day by number, and every later one is a Pentium 4 to them. Call it first in main, before MPI
 /// starts; returns where nothing is to be corrected: the kernels fit, the user has set OPENBLAS_CORETYPE, or the BLAS is another. Local.

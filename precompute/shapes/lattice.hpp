@@ -10,8 +10,6 @@
 
 namespace carillon::shapes {
 
-using mesh::Vec3;
-
 /// A Cartesian lattice of cells, cut into tetrahedra.
 struct Lattice {
   std::array<int, 3> cells{1, 1, 1};

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <set>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::shapes {
 namespace {

@@ -10,7 +10,7 @@
 #include <set>
 
 #include "precompute/shapes/plan.hpp"
-#include "runtime/config/document.hpp"
+#include "runtime/base/document.hpp"
 
 namespace carillon::shapes {
 namespace {
@@ -29,7 +29,7 @@ std::vector<std::string> list_names(const Shape& shape) {
 
 // "; did you mean 'x'?" or the list of what there is.
 std::string suggest(std::string_view word, const std::vector<std::string>& known) {
-  const std::string nearest = config::find_nearest(word, known);
+  const std::string nearest = base::find_nearest(word, known);
   if (!nearest.empty()) return fmt::format("did you mean '{}'? (known: {})", nearest, fmt::join(known, ", "));
   return fmt::format("known: {}", fmt::join(known, ", "));
 }

@@ -17,12 +17,11 @@
 
 #include "precompute/shapes/lattice.hpp"
 #include "precompute/shapes/plan.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::shapes {
 namespace {
 
-double norm(const Vec3& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
-Vec3 scale(const Vec3& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
 double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) {
   return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
@@ -89,7 +88,7 @@ class Core {
         for (int axis = 0; axis < 3; ++axis) sum[axis] += weights[i] * solid_.vertices[face[i]][axis];
       }
       const int level = weights[0] + weights[1] + weights[2];
-      mesh.nodes.push_back(level == 0 ? Vec3{} : scale(sum, radius_ * level / frequency_ / norm(sum)));
+      mesh.nodes.push_back(level == 0 ? Vec3{} : ((radius_ * level / frequency_ / norm(sum)) * sum));
     }
     return entry->second;
   }
@@ -124,7 +123,7 @@ mesh::TetMesh make_ball(double radius, int sides, int frequency, int levels, int
     std::vector<std::int32_t> above;
     for (std::int32_t node : skin_nodes) {
       above.push_back(static_cast<std::int32_t>(mesh.nodes.size()));
-      mesh.nodes.push_back(scale(mesh.nodes[node], static_cast<double>(level) / frequency));
+      mesh.nodes.push_back((static_cast<double>(level) / frequency) * mesh.nodes[node]);
     }
     for (const auto& triangle : core.skin) {
       std::array<std::int32_t, 3> bottom{}, top{};
@@ -136,7 +135,7 @@ mesh::TetMesh make_ball(double radius, int sides, int frequency, int levels, int
     }
     below = std::move(above);
   }
-  for (std::int32_t node : below) mesh.nodes[node] = scale(mesh.nodes[node], radius / norm(mesh.nodes[node]));
+  for (std::int32_t node : below) mesh.nodes[node] = (radius / norm(mesh.nodes[node])) * mesh.nodes[node];
   mesh.node_sets["surface"] = below;
   if (order == 2) {
     raise_order(mesh, [&](std::int32_t a, std::int32_t b) {
@@ -145,7 +144,7 @@ mesh::TetMesh make_ball(double radius, int sides, int frequency, int levels, int
       const double fraction = mean / radius;
       const double bulge = mean / norm(straight) - 1.0;
       const double weight = fraction > 1.0 - 1e-9 ? 1.0 : fraction * fraction;
-      return scale(straight, 1.0 + weight * bulge);
+      return (1.0 + weight * bulge) * straight;
     });
   }
   return mesh;
@@ -239,7 +238,7 @@ mesh::TetMesh make_shell(double outer_radius, double wall, double half_angle, in
       if (layer == 0) mesh.node_sets["inner"].push_back(node);
       if (layer == layers) mesh.node_sets["outer"].push_back(node);
       if (on_rim(node)) mesh.node_sets["rim"].push_back(node);
-      mesh.nodes.push_back(scale(cap.directions[p], radius(layer)));
+      mesh.nodes.push_back(radius(layer) * cap.directions[p]);
     }
   }
   for (int layer = 0; layer < layers; ++layer) {
@@ -254,7 +253,7 @@ mesh::TetMesh make_shell(double outer_radius, double wall, double half_angle, in
       const double across = std::sin(half_angle) / std::hypot(middle[0], middle[1]);
       middle = {middle[0] * across, middle[1] * across, -std::cos(half_angle)};
     }
-    return scale(middle, mean / norm(middle));
+    return (mean / norm(middle)) * middle;
   });
   return mesh;
 }

@@ -10,7 +10,7 @@
 
 #include "precompute/mesh/faces.hpp"
 #include "precompute/slabs/settle.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slabs {
 namespace {

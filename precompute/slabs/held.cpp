@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/document.hpp"
+#include "runtime/base/document.hpp"
 
 namespace carillon::slabs {
 namespace {
@@ -61,7 +61,7 @@ std::int64_t read_held_set(const Source& source, const std::string& name, const 
     names.push_back(array.name);
     if (names.size() <= 20) list += fmt::format("{}'{}'", list.empty() ? "" : ", ", array.name);
   }
-  const std::string nearest = config::find_nearest(*hold.node_set, names);
+  const std::string nearest = base::find_nearest(*hold.node_set, names);
   throw InputError(fmt::format("{}: the mesh has no node set '{}'{}; it has {} (or with a value: '{}:1')", start, *hold.node_set,
                                nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), list, names.front()));
 }

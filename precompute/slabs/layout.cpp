@@ -22,7 +22,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slabs {
 namespace {

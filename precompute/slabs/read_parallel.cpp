@@ -12,7 +12,7 @@
 
 #include "precompute/mesh/check_parts.hpp"
 #include "precompute/slabs/settle.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slabs {
 namespace {

@@ -20,8 +20,6 @@
 
 namespace carillon::slabs {
 
-using mesh::Vec3;
-
 /// Nodes to hold: those of a set, or those in a closed box {low, high}, as mesh::find_fixed_nodes finds them.
 struct Hold {
   std::optional<std::string> node_set = std::nullopt;

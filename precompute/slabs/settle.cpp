@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "precompute/mesh/faces.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slabs {
 namespace {

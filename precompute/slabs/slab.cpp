@@ -15,7 +15,7 @@
 #include "precompute/mesh/read.hpp"
 #include "precompute/slabs/held.hpp"
 #include "precompute/slabs/source.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slabs {
 namespace {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "precompute/slabs/layout.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slabs {
 

@@ -20,8 +20,8 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/nearest.hpp"
-#include "runtime/config/chance.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/chance.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/stream/events.hpp"
 #include "runtime/support/losses.hpp"
@@ -220,7 +220,7 @@ carillon_motion make_default() {
 static_assert(CARILLON_EFFECT_COUNT == synth::kEffectCount && CARILLON_TWO_EARS == 1 << static_cast<int>(synth::Effect::kTwoEars) &&
               CARILLON_ACCELERATION_NOISE == 1 << static_cast<int>(synth::Effect::kAccelerationNoise));
 
-stream::Vec3 to_vector(const double* x) { return {x[0], x[1], x[2]}; }
+carillon::Vec3 to_vector(const double* x) { return {x[0], x[1], x[2]}; }
 stream::Quaternion to_quaternion(const double* x) { return {x[0], x[1], x[2], x[3]}; }
 
 /// For the click of the body; 0, which a body without clicks may have, when the surface has no inside.
@@ -302,7 +302,7 @@ int32_t carillon_bank_vertex_count(const carillon_bank* bank) {
 }
 
 const double* carillon_bank_vertices_m(const carillon_bank* bank) {
-  static_assert(sizeof(bank::Vec3) == 3 * sizeof(double));
+  static_assert(sizeof(carillon::Vec3) == 3 * sizeof(double));
   return bank == nullptr || bank->bank.vertices_m.empty() ? nullptr : bank->bank.vertices_m.front().data();
 }
 
@@ -313,7 +313,7 @@ const int32_t* carillon_bank_triangles(const carillon_bank* bank) {
 
 void carillon_bank_centre_m(const carillon_bank* bank, double centre_m[3]) {
   if (centre_m == nullptr) return;
-  const bank::Vec3 centre = bank == nullptr ? bank::Vec3{} : bank->bank.rigid.centre_m;
+  const carillon::Vec3 centre = bank == nullptr ? carillon::Vec3{} : bank->bank.rigid.centre_m;
   std::copy(centre.begin(), centre.end(), centre_m);
 }
 
@@ -507,7 +507,7 @@ carillon_status carillon_push_force(carillon_synth* synth, const carillon_force*
   // Nothing of it is played unless all of it can be.
   for (int pass = 0; pass < 2; ++pass) {
     for (std::int32_t done = 0; done < ours->count; done += stream::kMostForceSteps) {
-      std::array<stream::Vec3, stream::kMostForceSteps> impulses{};
+      std::array<carillon::Vec3, stream::kMostForceSteps> impulses{};
       const std::int32_t count = std::min(stream::kMostForceSteps, ours->count - done);
       for (std::int32_t k = 0; k < count; ++k) impulses[static_cast<std::size_t>(k)] = to_vector(ours->impulse_n_s[done + k]);
       stream::Force first = piece;
@@ -534,7 +534,7 @@ carillon_status carillon_vary_impulse(const carillon_bank* bank, double variatio
       throw InputError("no strike that can be varied");
     if (variation == 0.0) return;
     synth::vary_strike(
-        bank->bank, [&](const bank::Vec3& point_m) { return bank->get_tree().find(point_m); }, variation, seed, strike, event);
+        bank->bank, [&](const carillon::Vec3& point_m) { return bank->get_tree().find(point_m); }, variation, seed, strike, event);
     ours->triangle = event.triangle;
     ours->duration_s = event.duration_s;
     std::copy(event.barycentric.begin(), event.barycentric.end(), ours->barycentric);
@@ -543,7 +543,7 @@ carillon_status carillon_vary_impulse(const carillon_bank* bank, double variatio
   });
 }
 
-uint64_t carillon_name_seed(const char* name) { return name == nullptr ? 0 : config::hash_name(name); }
+uint64_t carillon_name_seed(const char* name) { return name == nullptr ? 0 : base::hash_name(name); }
 
 carillon_status carillon_push_contact(carillon_synth* synth, const carillon_contact* contact) {
   const auto ours = read(contact);

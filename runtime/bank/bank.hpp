@@ -12,7 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::bank {
 
@@ -22,8 +23,6 @@ inline constexpr int kVersionMinor = 3;
 /// Air, as OCE01 section 4 has it: radiation gains are made with it and sound travels in it.
 inline constexpr double kAirDensityKgM3 = 1.21;
 inline constexpr double kSoundSpeedMs = 343.0;
-
-using Vec3 = std::array<double, 3>;
 
 /// Rigid-body data of the undeformed solid, in the frame of the mesh.
 struct RigidBody {

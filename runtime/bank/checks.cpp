@@ -17,9 +17,9 @@
 #include "runtime/bank/edges.hpp"
 #include "runtime/bank/faults.hpp"
 #include "runtime/bank/surface.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/config/solids.hpp"
-#include "runtime/config/supports.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/material/solids.hpp"
+#include "runtime/material/supports.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -348,13 +348,13 @@ Check check_rigid_body(const Bank& bank) {
 /// What is wrong with the words about the supports; empty when nothing is.
 std::string find_text_fault(const Supports& supports) {
   try {
-    const config::Document document = config::parse_document(supports.text, "supports/text");
-    config::Object root = document.root();
+    const base::Document document = base::parse_document(supports.text, "supports/text");
+    base::Object root = document.root();
     std::size_t count = 0;
-    for (config::Entry& entry : root.entries("supports", supports.count())) {
+    for (base::Entry& entry : root.entries("supports", supports.count())) {
       if (!entry.object) return "supports/text lists what is no object";
       entry.object->string("name");
-      config::read_fixing(*entry.object);
+      material::read_fixing(*entry.object);
       entry.object->finish();
       ++count;
     }
@@ -413,8 +413,8 @@ Check check_material(const Bank& bank) {
     if (value > 0.0 && !(value >= least && value <= most))
       faults.add("{} is {:.3g}, outside the {:.0e} to {:.0e} of any solid", name, value, least, most);
   };
-  expect("young_modulus_pa", m.young_modulus_pa, config::kLeastStiffnessPa, config::kMostStiffnessPa);
-  expect("density_kg_m3", m.density_kg_m3, config::kLeastDensityKgM3, config::kMostDensityKgM3);
+  expect("young_modulus_pa", m.young_modulus_pa, material::kLeastStiffnessPa, material::kMostStiffnessPa);
+  expect("density_kg_m3", m.density_kg_m3, material::kLeastDensityKgM3, material::kMostDensityKgM3);
   expect("alpha1_s", m.alpha1_s, 0.0, kMostAlpha1S);
   expect("alpha2_per_s", m.alpha2_per_s, 0.0, kMostAlpha2PerS);
   return {"material", fmt::format("E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^3", m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3),

@@ -20,9 +20,9 @@
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/report.hpp"
 #include "runtime/bank/write.hpp"
-#include "runtime/config/printable.hpp"
-#include "runtime/config/solids.hpp"
-#include "runtime/config/standard_output.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/standard_output.hpp"
+#include "runtime/material/solids.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
@@ -44,7 +44,7 @@ void check(const std::string& file) {
   }
   std::fflush(stdout);
   if (faults > 0) throw InputError(fmt::format("{}: {} fault{}; compute the bank again", file, faults, faults == 1 ? "" : "s"));
-  fmt::print("{}\n{}\n{}: whole and sane\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), config::printable(file));
+  fmt::print("{}\n{}\n{}: whole and sane\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), base::printable(file));
 }
 
 /// What `carillon-bank edit` does to a bank.
@@ -147,9 +147,9 @@ void check_bank_name(const std::filesystem::path& out) {
 constexpr double kMostAudibleHz = 20000.0;
 
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
-  const bool is_piped = config::is_standard_output(out);
+  const bool is_piped = base::is_standard_output(out);
   if (is_piped)
-    config::check_standard_output("bank");
+    base::check_standard_output("bank");
   else
     check_bank_name(out);
   read_damping(wishes);
@@ -160,11 +160,11 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   bank::Bank bank = bank::read_bank(file);
   const double old_end_hz = bank.band_hz[1];
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
-  if (const auto question = config::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
-    fmt::print(stderr, "carillon-bank: warning: {}\n", config::printable(*question));
+  if (const auto question = material::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
+    fmt::print(stderr, "carillon-bank: warning: {}\n", base::printable(*question));
   if (is_reduced) bank = bank::calc_reduced(bank, wishes.reduction);
   if (is_piped)
-    config::write_standard_output(bank::make_bank_bytes(bank));
+    base::write_standard_output(bank::make_bank_bytes(bank));
   else
     bank::write_bank(bank, out);
   if (bank.band_hz[1] < std::min(old_end_hz, kMostAudibleHz))
@@ -179,7 +179,7 @@ int run(int argc, char** argv) {
   CLI::App app("Looks at a mode bank, and edits it.");
   app.name("carillon-bank");
   app.failure_message(
-      [](const CLI::App* asked, const CLI::Error& error) { return config::printable_lines(CLI::FailureMessage::simple(asked, error)); });
+      [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
   app.require_subcommand(1);
   app.set_version_flag("--version", version::describe("carillon-bank"));
   std::string file;
@@ -211,7 +211,7 @@ int run(int argc, char** argv) {
     edit(file, edited, wishes);
   } else {
     const bank::Bank bank = bank::read_bank(file);
-    fmt::print("{}", json ? bank::format_info_json(bank, file) : config::printable_lines(bank::format_info(bank, file, modes, all)));
+    fmt::print("{}", json ? bank::format_info_json(bank, file) : base::printable_lines(bank::format_info(bank, file, modes, all)));
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;
@@ -219,7 +219,7 @@ int run(int argc, char** argv) {
 
 int fail(const char* what, int code) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-bank: {}\n", config::printable(what));
+  fmt::print(stderr, "carillon-bank: {}\n", base::printable(what));
   return code;
 }
 

@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "runtime/bank/triangle.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -20,14 +21,11 @@ constexpr int kDeepest = 64;            // halving 2^31 triangles takes 31 level
 constexpr double kLeastArea = 1e-14;    // of a triangle: its height over its length, squared
 constexpr double kSlack = 1.0 - 1e-12;  // of a squared distance: more than its rounding
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 subtract(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
 /// How far along (a, b), 0 to 1, the point nearest to p lies.
 double find_along(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 ab = subtract(b, a);
+  const Vec3 ab = b - a;
   const double square = dot(ab, ab);
-  return square > 0.0 ? std::clamp(dot(subtract(p, a), ab) / square, 0.0, 1.0) : 0.0;
+  return square > 0.0 ? std::clamp(dot(p - a, ab) / square, 0.0, 1.0) : 0.0;
 }
 
 /// The same as find_nearest_barycentric() by the three edges alone, for triangles without area.
@@ -60,7 +58,7 @@ void try_triangle(const Bank& bank, std::int32_t triangle, const Vec3& p, double
   const Vec3 weight = find_nearest_barycentric(p, a, b, c);
   Vec3 place{};
   for (std::size_t k = 0; k < 3; ++k) place[k] = weight[0] * a[k] + weight[1] * b[k] + weight[2] * c[k];
-  const Vec3 way = subtract(place, p);
+  const Vec3 way = place - p;
   const double square = dot(way, way);
   if (!(square < least || (square == least && triangle < best.triangle))) return;
   least = square;
@@ -79,12 +77,12 @@ double calc_square(const Vec3& p, const Vec3& low, const Vec3& high) {
 }  // namespace
 
 Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
-  const Vec3 ab = subtract(b, a), ac = subtract(c, a);
+  const Vec3 ab = b - a, ac = c - a;
   // A triangle without area has no regions that rounding leaves standing.
   const double square_ab = dot(ab, ab), square_ac = dot(ac, ac), along = dot(ab, ac);
   if (!(square_ab * square_ac - along * along > kLeastArea * std::max(square_ab, square_ac) * std::max(square_ab, square_ac)))
     return find_on_edges(p, {a, b, c});
-  const Vec3 ap = subtract(p, a), bp = subtract(p, b), cp = subtract(p, c);
+  const Vec3 ap = p - a, bp = p - b, cp = p - c;
   const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
   const Vec3 weight = weigh_corners(d1, d2, d3, d4, d5, d6);
   const bool is_inside = std::all_of(weight.begin(), weight.end(), [](double w) { return w >= 0.0 && w <= 1.0; });
@@ -130,7 +128,7 @@ std::int32_t SurfaceTree::build(std::vector<Vec3>& centres_m, std::int32_t first
   }
   boxes_.push_back(box);
   if (last - first <= kLeaf) return at;
-  const Vec3 extent = subtract(box.high, box.low);
+  const Vec3 extent = box.high - box.low;
   const auto axis = static_cast<std::size_t>(std::max_element(extent.begin(), extent.end()) - extent.begin());
   const std::int32_t middle = first + (last - first) / 2;
   std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last, [&](std::int32_t s, std::int32_t t) {

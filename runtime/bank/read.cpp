@@ -20,6 +20,7 @@
 #include "runtime/bank/large.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/seal.hpp"
+#include "runtime/base/sha256.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -230,7 +231,7 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   targets.push_back({seal.length, 0, nullptr});
 
   constexpr std::uint64_t kPiece = 1 << 18;  // is still in the cache when it is hashed
-  Digest digest;
+  base::Sha256 digest;
   std::vector<std::byte> buffer(std::min(seal.length, kPiece));
   std::uint64_t place = 0;
   const auto take = [&](std::byte* data, std::uint64_t bytes, bool is_shape = false) {
@@ -238,7 +239,7 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
       step = std::min(bytes - done, kPiece);
       const std::span piece(data != nullptr ? data + done : buffer.data(), step);
       read(place, piece);
-      digest.update(piece);
+      digest.add(piece);
       if (!is_shape) continue;
       const auto* steps = reinterpret_cast<const std::int16_t*>(piece.data());
       loaded.bank.shape.insert(loaded.bank.shape.end(), steps, steps + piece.size() / sizeof *steps);
@@ -252,7 +253,7 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
     const bool is_shape = target.bytes > 0 && target.data == reinterpret_cast<std::byte*>(loaded.bank.shape.data());
     take(is_shape ? nullptr : target.data, target.bytes, is_shape);
   }
-  if (digest.finish() != seal.digest) {
+  if (base::to_hex(digest.finish()) != seal.digest) {
     throw InputError(name +
                      ": checksum differs: bytes were changed since the bank was sealed; copy or write the bank again (or, if you changed "
                      "them, seal it again: docs/bank-format.md)");

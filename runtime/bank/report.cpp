@@ -8,7 +8,7 @@
 #include <optional>
 #include <sstream>
 
-#include "runtime/config/printable.hpp"
+#include "runtime/base/printable.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -45,7 +45,7 @@ std::string format_bytes(std::uintmax_t bytes) {
 std::string format_scalar(const std::string& key, const Json::Value& value) {
   if (value.isUInt64() && key.find("bytes") != std::string::npos) return format_bytes(value.asUInt64());
   if (value.isDouble()) return fmt::format("{:.6g}", value.asDouble());
-  if (value.isString()) return config::printable(value.asString());
+  if (value.isString()) return base::printable(value.asString());
   std::string text = value.toStyledString();
   text.erase(std::remove(text.begin(), text.end(), '\n'), text.end());
   return text.size() > 100 ? text.substr(0, 97) + "..." : text;
@@ -68,15 +68,15 @@ void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) 
       value.removeMember("name");
     }
     if (!is_nested(value) || (value.isArray() && is_flat(value))) {
-      text += fmt::format("{}{}: {}\n", indent, config::printable(key), format_scalar(key, value));
+      text += fmt::format("{}{}: {}\n", indent, base::printable(key), format_scalar(key, value));
     } else if (value.isObject() && is_flat(value) && value.size() <= 4) {
       std::string line;
       for (auto member = value.begin(); member != value.end(); ++member) {
-        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", config::printable(member.name()), format_scalar(member.name(), *member));
+        line += fmt::format("{}{} {}", line.empty() ? "" : ", ", base::printable(member.name()), format_scalar(member.name(), *member));
       }
-      text += fmt::format("{}{}: {}\n", indent, config::printable(key), line);
+      text += fmt::format("{}{}: {}\n", indent, base::printable(key), line);
     } else {
-      text += fmt::format("{}{}:\n", indent, config::printable(key));
+      text += fmt::format("{}{}:\n", indent, base::printable(key));
       append_tree(value, depth + 1, text);
     }
   }
@@ -108,7 +108,7 @@ std::string format_modes(const Bank& bank, std::size_t limit) {
 /// "rayleigh: alpha1 1e-07 s, alpha2 5 1/s"
 std::string format_damping(const Bank& bank) {
   const Damping& law = bank.damping;
-  std::string text = config::printable(law.law);
+  std::string text = base::printable(law.law);
   if (law.law == "rayleigh")
     return text + fmt::format(", alpha1 {:.4g} s, alpha2 {:.4g} 1/s", bank.material.alpha1_s, bank.material.alpha2_per_s);
   if (law.law == "internal_friction") return text + fmt::format(", tan(phi) {:.4g}", law.coefficient[0]);
@@ -294,9 +294,9 @@ Check calc_provenance_check(const Bank& bank) {
 }
 
 std::string format_check(const Check& check) {
-  if (check.faults.empty()) return fmt::format("ok      {:<12} {}\n", check.property, config::printable(check.figure));
+  if (check.faults.empty()) return fmt::format("ok      {:<12} {}\n", check.property, base::printable(check.figure));
   std::string text;
-  for (const std::string& fault : check.faults) text += fmt::format("FAULT   {:<12} {}\n", check.property, config::printable(fault));
+  for (const std::string& fault : check.faults) text += fmt::format("FAULT   {:<12} {}\n", check.property, base::printable(fault));
   return text;
 }
 

@@ -1,7 +1,6 @@
 #include "runtime/bank/seal.hpp"
 
 #include <fmt/format.h>
-#include <openssl/evp.h>
 
 #include <algorithm>
 #include <charconv>
@@ -131,28 +130,6 @@ std::string format_seal_text(std::uint64_t length, int minor, const std::map<std
   if (text.size() > kTextBytes) throw InputError("the table of arrays does not fit into the seal of a bank");
   text.resize(kTextBytes, '\n');
   return text;
-}
-
-Digest::Digest() : context_(EVP_MD_CTX_new()) {
-  if (context_ == nullptr || EVP_DigestInit_ex(static_cast<EVP_MD_CTX*>(context_), EVP_sha256(), nullptr) != 1) {
-    EVP_MD_CTX_free(static_cast<EVP_MD_CTX*>(context_));
-    throw SystemError("OpenSSL offers no SHA-256");
-  }
-}
-
-Digest::~Digest() { EVP_MD_CTX_free(static_cast<EVP_MD_CTX*>(context_)); }
-
-void Digest::update(std::span<const std::byte> bytes) {
-  if (EVP_DigestUpdate(static_cast<EVP_MD_CTX*>(context_), bytes.data(), bytes.size()) != 1) throw SystemError("SHA-256 failed");
-}
-
-std::string Digest::finish() {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
-  unsigned size = 0;
-  if (EVP_DigestFinal_ex(static_cast<EVP_MD_CTX*>(context_), hash.data(), &size) != 1) throw SystemError("SHA-256 failed");
-  std::string hex;
-  for (unsigned i = 0; i < size; ++i) hex += fmt::format("{:02x}", hash[i]);
-  return hex;
 }
 
 }  // namespace carillon::bank

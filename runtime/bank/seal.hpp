@@ -41,19 +41,4 @@ Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& 
 /// The text of a seal, kTextBytes long, for a file of `length` bytes and a minor version. InputError when the table does not fit.
 std::string format_seal_text(std::uint64_t length, int minor, const std::map<std::string, Extent>& extents);
 
-/// SHA-256 over pieces (OpenSSL).
-class Digest {
- public:
-  Digest();
-  ~Digest();
-  Digest(const Digest&) = delete;
-  Digest& operator=(const Digest&) = delete;
-  void update(std::span<const std::byte> bytes);
-  /// 64 lower-case hexadecimal digits. Once only.
-  std::string finish();
-
- private:
-  void* context_ = nullptr;
-};
-
 }  // namespace carillon::bank

@@ -1,5 +1,5 @@
 // Writing banks so that at every moment the name holds either the old bank or the new one, whole.
-// Method: the bytes are made and sealed in memory; config::write_file gives them the name in one step.
+// Method: the bytes are made and sealed in memory; base::write_file gives them the name in one step.
 #include "runtime/bank/write.hpp"
 
 #include <fmt/format.h>
@@ -10,7 +10,8 @@
 #include "runtime/bank/hdf5_image.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/seal.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/sha256.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -64,10 +65,10 @@ void use_bytes(const Bank& bank, Use&& use) {
   const std::span<std::byte> bytes = image.bytes;
   const std::string text = format_seal_text(bytes.size(), find_version_minor(bank), image.extents);
   std::memcpy(bytes.data(), text.data(), kTextBytes);
-  Digest digest;
-  digest.update(bytes.first(kTextBytes));
-  digest.update(bytes.subspan(kSealBytes));
-  std::memcpy(bytes.data() + kTextBytes, digest.finish().data(), kDigestBytes);
+  base::Sha256 digest;
+  digest.add(bytes.first(kTextBytes));
+  digest.add(bytes.subspan(kSealBytes));
+  std::memcpy(bytes.data() + kTextBytes, base::to_hex(digest.finish()).data(), kDigestBytes);
 
   use(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
@@ -77,7 +78,7 @@ void use_bytes(const Bank& bank, Use&& use) {
 void write_bank(const Bank& bank, const fs::path& file) {
   check_faults(bank, file.string());
   const fs::path target = resolve_target(file);
-  use_bytes(bank, [&](std::string_view bytes) { config::write_file(target, bytes); });
+  use_bytes(bank, [&](std::string_view bytes) { base::write_file(target, bytes); });
 }
 
 std::string make_bank_bytes(const Bank& bank) {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/rigid/groups.hpp"
 
 namespace carillon::contact {
@@ -91,7 +91,7 @@ void check_joints(const WorldSpec& spec) {
         joint.kind == joints::Kind::kHinge || joint.kind == joints::Kind::kSlider || joint.kind == joints::Kind::kUniversal;
     if (has_axis && !(std::abs(length(joint.axis) - 1.0) < 1e-6)) throw InputError(who + ": its axis is not of length 1");
     if (joint.kind == joints::Kind::kUniversal &&
-        !(std::abs(length(joint.second_axis) - 1.0) < 1e-6 && std::abs(impact::dot(joint.axis, joint.second_axis)) < 1e-6))
+        !(std::abs(length(joint.second_axis) - 1.0) < 1e-6 && std::abs(dot(joint.axis, joint.second_axis)) < 1e-6))
       throw InputError(who + ": its second axis is not of length 1 and at right angles to the first");
     if (!(joint.damping >= 0.0 && std::isfinite(joint.damping)))
       throw InputError(fmt::format("{}: damping {} must be a finite number, 0 or more", who, joint.damping));

@@ -11,7 +11,6 @@
 namespace carillon::contact {
 
 using stream::Impulse;
-using stream::Vec3;
 
 /// A rigid pose: x_world = R(q) x_body + p.
 struct Pose {

@@ -10,18 +10,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/config/chance.hpp"
+#include "runtime/base/chance.hpp"
 #include "runtime/impact/spring.hpp"
 
 namespace carillon::contact {
 namespace {
-
-using impact::dot;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
-using rigid::norm;
-using stream::Vec3;
 
 constexpr double kInstant = 1e-8;     // s; shorter than any step, longer than what a step may leave out at its end
 constexpr double kPatience = 5e-3;    // s
@@ -34,7 +27,7 @@ constexpr double kRollingSpin = 1.0;  // rad/s; slower, what sways stays where i
 constexpr double kSharpest = 5e-4;    // m; radius of an edge that the mesh has sharp
 constexpr double kSticks = 1e-6;      // m/s; what is slower than this does not slip
 
-std::uint64_t scramble(std::uint64_t state) { return config::draw(state); }
+std::uint64_t scramble(std::uint64_t state) { return base::draw(state); }
 
 }  // namespace
 
@@ -44,7 +37,7 @@ double calc_spot_radius(const rigid::Space& space, int a, int b) {
 }
 
 Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const Vec3& where, const Vec3& outward, std::int32_t hint) {
-  const rigid::Mat3 back = rigid::transpose(rigid::make_rotation(state.rotation));
+  const Mat3 back = transpose(rigid::make_rotation(state.rotation));
   const shape::Place place = solid.shape->find_place(solid.centre_m + back * (where - state.centre), back * outward, hint);
   return {place.triangle, place.barycentric};
 }
@@ -135,7 +128,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     if (body < 0) continue;
     const double sign = side == 0 ? 1.0 : -1.0;
     const rigid::State& state = space.state(body);
-    const rigid::Mat3 back = rigid::transpose(rigid::make_rotation(state.rotation));
+    const Mat3 back = transpose(rigid::make_rotation(state.rotation));
     const Spotted place =
         find_place(space.solid(body), state, g.where, (-sign) * g.normal, is_new ? -1 : spot.last[static_cast<std::size_t>(side)].triangle);
     stream::Contact c;
@@ -160,7 +153,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
 }
 
 /// 0 for the ground.
-std::uint64_t LastingContacts::hash_name(int body) const { return body < 0 ? 0 : config::hash_name(get_matter(body).name); }
+std::uint64_t LastingContacts::hash_name(int body) const { return body < 0 ? 0 : base::hash_name(get_matter(body).name); }
 
 /// Of the names of the pair and the number of the touch among theirs: other bodies of the scene change nothing of it, nor does their order.
 std::uint64_t LastingContacts::make_id(const Spot& spot) {

@@ -26,10 +26,9 @@ double calc_spot_radius(const rigid::Space& space, int a, int b);
 /// The place of a point of the world on a body's bank; `hint`: a triangle that may be it.
 struct Spotted {
   std::int32_t triangle = 0;
-  stream::Vec3 barycentric{};
+  Vec3 barycentric{};
 };
-Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const stream::Vec3& where, const stream::Vec3& outward,
-                   std::int32_t hint = -1);
+Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const Vec3& where, const Vec3& outward, std::int32_t hint = -1);
 
 class LastingContacts {
  public:
@@ -39,14 +38,14 @@ class LastingContacts {
   /// After a step: what touches now. Appends events.
   void update(const rigid::Space& space, std::vector<stream::Event>& events);
   /// An impact at a place: what follows there is no lasting contact for the next moments.
-  void note_impact(const rigid::Space& space, int a, int b, const stream::Vec3& where, double time_s);
+  void note_impact(const rigid::Space& space, int a, int b, const Vec3& where, double time_s);
 
  private:
   /// What touches at one place now.
   struct Group {
     int a = 0, b = -1;
-    stream::Vec3 where{}, normal{}, turn{};
-    stream::Vec3 carried{};  // the velocity of the surface whose points carry
+    Vec3 where{}, normal{}, turn{};
+    Vec3 carried{};  // the velocity of the surface whose points carry
     double push_n = 0.0, curvature_per_m = 0.0;
     bool smooth = false;
     std::uint64_t features = 0;  // tells which of them carry
@@ -55,8 +54,8 @@ class LastingContacts {
   struct Spot {
     std::uint64_t id = 0;  // of the contact, from its first record on
     int a = 0, b = -1;
-    stream::Vec3 where{};
-    stream::Vec3 drift{};        // velocity of the place over the surface that carries, smoothed
+    Vec3 where{};
+    Vec3 drift{};                // velocity of the place over the surface that carries, smoothed
     std::uint64_t features = 0;  // which points carry there
     double quiet_s = 0.0;        // time of the first touch, or of the last impact since
     double seen_s = 0.0;         // when it last touched

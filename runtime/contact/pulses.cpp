@@ -13,14 +13,7 @@
 namespace carillon::contact {
 namespace {
 
-using impact::cross;
-using impact::dot;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
 using rigid::kSlowest;
-using rigid::norm;
-using stream::Vec3;
 
 constexpr double kMasked = 0.01;    // of the largest impulse of the same instant: 40 dB below it
 constexpr double kHidden = 0.005;   // of an impulse of the same body before: 46 dB below it
@@ -87,7 +80,7 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
     pulse.other = side == 0 ? first.b : first.a;
     pulse.triangle = place.triangle;
     pulse.barycentric = place.barycentric;
-    pulse.impulse_n_s = rigid::transpose(rigid::make_rotation(state.rotation)) * (sign * impulse);
+    pulse.impulse_n_s = transpose(rigid::make_rotation(state.rotation)) * (sign * impulse);
     events.push_back(pulse);
   }
 }

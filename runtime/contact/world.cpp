@@ -10,8 +10,8 @@
 #include <utility>
 #include <variant>
 
-#include "runtime/config/cpu_clock.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/contact/check.hpp"
 #include "runtime/contact/lasting.hpp"
 #include "runtime/contact/mode_sets.hpp"
@@ -22,7 +22,7 @@
 namespace carillon::contact {
 namespace {
 
-rigid::Mat3 to_matrix(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
+Mat3 to_matrix(const std::array<double, 9>& m) { return {Vec3{m[0], m[1], m[2]}, Vec3{m[3], m[4], m[5]}, Vec3{m[6], m[7], m[8]}}; }
 
 /// Bodies of one bank share their shape.
 using Shapes = std::map<const bank::Bank*, std::shared_ptr<const shape::Shape>>;
@@ -43,7 +43,7 @@ rigid::Solid make_solid(const BodySpec& b, Shapes& shapes) {
   solid.centre_m = b.bank->rigid.centre_m;
   if (!b.fixed) {
     solid.inertia_kg_m2 = to_matrix(b.bank->rigid.inertia_kg_m2);
-    solid.inverse_inertia = impact::calc_inverse(solid.inertia_kg_m2);
+    solid.inverse_inertia = calc_inverse(solid.inertia_kg_m2);
   }
   for (const Vec3& v : b.bank->vertices_m)
     solid.radius_m = std::max(solid.radius_m, std::hypot(v[0] - solid.centre_m[0], v[1] - solid.centre_m[1], v[2] - solid.centre_m[2]));
@@ -61,14 +61,12 @@ void add_modes(rigid::Solid& solid, const bank::Bank& bank, ModeSets& sets) {
 }
 
 rigid::State make_state(const BodySpec& b, const rigid::Solid& solid) {
-  using rigid::operator*;
-  using impact::operator+;
   rigid::State state;
   state.rotation = rigid::normalise(b.initial.rotation);
-  const rigid::Mat3 rotation = rigid::make_rotation(state.rotation);
+  const Mat3 rotation = rigid::make_rotation(state.rotation);
   state.centre = b.initial.position_m + rotation * solid.centre_m;
   state.velocity = b.velocity_m_s;
-  if (!b.fixed) state.momentum = rotation * (solid.inertia_kg_m2 * (impact::transpose(rotation) * b.angular_velocity_rad_s));
+  if (!b.fixed) state.momentum = rotation * (solid.inertia_kg_m2 * (transpose(rotation) * b.angular_velocity_rad_s));
   return state;
 }
 
@@ -83,18 +81,16 @@ std::vector<Matter> list_matter(const WorldSpec& spec) {
 
 /// The stops of a joint: one at each end of its way.
 void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states, rigid::Links& links) {
-  using impact::operator-;
-  using rigid::operator*;
   const bool turned = solids[static_cast<std::size_t>(j.body)].fixed;  // what moves comes first
   const int a = turned ? j.to : j.body, b = turned ? j.body : j.to;
   const auto get_turn = [&](int body) {
-    return body < 0 ? rigid::Mat3{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}
-                    : rigid::transpose(rigid::make_rotation(states[static_cast<std::size_t>(body)].rotation));
+    return body < 0 ? Mat3{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}
+                    : transpose(rigid::make_rotation(states[static_cast<std::size_t>(body)].rotation));
   };
   const auto get_place = [&](int body) {
     return body < 0 ? j.at_m : get_turn(body) * (j.at_m - states[static_cast<std::size_t>(body)].centre);
   };
-  const Vec3 lever = impact::find_across(j.axis);
+  const Vec3 lever = find_across(j.axis);
   double arm = solids[static_cast<std::size_t>(a)].radius_m;
   if (b >= 0 && !solids[static_cast<std::size_t>(b)].fixed) arm = std::min(arm, solids[static_cast<std::size_t>(b)].radius_m);
   for (const bool is_lower : {true, false}) {
@@ -109,8 +105,6 @@ void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, cons
 }
 
 rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& solids, const std::vector<rigid::State>& states) {
-  using impact::operator-;
-  using rigid::operator*;
   rigid::Links links;
   for (const JointSpec& j : spec.joints) {
     links.joints.push_back({j.kind, j.body, j.to, j.at_m, j.axis, j.second_axis, j.damping});
@@ -120,7 +114,7 @@ rigid::Links make_links(const WorldSpec& spec, const std::vector<rigid::Solid>& 
     const auto tie = [&](int body, const Vec3& where) {
       if (body < 0) return where;
       const rigid::State& state = states[static_cast<std::size_t>(body)];
-      return rigid::transpose(rigid::make_rotation(state.rotation)) * (where - state.centre);
+      return transpose(rigid::make_rotation(state.rotation)) * (where - state.centre);
     };
     rigid::Cord cord;
     // What moves comes first.
@@ -192,16 +186,16 @@ class World::Course {
     prepare_shapes(spec.ground.has_value());
     if (!options_.audits_energy) return;
     for (int i = 0; i < count(); ++i)
-      if (!space_.solid(i).fixed) energy_.weight_n += space_.solid(i).mass_kg * impact::norm(spec.gravity_m_s2);
+      if (!space_.solid(i).fixed) energy_.weight_n += space_.solid(i).mass_kg * norm(spec.gravity_m_s2);
   }
 
   double advance(double until_s, double cpu_s, const Sink& sink) {
-    const double started_s = config::get_thread_cpu_s();
+    const double started_s = base::get_thread_cpu_s();
     while (!begun_ || (until_s - reached_s_ > kShortest && !is_over())) {
       step(sink);
-      if (std::isfinite(cpu_s) && config::get_thread_cpu_s() - started_s >= cpu_s) break;
+      if (std::isfinite(cpu_s) && base::get_thread_cpu_s() - started_s >= cpu_s) break;
     }
-    seconds_cpu_ += config::get_thread_cpu_s() - started_s;
+    seconds_cpu_ += base::get_thread_cpu_s() - started_s;
     return reached_s_;
   }
 
@@ -288,8 +282,8 @@ class World::Course {
       const std::vector<Vec3>& impulses = side == 0 ? forces.on_a : forces.on_b;
       if (masks_) {
         Vec3 given{};
-        for (const Vec3& impulse : impulses) given = impact::operator+(given, impulse);
-        masks_->take(body, forces.time_s, rigid::norm(given), forces.step_s * static_cast<double>(impulses.size()));
+        for (const Vec3& impulse : impulses) given = given + impulse;
+        masks_->take(body, forces.time_s, norm(given), forces.step_s * static_cast<double>(impulses.size()));
       }
       stream::Force first;
       first.time_s = forces.time_s;
@@ -434,16 +428,14 @@ double World::advance(double until_s, double cpu_s, const Sink& sink) { return c
 Statistics World::get_statistics() const { return course_->get_statistics(); }
 
 std::vector<std::string> ask_about_links(const WorldSpec& spec) {
-  using impact::operator-;
-  using rigid::operator*;
   constexpr double kFar = 30.0;  // radii of a body
   std::vector<std::string> questions;
   const auto calc_distance = [&](int body, const Vec3& where, double& radius) {
     const BodySpec& b = spec.bodies[static_cast<std::size_t>(body)];
     radius = 0.0;
-    for (const Vec3& v : b.bank->vertices_m) radius = std::max(radius, rigid::norm(v - b.bank->rigid.centre_m));
-    const rigid::Mat3 rotation = rigid::make_rotation(rigid::normalise(b.initial.rotation));
-    return rigid::norm(where - b.initial.position_m - rotation * b.bank->rigid.centre_m);
+    for (const Vec3& v : b.bank->vertices_m) radius = std::max(radius, norm(v - b.bank->rigid.centre_m));
+    const Mat3 rotation = rigid::make_rotation(rigid::normalise(b.initial.rotation));
+    return norm(where - b.initial.position_m - rotation * b.bank->rigid.centre_m);
   };
   const auto name = [&](int body) { return spec.bodies[static_cast<std::size_t>(body)].name; };
   for (const JointSpec& joint : spec.joints) {
@@ -477,7 +469,7 @@ std::vector<std::string> ask_about_links(const WorldSpec& spec) {
 Pose calc_pose(const stream::Motion& motion, const Vec3& c) {
   const auto& q = motion.rotation;
   const Vec3 u{q[1], q[2], q[3]};
-  const Vec3 t = impact::cross(u, c), s = impact::cross(u, t);
+  const Vec3 t = cross(u, c), s = cross(u, t);
   Pose pose{motion.time_s, motion.position_m, q};
   for (std::size_t k = 0; k < 3; ++k) pose.position_m[k] -= c[k] + 2.0 * (q[0] * t[k] + s[k]);
   return pose;

@@ -205,7 +205,7 @@ contact::WorldSpec make_world(const Scene& scene) {
   return spec;
 }
 
-Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, config::Spool spool) {
+Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, base::Spool spool) {
   Course course{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
   std::vector<const bank::Bank*> banks;
   for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
@@ -230,7 +230,7 @@ Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::f
   return course;
 }
 
-Course read_course(const std::filesystem::path& file, const Scene& scene, config::Spool spool) {
+Course read_course(const std::filesystem::path& file, const Scene& scene, base::Spool spool) {
   Course course{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
   (void)stream::read_recording(
       file, [&](const stream::Event& event) { course.events.append(event); },

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/config/spool.hpp"
+#include "runtime/base/spool.hpp"
 #include "runtime/host/mallets.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/stream/file.hpp"
@@ -16,7 +16,7 @@
 namespace carillon::host {
 
 /// What happens, in order of time, however much it is.
-using Events = config::Records<stream::Event>;
+using Events = base::Records<stream::Event>;
 
 /// A list as events, for scenes that are made by hand.
 Events make_events(const std::vector<stream::Event>& events);
@@ -53,11 +53,11 @@ contact::WorldSpec make_world(const Scene& scene);
 /// that last; `audits`: with the books of energy. `progress` (may be empty) is called with the finished fraction. `spool` takes the events.
 /// Throws InputError and SolveError, which name the scene.
 Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress,
-                config::Spool spool = config::Spool());
+                base::Spool spool = base::Spool());
 
 /// The events of a contacts file. Throws InputError when it is none, or was made for other bodies than the scene's: as many, of the same
 /// names, with the same surface in their banks, in the same order. A file that does not say which surfaces it was made for is compared by
 /// their numbers of triangles, with a warning.
-Course read_course(const std::filesystem::path& file, const Scene& scene, config::Spool spool = config::Spool());
+Course read_course(const std::filesystem::path& file, const Scene& scene, base::Spool spool = base::Spool());
 
 }  // namespace carillon::host

@@ -6,8 +6,8 @@
 #include <exception>
 #include <new>
 
-#include "runtime/config/error.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/host/program.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/version/version.hpp"
@@ -15,7 +15,7 @@
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-render: {}\n", carillon::config::printable(message));
+  fmt::print(stderr, "carillon-render: {}\n", carillon::base::printable(message));
   return code;
 }
 
@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
   carillon::host::ProgramOptions options;
   CLI::App app("Simulates a scene of falling bodies and renders what two ears or microphones hear.", "carillon-render");
   app.failure_message([](const CLI::App* asked, const CLI::Error& error) {
-    return carillon::config::printable_lines(CLI::FailureMessage::simple(asked, error));
+    return carillon::base::printable_lines(CLI::FailureMessage::simple(asked, error));
   });
   app.add_option("scene", options.scene, "Scene file (JSON)")->required()->option_text("SCENE.json");
   auto* output =

@@ -15,17 +15,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/impact/predict.hpp"
 
 namespace carillon::host {
 namespace {
-
-using impact::operator*;
-using impact::operator-;
-using impact::cross;
-using impact::dot;
-using impact::norm;
 
 constexpr double kLongestS = 1.0;      // of one blow, and of what overlaps with it
 constexpr double kLeastCosine = 0.05;  // of the way to the surface: flatter is past it
@@ -45,7 +39,7 @@ Spot find_spot(const bank::Bank& bank, std::int32_t triangle, const Vec3& baryce
   for (std::size_t c = 0; c < 3; ++c) at[c] = bank.vertices_m[static_cast<std::size_t>(corners[c])];
   Spot spot;
   const Vec3 across = cross(at[1] - at[0], at[2] - at[0]);
-  if (norm(across) > 0.0) spot.normal = impact::normalise(across);
+  if (norm(across) > 0.0) spot.normal = normalise(across);
   for (std::size_t c = 0; c < 3; ++c)
     for (std::size_t k = 0; k < 3; ++k) spot.where_m[k] += barycentric[c] * at[c][k];
   spot.shape = bank::calc_shapes(bank, triangle, barycentric);

@@ -4,14 +4,14 @@
 #include <limits>
 #include <optional>
 
-#include "runtime/config/chance.hpp"
+#include "runtime/base/chance.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/synth/pulse.hpp"
 
 namespace carillon::host {
 
 synth::Surface make_surface(const SceneBody& body) {
-  return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = config::hash_name(body.name)};
+  return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = base::hash_name(body.name)};
 }
 
 synth::Surface make_ground(const Scene& scene) {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "runtime/config/spool.hpp"
+#include "runtime/base/spool.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/scene.hpp"
@@ -33,7 +33,7 @@ struct PlanStep {
 struct Plan {
   plan::SceneFacts facts;
   plan::Planner planner;
-  config::Records<PlanStep> steps{};    // in order of time; the first of every body at 0
+  base::Records<PlanStep> steps{};      // in order of time; the first of every body at 0
   std::vector<plan::Change> changes{};  // the same with reasons, as many as a report lists
 };
 inline constexpr std::size_t kMostReported = 10000;  // switches of effects

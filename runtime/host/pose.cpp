@@ -5,10 +5,10 @@
 
 namespace carillon::host {
 
-contact::Vec3 calc_world_point(const contact::Pose& pose, const contact::Vec3& x) {
+Vec3 calc_world_point(const contact::Pose& pose, const Vec3& x) {
   const auto [w, a, b, c] = pose.rotation;
   // x + 2 w (v cross x) + 2 v cross (v cross x), v = (a, b, c).
-  const contact::Vec3 t{2.0 * (b * x[2] - c * x[1]), 2.0 * (c * x[0] - a * x[2]), 2.0 * (a * x[1] - b * x[0])};
+  const Vec3 t{2.0 * (b * x[2] - c * x[1]), 2.0 * (c * x[0] - a * x[2]), 2.0 * (a * x[1] - b * x[0])};
   return {pose.position_m[0] + x[0] + w * t[0] + b * t[2] - c * t[1], pose.position_m[1] + x[1] + w * t[1] + c * t[0] - a * t[2],
           pose.position_m[2] + x[2] + w * t[2] + a * t[1] - b * t[0]};
 }

@@ -10,7 +10,7 @@
 namespace carillon::host {
 
 /// x_world = R(q) x_body + p.
-contact::Vec3 calc_world_point(const contact::Pose& pose, const contact::Vec3& body_m);
+Vec3 calc_world_point(const contact::Pose& pose, const Vec3& body_m);
 
 /// The pose at a time, between its neighbours: position on a straight line, rotation along the shorter way, renormalised.
 /// `poses` in order of time, not empty; before the first and after the last the body rests.

@@ -12,9 +12,10 @@
 #include <ctime>
 #include <memory>
 
-#include "runtime/config/file.hpp"
-#include "runtime/config/printable.hpp"
-#include "runtime/config/standard_output.hpp"
+#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/standard_output.hpp"
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
@@ -58,7 +59,7 @@ class Progress {
   int next_ = 0;
 };
 
-using config::is_standard_output;
+using base::is_standard_output;
 
 /// Where what the sound is made of waits until it is written.
 fs::path find_spool_folder(const fs::path& wav) {
@@ -75,7 +76,7 @@ void check_room(const Scene& scene, const fs::path& wav) {
   std::error_code error;
   const fs::path folder = is_standard_output(wav) ? fs::temp_directory_path(error) : find_spool_folder(wav);
   const fs::space_info space = fs::space(folder, error);
-  if (error || kept <= static_cast<double>(config::Spool::kMemory) || static_cast<double>(space.available) >= kept + whole) return;
+  if (error || kept <= static_cast<double>(base::Spool::kMemory) || static_cast<double>(space.available) >= kept + whole) return;
   throw SystemError(
       fmt::format("{}: {:.3g} GB are free, and the sound needs {:.3g} GB: {:.3g} GB for the WAV file and {:.3g} GB while it is "
                   "made; make room or choose another place",
@@ -85,21 +86,21 @@ void check_room(const Scene& scene, const fs::path& wav) {
 /// Files that appear together, when all of them are whole.
 class Outputs {
  public:
-  config::WholeFile& add(const fs::path& file, const char* what) {
-    files_.push_back({std::make_unique<config::WholeFile>(file), what, file});
+  base::WholeFile& add(const fs::path& file, const char* what) {
+    files_.push_back({std::make_unique<base::WholeFile>(file), what, file});
     return *files_.back().file;
   }
   /// `notes`: where each is named; may be null.
   void commit(std::FILE* notes) {
     for (const Output& output : files_) {
       output.file->commit();
-      if (notes != nullptr) fmt::print(notes, "{:<18} {}\n", output.what, config::printable(output.path.string()));
+      if (notes != nullptr) fmt::print(notes, "{:<18} {}\n", output.what, base::printable(output.path.string()));
     }
   }
 
  private:
   struct Output {
-    std::unique_ptr<config::WholeFile> file;
+    std::unique_ptr<base::WholeFile> file;
     const char* what;
     fs::path path;
   };
@@ -137,7 +138,7 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
         throw InputError(fmt::format("{}: the {} would overwrite the {}; give it another name", file.string(), what, name));
       }
     }
-    config::check_writable(file, what);
+    base::check_writable(file, what);
     taken.emplace_back(file, what);
   }
   if (!options.plan) check_sound_name(options.wav);
@@ -149,17 +150,17 @@ void print_bands(std::FILE* notes, const Scene& scene, double rate_hz) {
     const double end_hz = body.spec.bank->band_hz[1];
     if (end_hz < std::min(kMostAudibleHz, 0.5 * rate_hz))
       fmt::print(notes, "  {:<16} nothing above {:.5g} Hz, where its bank ends; compute one with a higher \"band_hz\" to hear more\n",
-                 config::printable(body.name), end_hz);
+                 base::printable(body.name), end_hz);
   }
 }
 
 void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, const Figures& figures) {
   fmt::print(notes, "bodies             {}\n", figures.bodies);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    fmt::print(notes, "  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", config::printable(scene.bodies[i].name), sound.body_modes[i],
+    fmt::print(notes, "  {:<16} {} modes, {}peak {:.3g} Pa at 1 m\n", base::printable(scene.bodies[i].name), sound.body_modes[i],
                scene.bodies[i].spec.fixed ? "fixed, " : "", sound.body_peak_pa[i]);
     if (const std::string& text = scene.bodies[i].mounting.text; !text.empty())
-      fmt::print(notes, "  {:<16} {}\n", "", config::printable(text));
+      fmt::print(notes, "  {:<16} {}\n", "", base::printable(text));
     if (const std::string text = describe_limited(scene.bodies[i]); !text.empty()) fmt::print(notes, "  {:<16} {}\n", "", text);
   }
   print_bands(notes, scene, sound.rate_hz);
@@ -172,7 +173,7 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
   for (std::size_t i = 0; i < std::min(figures.blows.size(), kMostPrinted); ++i) {
     const Blow& blow = figures.blows[i];
     fmt::print(notes, "mallet             at {:g} s on {}: {:.3g} ms, {:.3g} N s, {:.3g} N at most, leaves with {:.2g} of its speed\n",
-               blow.time_s, config::printable(blow.body), 1e3 * blow.contact_s, blow.impulse_n_s, blow.peak_n, blow.restitution);
+               blow.time_s, base::printable(blow.body), 1e3 * blow.contact_s, blow.impulse_n_s, blow.peak_n, blow.restitution);
   }
   if (figures.blows.size() > kMostPrinted)
     fmt::print(notes, "mallet             and {} more (--report)\n", figures.blows.size() - kMostPrinted);
@@ -231,11 +232,11 @@ void run(const ProgramOptions& options) {
     throw InputError("--plan makes no sound and writes no files; leave the options that name files away");
   }
   const bool to_standard_output = is_standard_output(options.wav);
-  if (to_standard_output) config::check_standard_output("sound");
+  if (to_standard_output) base::check_standard_output("sound");
   std::FILE* notes = to_standard_output ? stderr : stdout;
   check_outputs(options, scene);
   if (!options.plan) check_room(scene, options.wav);
-  const auto make_spool = [&](const char* what) { return config::Spool(find_spool_folder(options.wav), what); };
+  const auto make_spool = [&](const char* what) { return base::Spool(find_spool_folder(options.wav), what); };
   const Banks banks = read_banks(scene);
   plan::SceneFacts facts = make_facts(scene, make_microphones(scene), options.contacts.has_value() || has_physics(scene));
   std::vector<const bank::Bank*> body_banks;
@@ -244,22 +245,22 @@ void run(const ProgramOptions& options) {
   Figures figures;
   figures.bodies = scene.bodies.size();
   auto started = Clock::now();
-  const std::clock_t ticks = std::clock();
+  const double cpu_s = base::get_process_cpu_s();
   const bool has_contacts = options.record.has_value() || plan::Planner(facts).needs_contacts();
   const Course course = options.contacts
                             ? read_course(*options.contacts, scene, make_spool("contacts"))
                             : simulate(scene, has_contacts, options.audit, Progress("physics", options.quiet), make_spool("contacts"));
   figures.physics_s = get_seconds_since(started);
   scene.warnings.insert(scene.warnings.end(), course.warnings.begin(), course.warnings.end());
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", config::printable(warning));
-  figures.physics_cpu_s = static_cast<double>(std::clock() - ticks) / CLOCKS_PER_SEC;
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", base::printable(warning));
+  figures.physics_cpu_s = base::get_process_cpu_s() - cpu_s;
   const bool measures = options.plan || options.report.has_value();
   const Plan plan = make_plan(std::move(facts), course.events, measures ? plan::measure_costs() : plan::Costs{});
   if (options.plan) {
-    fmt::print("{}", config::printable_lines(plan::format_plan(plan.planner, plan.facts)));
+    fmt::print("{}", base::printable_lines(plan::format_plan(plan.planner, plan.facts)));
     for (const SceneBody& body : scene.bodies) {
-      if (!body.mounting.text.empty()) fmt::print("{}: {}\n", config::printable(body.name), config::printable(body.mounting.text));
-      if (const std::string text = describe_limited(body); !text.empty()) fmt::print("{}: {}\n", config::printable(body.name), text);
+      if (!body.mounting.text.empty()) fmt::print("{}: {}\n", base::printable(body.name), base::printable(body.mounting.text));
+      if (const std::string text = describe_limited(body); !text.empty()) fmt::print("{}: {}\n", base::printable(body.name), text);
     }
     return;
   }
@@ -284,7 +285,7 @@ void run(const ProgramOptions& options) {
 
   // Everything is made before anything is seen.
   Outputs outputs;
-  const auto append_to = [](config::WholeFile& file) { return [&file](std::string_view bytes) { file.append(bytes); }; };
+  const auto append_to = [](base::WholeFile& file) { return [&file](std::string_view bytes) { file.append(bytes); }; };
   if (options.spectrogram) {
     outputs.add(*options.spectrogram, "spectrogram")
         .append(make_spectrogram_png(
@@ -300,7 +301,7 @@ void run(const ProgramOptions& options) {
   print_warnings(scene, sound, figures);
   if (to_standard_output) {
     std::signal(SIGPIPE, SIG_IGN);  // a reader that goes is an error with a name
-    write_wav(store, figures.gain.per_pa, scene.output.format, config::write_standard_output);
+    write_wav(store, figures.gain.per_pa, scene.output.format, base::write_standard_output);
   }
   outputs.commit(options.quiet ? nullptr : notes);
 }

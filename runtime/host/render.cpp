@@ -14,6 +14,7 @@
 #include <numeric>
 #include <optional>
 
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/host/feed.hpp"
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
@@ -32,8 +33,6 @@ constexpr double kFastS = 0.125;
 constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away is not heard (84 dB down, and memory has an end)
 constexpr int kMostStrikes = 256;         // of a body, waiting or acting at once
 constexpr int kMostForces = 512;          // of a body that gets any
-
-double get_cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
@@ -115,7 +114,7 @@ class Changes {
   const Scene* scene_;
   const std::vector<BodyCourse>* courses_;
   std::vector<synth::EffectSet> first_, all_;  // per body
-  std::optional<config::Records<PlanStep>::Reader> steps_;
+  std::optional<base::Records<PlanStep>::Reader> steps_;
 };
 
 /// What comes out of the synthesiser on its way into the store: measured, and with its end held back until it is known whether it has to
@@ -157,7 +156,7 @@ class Outlet {
   static constexpr std::size_t kHeld = 8192;  // frames: the clock is asked twice for so many
 
   void pass_on() {
-    const double began = get_cpu_seconds();
+    const double began = base::get_process_cpu_s();
     const std::size_t channels = store_->get_channels(), count = frames_.size() / channels;
     const auto before = static_cast<std::size_t>(std::min<std::uint64_t>(count, tail_begin_ - std::min(tail_begin_, taken_)));
     const std::span<const float> all(frames_);
@@ -166,7 +165,7 @@ class Outlet {
     tail_.insert(tail_.end(), rest.begin(), rest.end());
     taken_ += count;
     frames_.clear();
-    seconds_cpu_ += get_cpu_seconds() - began;
+    seconds_cpu_ += base::get_process_cpu_s() - began;
   }
   void store(std::span<const float> frames) {
     meter_.add(frames);
@@ -199,7 +198,7 @@ double calc_reach_m(const Scene& scene, const Microphones& microphones, const Ve
 
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
                  SoundStore& store) {
-  const double started = get_cpu_seconds();
+  const double started = base::get_process_cpu_s();
   const Microphones microphones = make_microphones(scene);
   const std::vector<stream::Listener> walk = list_walk(microphones);
   const Vec3 base = microphones.centre.find(0.0).position_m;
@@ -268,7 +267,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   std::vector<std::array<float, kBlock>> blocks(channels);
   std::vector<float*> out;
   for (auto& block : blocks) out.push_back(block.data());
-  const double began = get_cpu_seconds();
+  const double began = base::get_process_cpu_s();
   const std::uint64_t asked_ns = synth::get_cpu_ticks_cost_ns();
   for (std::size_t start = 0; start < samples; start += kBlock) {
     const std::size_t count = std::min(kBlock, samples - start);
@@ -280,8 +279,8 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     outlet.add(heard, count - skipped);
     if (options.progress) options.progress(static_cast<double>(start + count) / static_cast<double>(samples));
   }
-  sound.seconds_playing_cpu = std::max(
-      0.0, get_cpu_seconds() - began - outlet.get_seconds_cpu() - 1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - asked_ns));
+  sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began - outlet.get_seconds_cpu() -
+                                                1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - asked_ns));
   outlet.finish(sound);
   if (options.measures) sound.seconds_per_tick = 1e-9;
   const synth::SynthesiserCounters counters = synthesiser.get_counters();
@@ -294,7 +293,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
     sound.radiated_j += synthesiser.get_radiated_j(static_cast<int>(i));
     sound.effect_counters.push_back(synthesiser.get_effect_counters(static_cast<int>(i)));
   }
-  sound.seconds_cpu = get_cpu_seconds() - started;
+  sound.seconds_cpu = base::get_process_cpu_s() - started;
   return sound;
 }
 

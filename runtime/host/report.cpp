@@ -7,8 +7,8 @@
 #include <iterator>
 #include <optional>
 
-#include "runtime/config/document.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/plan/table.hpp"
 #include "runtime/synth/kernels.hpp"
@@ -22,10 +22,10 @@ constexpr std::size_t kPiece = 1 << 16;  // bytes that are handed on at once
 /// JSON has no infinity: silence has the level null.
 std::string make_level(double db) { return std::isfinite(db) ? fmt::format("{:.2f}", db) : "null"; }
 
-using Paths = config::RecordLists<contact::Pose>;
+using Paths = base::RecordLists<contact::Pose>;
 
 /// Where each body has been. After an impact it is where it was before.
-Paths collect_paths(const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool) {
+Paths collect_paths(const std::vector<const bank::Bank*>& banks, const Events& events, base::Spool spool) {
   Paths paths(banks.size(), std::move(spool));
   std::vector<std::optional<double>> last_s(banks.size());
   events.for_each([&](const stream::Event& event) {
@@ -99,8 +99,8 @@ std::optional<stream::Impulse> find_impulse(const stream::Event& event) {
   return impulse;
 }
 
-contact::Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse& impulse) {
-  contact::Vec3 point{};
+Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse& impulse) {
+  Vec3 point{};
   for (int corner = 0; corner < 3; ++corner) {
     const auto vertex = static_cast<std::size_t>(bank.triangles[static_cast<std::size_t>(impulse.triangle)][corner]);
     for (int k = 0; k < 3; ++k) point[k] += impulse.barycentric[corner] * bank.vertices_m[vertex][k];
@@ -124,7 +124,7 @@ plan::MoreJson list_measured(const Sound& sound, std::size_t body, double durati
 std::string make_mounting_json(const Mounting& mounting) {
   if (mounting.text.empty()) return {};
   std::string json = fmt::format("\"supports\": {{\"text\": {}, \"beyond_first_order\": {}, \"shared\": {}",
-                                 config::quote(config::printable(mounting.text)), mounting.beyond, mounting.mixed);
+                                 base::quote(base::printable(mounting.text)), mounting.beyond, mounting.mixed);
   const auto add = [&](const char* name, const std::vector<double>& values) {
     fmt::format_to(std::back_inserter(json), ",\n    \"{}\": [", name);
     for (std::size_t i = 0; i < values.size(); ++i) fmt::format_to(std::back_inserter(json), "{}{:.8g}", i == 0 ? "" : ", ", values[i]);
@@ -150,7 +150,7 @@ std::string describe_limited(const SceneBody& body) {
                      body.spec.bank->mode_count(), body.limited.most_db);
 }
 
-void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool,
+void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, base::Spool spool,
                       const std::function<void(std::string_view)>& sink) {
   const Paths paths = collect_paths(banks, events, std::move(spool));
   std::string json = "{\n \"bodies\": [";
@@ -162,8 +162,8 @@ void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& 
   };
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const SceneBody& body = scene.bodies[i];
-    fmt::format_to(out, "{}\n  {{\"name\": {}, \"bank\": {}, \"fixed\": {},\n   \"poses\": [", i == 0 ? "" : ",", config::quote(body.name),
-                   config::quote(body.bank.string()), body.spec.fixed);
+    fmt::format_to(out, "{}\n  {{\"name\": {}, \"bank\": {}, \"fixed\": {},\n   \"poses\": [", i == 0 ? "" : ",", base::quote(body.name),
+                   base::quote(body.bank.string()), body.spec.fixed);
     bool first = true;
     for_kept_poses(paths, i, [&](const contact::Pose& p) {
       fmt::format_to(out, "{}\n    [{:.6f}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", first ? "" : ",", p.time_s,
@@ -183,7 +183,7 @@ void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& 
     if (!impulse || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= scene.bodies.size()) return;
     const auto i = static_cast<std::size_t>(impulse->body);
     const contact::Pose pose = cursors[i].is_empty() ? scene.bodies[i].spec.initial : cursors[i].find(impulse->time_s);
-    const contact::Vec3 x = calc_world_point(pose, find_contact_point(*banks[i], *impulse));
+    const Vec3 x = calc_world_point(pose, find_contact_point(*banks[i], *impulse));
     const double size = std::hypot(impulse->impulse_n_s[0], impulse->impulse_n_s[1], impulse->impulse_n_s[2]);
     fmt::format_to(out,
                    "{}\n  {{\"time_s\": {:.9f}, \"body\": {}, \"other\": {}, \"world_m\": [{:.6g}, {:.6g}, {:.6g}], \"impulse_n_s\": "
@@ -200,7 +200,7 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
   std::string json = "{\n";
   auto out = std::back_inserter(json);
   fmt::format_to(out, " \"scene\": {},\n \"duration_s\": {},\n \"sample_rate_hz\": {},\n \"samples\": {},\n \"channels\": {},\n",
-                 config::quote(scene.file.string()), scene.duration_s, sound.rate_hz, sound.frames, sound.channels);
+                 base::quote(scene.file.string()), scene.duration_s, sound.rate_hz, sound.frames, sound.channels);
   fmt::format_to(
       out,
       " \"instructions\": \"{}\",\n \"bodies\": {},\n \"modes\": {},\n \"contacts\": {},\n \"impulses\": {},\n \"impulses_played\": {},\n "
@@ -237,19 +237,18 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
                      "{}\n  {{\"body\": {}, \"time_s\": {:.9g}, \"contact_s\": {:.6g}, \"impulse_n_s\": {:.6g}, \"peak_n\": {:.6g}, "
                      "\"restitution\": {:.6g}, \"before_j\": {:.6g}, \"after_j\": {:.6g}, \"together\": {}, \"motion_j\": {:.6g}, "
                      "\"modes_j\": {:.6g}, \"lost_j\": {:.6g}}}",
-                     i == 0 ? "" : ",", config::quote(b.body), b.time_s, b.contact_s, b.impulse_n_s, b.peak_n, b.restitution, b.before_j,
+                     i == 0 ? "" : ",", base::quote(b.body), b.time_s, b.contact_s, b.impulse_n_s, b.peak_n, b.restitution, b.before_j,
                      b.after_j, b.together, b.motion_j, b.modes_j, b.lost_j);
     }
     json += "\n ],\n";
   }
   json += " \"warnings\": [";
-  for (std::size_t i = 0; i < scene.warnings.size(); ++i)
-    json += (i == 0 ? "" : ", ") + config::quote(config::printable(scene.warnings[i]));
+  for (std::size_t i = 0; i < scene.warnings.size(); ++i) json += (i == 0 ? "" : ", ") + base::quote(base::printable(scene.warnings[i]));
   json += "],\n \"per_body\": [";
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const std::int64_t played = i < f.tally.body_impulses.size() ? f.tally.body_impulses[i] : 0;
     fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   {}{}\"effects\": {}}}",
-                   i == 0 ? "" : ",", config::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i],
+                   i == 0 ? "" : ",", base::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i],
                    make_mounting_json(scene.bodies[i].mounting), make_limited_json(scene.bodies[i].limited),
                    plan::make_plan_json(plan.planner, plan.facts, static_cast<int>(i), list_measured(sound, i, scene.duration_s)));
   }

@@ -14,7 +14,7 @@ namespace carillon::host {
 
 /// Paths (at most 200 poses a second), ground and impulses, in pieces, in order. Layout: docs/howto/scene-files.md. `spool` takes the
 /// paths meanwhile.
-void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, config::Spool spool,
+void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, base::Spool spool,
                       const std::function<void(std::string_view)>& sink);
 
 /// Where energy is and went, and whether any came from nowhere.

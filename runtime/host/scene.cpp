@@ -13,8 +13,9 @@
 #include <span>
 #include <utility>
 
-#include "runtime/config/solids.hpp"
-#include "runtime/config/supports.hpp"
+#include "runtime/base/vector.hpp"
+#include "runtime/material/solids.hpp"
+#include "runtime/material/supports.hpp"
 
 namespace carillon::host {
 namespace {
@@ -41,8 +42,6 @@ constexpr double kRoughestM = 1e-3;         // what is higher is no roughness bu
 
 using Quaternion = std::array<double, 4>;
 
-double calc_norm(const Vec3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
 Quaternion multiply(const Quaternion& a, const Quaternion& b) {
   return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
           a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
@@ -61,7 +60,7 @@ Quaternion calc_rotation(const Vec3& degrees) {
 }
 
 /// A list of three numbers, each of at most `limit` in size.
-Vec3 read_vector(config::Object& object, std::string_view key, const Vec3& fallback, double limit) {
+Vec3 read_vector(base::Object& object, std::string_view key, const Vec3& fallback, double limit) {
   const Vec3 v = object.numbers_or<3>(key, fallback);
   for (const double x : v) {
     if (!(std::abs(x) <= limit)) object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}", x, -limit, limit));
@@ -70,7 +69,7 @@ Vec3 read_vector(config::Object& object, std::string_view key, const Vec3& fallb
 }
 
 /// A number from low to high, both included.
-double read_within(config::Object& object, std::string_view key, double fallback, double low, double high) {
+double read_within(base::Object& object, std::string_view key, double fallback, double low, double high) {
   const double value = object.number_or(key, fallback);
   if (!(value >= low && value <= high)) {
     object.fail(key, fmt::format("{} is out of range; give a number from {} to {}", value, low, high));
@@ -78,7 +77,7 @@ double read_within(config::Object& object, std::string_view key, double fallback
   return value;
 }
 
-Quaternion read_rotation(config::Object& body) {
+Quaternion read_rotation(base::Object& body) {
   if (!body.has("quaternion")) return calc_rotation(read_vector(body, "rotation_deg", {0.0, 0.0, 0.0}, 1e6));
   if (body.has("rotation_deg")) body.fail("quaternion", "says the same thing as \"rotation_deg\"; keep one of them");
   Quaternion q = body.numbers<4>("quaternion");
@@ -91,11 +90,11 @@ Quaternion read_rotation(config::Object& body) {
 }
 
 /// The effects that "key" of `object` names, none twice.
-synth::EffectSet read_names(config::Object& object, std::string_view key) {
+synth::EffectSet read_names(base::Object& object, std::string_view key) {
   std::vector<std::string> playable;
   for (const synth::Effect effect : kPlayableEffects) playable.emplace_back(synth::get_name(effect));
   synth::EffectSet effects;
-  for (const config::Entry& entry : object.entries(key, std::numeric_limits<std::size_t>::max())) {
+  for (const base::Entry& entry : object.entries(key, std::numeric_limits<std::size_t>::max())) {
     const auto refuse = [&](const std::string& what) { throw InputError(fmt::format("{}: \"{}\" {}", entry.place, key, what)); };
     if (entry.object) refuse("must be a list of names of effects, and holds an object");
     const std::optional<synth::Effect> effect = synth::find_effect(entry.text);
@@ -104,7 +103,7 @@ synth::EffectSet read_names(config::Object& object, std::string_view key) {
                          fmt::join(playable, ", ")));
     }
     if (!effect) {
-      const std::string nearest = config::find_nearest(entry.text, playable);
+      const std::string nearest = base::find_nearest(entry.text, playable);
       refuse(fmt::format("names \"{}\", which is no effect that can be played{}; there are {}", entry.text,
                          nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest), fmt::join(playable, ", ")));
     }
@@ -115,7 +114,7 @@ synth::EffectSet read_names(config::Object& object, std::string_view key) {
 }
 
 /// "auto"; a list: exactly these; or {"base": "auto", "on": [...], "off": [...]}.
-plan::Wish read_effects(config::Object& object) {
+plan::Wish read_effects(base::Object& object) {
   plan::Wish wish;
   if (object.has_string("effects")) {
     const std::string text = object.string("effects");
@@ -129,7 +128,7 @@ plan::Wish read_effects(config::Object& object) {
     wish.on = read_names(object, "effects");
     return wish;
   }
-  config::Object wishes = object.object("effects");
+  base::Object wishes = object.object("effects");
   wishes.choice_or("base", {"auto"}, "auto");
   if (wishes.has("on")) wish.on = read_names(wishes, "on");
   if (wishes.has("off")) wish.off = read_names(wishes, "off");
@@ -144,22 +143,22 @@ plan::Wish read_effects(config::Object& object) {
 synth::EffectSet find_usual(const plan::Wish& wish) { return wish.automatic ? kDefaultEffects.with(wish.on).without(wish.off) : wish.on; }
 
 /// What fixes or carries a body.
-support::Wish read_support(config::Object& body) {
+support::Wish read_support(base::Object& body) {
   support::Wish wish;
-  wish.all = config::read_fixing(body);
+  wish.all = material::read_fixing(body);
   if (auto supports = body.object_if("supports")) {
     for (const std::string& name : supports->keys()) {
-      config::Object one = supports->object(name);
-      const auto fixing = config::read_fixing(one);
+      base::Object one = supports->object(name);
+      const auto fixing = material::read_fixing(one);
       one.finish();
       if (!fixing) supports->fail(name, "says nothing; give \"on\", \"joint\" or \"loss\"");
       wish.by_name.emplace(name, *fixing);
     }
   }
-  for (config::Entry& entry : body.entries("held", kMostHolders)) {
+  for (base::Entry& entry : body.entries("held", kMostHolders)) {
     if (!entry.object)
       throw InputError(fmt::format("{}: \"held\": say where as well: {{\"by\": \"{}\", \"point_m\": [x, y, z]}}", entry.place, entry.text));
-    support::Holder holder{.by = config::read_holder(*entry.object, "by")};
+    support::Holder holder{.by = material::read_holder(*entry.object, "by")};
     if (!entry.object->has("point_m")) entry.object->numbers<3>("point_m");  // its message
     holder.point_m = read_vector(*entry.object, "point_m", {}, kFarthestM);
     entry.object->finish();
@@ -168,7 +167,7 @@ support::Wish read_support(config::Object& body) {
   return wish;
 }
 
-SceneBody parse_body(config::Object& object, const plan::Wish& wish, double variation) {
+SceneBody parse_body(base::Object& object, const plan::Wish& wish, double variation) {
   SceneBody body;
   body.name = object.string("name");
   if (body.name.size() > kLongestName ||
@@ -202,12 +201,12 @@ SceneBody parse_body(config::Object& object, const plan::Wish& wish, double vari
   return body;
 }
 
-contact::GroundSpec parse_ground(config::Object& object, std::vector<std::string>& warnings) {
+contact::GroundSpec parse_ground(base::Object& object, std::vector<std::string>& warnings) {
   contact::GroundSpec ground;
   ground.height_m = read_within(object, "height_m", ground.height_m, -kFarthestM, kFarthestM);
-  ground.young_modulus_pa = object.number_or("young_modulus_pa", ground.young_modulus_pa, config::kPositive);
+  ground.young_modulus_pa = object.number_or("young_modulus_pa", ground.young_modulus_pa, base::kPositive);
   ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1.0, 3e4);
-  const auto question = config::ask_about_solid(ground.young_modulus_pa, ground.density_kg_m3);
+  const auto question = material::ask_about_solid(ground.young_modulus_pa, ground.density_kg_m3);
   if (!(ground.young_modulus_pa >= kSoftestGroundPa && ground.young_modulus_pa <= kStiffestGroundPa)) {
     object.fail("young_modulus_pa", fmt::format("{:g} Pa is no plausible ground stiffness; give {:g} to {:g}{}", ground.young_modulus_pa,
                                                 kSoftestGroundPa, kStiffestGroundPa, question ? ": " + *question : ""));
@@ -224,38 +223,38 @@ contact::GroundSpec parse_ground(config::Object& object, std::vector<std::string
 using Names = std::map<std::string, std::size_t>;  // of bodies, and their places in the list
 
 /// The body that a key names.
-std::size_t find_body(config::Object& object, const Names& bodies, std::string_view key = "body") {
+std::size_t find_body(base::Object& object, const Names& bodies, std::string_view key = "body") {
   const std::string name = object.string(key);
   if (const auto found = bodies.find(name); found != bodies.end()) return found->second;
   std::vector<std::string> names;
   for (const auto& [known, index] : bodies) names.push_back(known);
-  const std::string nearest = config::find_nearest(name, names);
+  const std::string nearest = base::find_nearest(name, names);
   object.fail(key, fmt::format("no body is called \"{}\"; {}", name,
                                nearest.empty() ? "give the name of one of \"bodies\"" : fmt::format("did you mean \"{}\"?", nearest)));
 }
 
 /// "world", or a body's name.
-int find_end(config::Object& object, const Names& bodies, std::string_view key) {
+int find_end(base::Object& object, const Names& bodies, std::string_view key) {
   if (object.string(key) == "world") return -1;
   return static_cast<int>(find_body(object, bodies, key));
 }
 
 /// A direction, of length 1.
-Vec3 read_direction(config::Object& object, std::string_view key) {
+Vec3 read_direction(base::Object& object, std::string_view key) {
   if (!object.has(key)) object.numbers<3>(key);  // its message
   Vec3 v = read_vector(object, key, {}, kFarthestM);
-  const double norm = calc_norm(v);
-  if (!(norm > 1e-9)) object.fail(key, "is no direction; give three numbers that are not all 0");
-  for (double& x : v) x /= norm;
+  const double length = norm(v);
+  if (!(length > 1e-9)) object.fail(key, "is no direction; give three numbers that are not all 0");
+  for (double& x : v) x /= length;
   return v;
 }
 
-Vec3 read_required_place(config::Object& object, std::string_view key) {
+Vec3 read_required_place(base::Object& object, std::string_view key) {
   if (!object.has(key)) object.numbers<3>(key);  // its message
   return read_vector(object, key, {}, kFarthestM);
 }
 
-contact::JointSpec parse_joint(config::Object& object, const Names& names) {
+contact::JointSpec parse_joint(base::Object& object, const Names& names) {
   contact::JointSpec joint;
   joint.place = object.find_place("");
   const std::string kind = object.choice("kind", kJointNames);
@@ -272,8 +271,8 @@ contact::JointSpec parse_joint(config::Object& object, const Names& names) {
         joint.axis[0] * joint.second_axis[0] + joint.axis[1] * joint.second_axis[1] + joint.axis[2] * joint.second_axis[2];
     if (!(std::abs(cosine) < 1e-3)) object.fail("second_axis", "must be at right angles to \"axis\"");
     for (std::size_t k = 0; k < 3; ++k) joint.second_axis[k] -= cosine * joint.axis[k];
-    const double norm = calc_norm(joint.second_axis);
-    for (double& x : joint.second_axis) x /= norm;
+    const double length = norm(joint.second_axis);
+    for (double& x : joint.second_axis) x /= length;
   } else if (object.has("second_axis")) {
     object.fail("second_axis", "belongs to a universal joint alone; take it away");
   }
@@ -301,10 +300,10 @@ contact::JointSpec parse_joint(config::Object& object, const Names& names) {
   return joint;
 }
 
-contact::CordSpec parse_cord(config::Object& object, const Names& names) {
+contact::CordSpec parse_cord(base::Object& object, const Names& names) {
   contact::CordSpec cord;
   cord.place = object.find_place("");
-  config::Object from = object.object("from"), to = object.object("to");
+  base::Object from = object.object("from"), to = object.object("to");
   cord.body = static_cast<int>(find_body(from, names));
   cord.from_m = read_required_place(from, "at_m");
   from.finish();
@@ -312,23 +311,23 @@ contact::CordSpec parse_cord(config::Object& object, const Names& names) {
   cord.to_m = read_required_place(to, "at_m");
   to.finish();
   if (object.has("length_m")) {
-    cord.length_m = object.number("length_m", config::kPositive);
+    cord.length_m = object.number("length_m", base::kPositive);
     const Vec3 apart{cord.from_m[0] - cord.to_m[0], cord.from_m[1] - cord.to_m[1], cord.from_m[2] - cord.to_m[2]};
-    if (!(*cord.length_m >= calc_norm(apart) - 1e-9 && *cord.length_m <= kFarthestM))
+    if (!(*cord.length_m >= norm(apart) - 1e-9 && *cord.length_m <= kFarthestM))
       object.fail(
           "length_m",
           fmt::format("{:g} m is less than the {:.6g} m between its ends at the start (or more than {:g} m); give at least that, or "
                       "leave it out",
-                      *cord.length_m, calc_norm(apart), kFarthestM));
+                      *cord.length_m, norm(apart), kFarthestM));
   }
   cord.restitution = read_within(object, "restitution", 0.0, 0.0, 1.0);
   object.finish();
   return cord;
 }
 
-Mallet parse_mallet(config::Object& object, std::vector<std::string>& warnings) {
+Mallet parse_mallet(base::Object& object, std::vector<std::string>& warnings) {
   Mallet mallet;
-  const auto read_positive = [&](config::Object& from, std::string_view key, double low, double high) {
+  const auto read_positive = [&](base::Object& from, std::string_view key, double low, double high) {
     const double value = from.number(key);
     if (!(value >= low && value <= high))
       from.fail(key, fmt::format("{} is out of range; give a number from {:g} to {:g}", value, low, high));
@@ -362,16 +361,16 @@ Mallet parse_mallet(config::Object& object, std::vector<std::string>& warnings) 
   mallet.friction = read_within(object, "friction", mallet.friction, 0.0, 10.0);
   if (object.has("direction")) {
     Vec3 direction = read_vector(object, "direction", {}, kFarthestM);
-    const double norm = calc_norm(direction);
-    if (!(norm > 1e-9)) object.fail("direction", "is no direction; give the way of the head as three numbers");
-    for (double& x : direction) x /= norm;
+    const double length = norm(direction);
+    if (!(length > 1e-9)) object.fail("direction", "is no direction; give the way of the head as three numbers");
+    for (double& x : direction) x /= length;
     mallet.direction = direction;
   }
   object.finish();
   return mallet;
 }
 
-SceneStrike parse_strike(config::Object& object, Scene& scene, const Names& names) {
+SceneStrike parse_strike(base::Object& object, Scene& scene, const Names& names) {
   SceneStrike strike;
   strike.place = object.find_place("");
   strike.body = find_body(object, names);
@@ -404,7 +403,7 @@ SceneStrike parse_strike(config::Object& object, Scene& scene, const Names& name
 }
 
 /// A place in the world out of a row of numbers.
-Vec3 read_place(const config::Object& object, std::string_view key, std::span<const double> row) {
+Vec3 read_place(const base::Object& object, std::string_view key, std::span<const double> row) {
   for (const double x : row) {
     if (!(std::abs(x) <= kFarthestM)) {
       object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}", x, -kFarthestM, kFarthestM));
@@ -414,7 +413,7 @@ Vec3 read_place(const config::Object& object, std::string_view key, std::span<co
 }
 
 /// Rows [t, x, y, z] in order of time, slower than sound.
-std::vector<synth::Place> read_path(config::Object& object, std::string_view key) {
+std::vector<synth::Place> read_path(base::Object& object, std::string_view key) {
   std::vector<synth::Place> path;
   for (const std::vector<double>& row : object.number_rows(key, 4, kMostWaypoints)) {
     const synth::Place place{row[0], read_place(object, key, std::span(row).subspan(1))};
@@ -436,7 +435,7 @@ std::vector<synth::Place> read_path(config::Object& object, std::string_view key
   return path;
 }
 
-Listener parse_listener(config::Object& object) {
+Listener parse_listener(base::Object& object) {
   Listener listener;
   if (object.has("path")) {
     if (object.has("position_m")) object.fail("path", "says the same thing as \"position_m\"; keep one of them");
@@ -456,20 +455,20 @@ Listener parse_listener(config::Object& object) {
   } else {
     direction = read_vector(object, key, direction, kFarthestM);
   }
-  const double norm = calc_norm(direction);
-  if (!(norm > 1e-9)) object.fail(key, "gives the listener no direction to look in; name another place or direction");
-  for (int k = 0; k < 3; ++k) listener.facing[k] = direction[k] / norm;
+  const double length = norm(direction);
+  if (!(length > 1e-9)) object.fail(key, "gives the listener no direction to look in; name another place or direction");
+  for (int k = 0; k < 3; ++k) listener.facing[k] = direction[k] / length;
   object.finish();
   return listener;
 }
 
 /// The position of the text of `key` among names.
-std::size_t read_name(config::Object& object, std::string_view key, const std::vector<std::string>& names, const std::string& fallback) {
+std::size_t read_name(base::Object& object, std::string_view key, const std::vector<std::string>& names, const std::string& fallback) {
   const std::string name = object.choice_or(key, names, fallback);
   return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
-Output parse_output(config::Object& object) {
+Output parse_output(base::Object& object) {
   Output output;
   if (object.has("gain")) {
     const bool automatic = object.has_string("gain") && object.string("gain") == "auto";
@@ -486,7 +485,7 @@ Output parse_output(config::Object& object) {
   return output;
 }
 
-Quality parse_quality(config::Object& object) {
+Quality parse_quality(base::Object& object) {
   Quality quality;
   plan::Strictness& planner = quality.planner;
   if (object.has("planner_db")) planner.tellable_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", 0.0, -150.0, -10.0));
@@ -506,14 +505,14 @@ Quality parse_quality(config::Object& object) {
 }  // namespace
 
 Scene read_scene(const std::filesystem::path& file) {
-  return parse_scene(config::read_document(file, fmt::format("a scene may hold {} bodies and {} strikes", kMostBodies, kMostStrikes)));
+  return parse_scene(base::read_document(file, fmt::format("a scene may hold {} bodies and {} strikes", kMostBodies, kMostStrikes)));
 }
 
-Scene parse_scene(const config::Document& document) {
+Scene parse_scene(const base::Document& document) {
   Scene scene;
   scene.file = document.file();
-  config::Object root = document.root();
-  scene.duration_s = root.number("duration_s", config::kPositive);
+  base::Object root = document.root();
+  scene.duration_s = root.number("duration_s", base::kPositive);
   if (scene.duration_s < kShortestS || scene.duration_s > kLongestS) {
     root.fail("duration_s", fmt::format("{} is out of range; give {} to {} s", scene.duration_s, kShortestS, kLongestS));
   }
@@ -521,7 +520,7 @@ Scene parse_scene(const config::Document& document) {
   scene.gravity_m_s2 = read_vector(root, "gravity_m_s2", scene.gravity_m_s2, 1e4);
   if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground, scene.warnings);
 
-  std::vector<config::Object> bodies = root.objects("bodies");
+  std::vector<base::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
     for (const char* later :
          {"joints", "cords", "strikes", "listener", "microphones", "effects", "variation", "radiation", "output", "quality"})
@@ -536,19 +535,19 @@ Scene parse_scene(const config::Document& document) {
   scene.effects = find_usual(scene.wish);
   const double variation = read_within(root, "variation", 0.0, 0.0, 1.0);
   Names names;
-  for (config::Object& object : bodies) {
+  for (base::Object& object : bodies) {
     scene.bodies.push_back(parse_body(object, scene.wish, variation));
     const std::string& name = scene.bodies.back().name;
     if (!names.emplace(name, names.size()).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
   }
-  for (config::Object& object : root.objects("joints")) scene.joints.push_back(parse_joint(object, names));
-  for (config::Object& object : root.objects("cords")) scene.cords.push_back(parse_cord(object, names));
-  std::vector<config::Object> strikes = root.objects("strikes");
+  for (base::Object& object : root.objects("joints")) scene.joints.push_back(parse_joint(object, names));
+  for (base::Object& object : root.objects("cords")) scene.cords.push_back(parse_cord(object, names));
+  std::vector<base::Object> strikes = root.objects("strikes");
   if (strikes.size() > kMostStrikes) {
     root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMostStrikes));
   }
-  for (config::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene, names));
+  for (base::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene, names));
   if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
@@ -568,8 +567,8 @@ std::size_t count_channels(const Scene& scene) { return scene.microphones_m.empt
 std::array<Vec3, 2> calc_ears(const Listener& listener) {
   // Left is up x facing. Who looks straight up or down keeps the left ear towards -x.
   Vec3 left{-listener.facing[1], listener.facing[0], 0.0};
-  const double norm = calc_norm(left);
-  left = norm > 1e-6 ? Vec3{left[0] / norm, left[1] / norm, 0.0} : Vec3{-1.0, 0.0, 0.0};
+  const double length = norm(left);
+  left = length > 1e-6 ? Vec3{left[0] / length, left[1] / length, 0.0} : Vec3{-1.0, 0.0, 0.0};
   std::array<Vec3, 2> ears{listener.position_m, listener.position_m};
   for (int k = 0; k < 3; ++k) {
     ears[0][k] += 0.5 * listener.ear_distance_m * left[k];

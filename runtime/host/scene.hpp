@@ -9,7 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/config/document.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/vector.hpp"
 #include "runtime/contact/world.hpp"
 #include "runtime/plan/planner.hpp"
 #include "runtime/radiation/gains.hpp"
@@ -19,8 +20,6 @@
 #include "runtime/synth/track.hpp"
 
 namespace carillon::host {
-
-using Vec3 = std::array<double, 3>;
 
 enum class SampleFormat { kPcm16, kPcm24, kPcm32, kFloat };
 /// The names of --format and output.format, in the order of SampleFormat.
@@ -139,7 +138,7 @@ struct Scene {
 Scene read_scene(const std::filesystem::path& file);
 
 /// Reads a scene. Banks are only named, not opened. Throws InputError "file:line: ..." for anything that is not a scene.
-Scene parse_scene(const config::Document& document);
+Scene parse_scene(const base::Document& document);
 
 /// Channels of the sound: microphones, or two ears.
 std::size_t count_channels(const Scene& scene);

@@ -4,14 +4,14 @@
 #include <cstdint>
 #include <span>
 
-#include "runtime/config/spool.hpp"
+#include "runtime/base/spool.hpp"
 
 namespace carillon::host {
 
 /// Pressure [Pa], frame by frame: sample n of all channels, then sample n + 1. Memory does not grow with the number of frames.
 class SoundStore {
  public:
-  SoundStore(int rate_hz, std::size_t channels, config::Spool spool = config::Spool())
+  SoundStore(int rate_hz, std::size_t channels, base::Spool spool = base::Spool())
       : rate_hz_(rate_hz), channels_(channels), samples_(std::move(spool)) {}
 
   int get_rate_hz() const { return rate_hz_; }
@@ -39,7 +39,7 @@ class SoundStore {
   static constexpr std::size_t kPiece = 4096;  // frames
   int rate_hz_ = 0;
   std::size_t channels_ = 0;
-  config::Records<float> samples_;
+  base::Records<float> samples_;
 };
 
 }  // namespace carillon::host

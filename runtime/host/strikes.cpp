@@ -12,15 +12,12 @@
 #include <utility>
 
 #include "runtime/bank/nearest.hpp"
+#include "runtime/base/vector.hpp"
 #include "runtime/host/planning.hpp"
-#include "runtime/impact/vector.hpp"
 #include "runtime/synth/variation.hpp"
 
 namespace carillon::host {
 namespace {
-
-using impact::operator*;
-using impact::operator-;
 
 constexpr double kQuestionedNs = 1.0, kQuestionedJ = 20.0;  // of a strike without length
 constexpr double kFarthestShare = 0.25;                     // of the body's extent: how far from the surface a point may lie
@@ -69,7 +66,7 @@ Vec3 find_velocity(const Mallet& mallet, const bank::Bank& bank, std::int32_t tr
   } else {
     const auto& corners = bank.triangles[static_cast<std::size_t>(triangle)];
     const Vec3 &p = bank.vertices_m[corners[0]], &q = bank.vertices_m[corners[1]], &r = bank.vertices_m[corners[2]];
-    const Vec3 u = q - p, v = r - p, normal = impact::cross(v, u);  // inwards
+    const Vec3 u = q - p, v = r - p, normal = cross(v, u);  // inwards
     way = (1.0 / std::max(std::hypot(normal[0], normal[1], normal[2]), 1e-300)) * normal;
   }
   return mallet.speed_m_s * way;

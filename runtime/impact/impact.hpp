@@ -18,10 +18,10 @@
 #include <span>
 #include <vector>
 
+#include "runtime/base/vector.hpp"
 #include "runtime/impact/modes.hpp"
 #include "runtime/impact/solve.hpp"
 #include "runtime/impact/spring.hpp"
-#include "runtime/impact/vector.hpp"
 
 namespace carillon::impact {
 

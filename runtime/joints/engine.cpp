@@ -16,8 +16,6 @@
 namespace carillon::joints {
 namespace {
 
-using impact::operator*;
-using impact::operator-;
 using SimTK::MobilizedBody;
 using SimTK::SpatialVec;
 using SimTK::Stage;
@@ -355,6 +353,6 @@ class Tree final : public Mechanism {
 
 extern "C" __attribute__((visibility("default"))) carillon::joints::Mechanism* carillon_make_mechanism_1(
     const std::vector<carillon::joints::Member>& members, const std::vector<carillon::joints::Joint>& joints,
-    const carillon::joints::Vec3& gravity) {
+    const carillon::Vec3& gravity) {
   return new carillon::joints::Tree(members, joints, gravity);
 }

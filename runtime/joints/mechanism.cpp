@@ -8,7 +8,7 @@
 #include <mutex>
 #include <string_view>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/joints/engine.hpp"
 
 namespace carillon::joints {

@@ -15,12 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "runtime/impact/vector.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::joints {
 
-using impact::Mat3;
-using impact::Vec3;
 using Quaternion = std::array<double, 4>;  // w x y z, unit
 
 enum class Kind { kWeld, kHinge, kSlider, kUniversal, kBall };

@@ -16,7 +16,7 @@
 #include <stop_token>
 #include <thread>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/cpu_ticks.hpp"
 
 namespace carillon::live {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/error.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/live/device.hpp"
 #include "runtime/live/player.hpp"
 #include "runtime/version/version.hpp"
@@ -16,7 +16,7 @@
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-live: {}\n", carillon::config::printable(message));
+  fmt::print(stderr, "carillon-live: {}\n", carillon::base::printable(message));
   return code;
 }
 
@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
   bool lists = false;
   CLI::App app("Plays a scene of falling bodies while it happens.", "carillon-live");
   app.failure_message([](const CLI::App* asked, const CLI::Error& error) {
-    return carillon::config::printable_lines(CLI::FailureMessage::simple(asked, error));
+    return carillon::base::printable_lines(CLI::FailureMessage::simple(asked, error));
   });
   auto* scene = app.add_option("scene", options.scene, "Scene file (JSON)")->option_text("SCENE.json");
   app.add_flag("--list", lists, "List the sound cards' outputs, the default one first")->excludes(scene);
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   try {
     if (lists) {
       const std::vector<std::string> names = carillon::live::list_devices();
-      for (const std::string& name : names) fmt::print("{}\n", carillon::config::printable(name));
+      for (const std::string& name : names) fmt::print("{}\n", carillon::base::printable(name));
       if (names.empty()) fmt::print("{}\n", carillon::live::kNoCardText);
       return 0;
     }

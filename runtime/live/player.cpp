@@ -16,8 +16,8 @@
 #include <thread>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
-#include "runtime/config/printable.hpp"
+#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/contact/world.hpp"
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
@@ -50,7 +50,7 @@ class Course {
   /// The planner watches what is to be played as soon as it is known.
   Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks, plan::Planner& planner) : planner_(&planner) {
     host::Strikes strikes = host::make_strikes(scene, banks);
-    for (const std::string& warning : strikes.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", config::printable(warning));
+    for (const std::string& warning : strikes.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
     strikes_ = std::move(strikes.events);
     for (const stream::Event& strike : strikes_) planner.watch(strike);
     if (!host::has_physics(scene)) return;
@@ -71,13 +71,13 @@ class Course {
   /// Goes on towards a time, for a slice of CPU time.
   void advance(double until_s) {
     if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return;
-    counted_s_ = config::get_thread_cpu_s();
+    counted_s_ = base::get_thread_cpu_s();
     time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) {
       waiting_.push_back(event);
       planner_->watch(event);
       if (std::holds_alternative<stream::Mark>(event)) end_window();
     });
-    window_cpu_s_ += config::get_thread_cpu_s() - counted_s_;
+    window_cpu_s_ += base::get_thread_cpu_s() - counted_s_;
   }
   /// The most CPU time that a window of the physics, 2 ms of the scene, has taken.
   double get_worst_window_s() const { return worst_window_s_; }
@@ -104,7 +104,7 @@ class Course {
  private:
   /// The physics marks the end of each window.
   void end_window() {
-    const double now = config::get_thread_cpu_s();
+    const double now = base::get_thread_cpu_s();
     worst_window_s_ = std::max(worst_window_s_, window_cpu_s_ + now - counted_s_);
     window_cpu_s_ = 0.0;
     counted_s_ = now;
@@ -143,7 +143,7 @@ void play(const PlayerOptions& options) {
   const host::Banks banks = host::read_banks(scene);
   std::vector<const bank::Bank*> body_banks;
   for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", config::printable(warning));
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
   const double rate_hz = scene.sample_rate_hz;
 
   const host::Microphones microphones = host::make_microphones(scene);

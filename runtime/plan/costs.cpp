@@ -11,7 +11,7 @@
 #include <numbers>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/synth/click.hpp"
 #include "runtime/synth/ears.hpp"
 #include "runtime/synth/voice.hpp"
@@ -28,9 +28,9 @@ template <typename Function>
 double time_ns(Function function) {
   double best = 1e300;
   for (int round = 0; round < 3; ++round) {
-    const double begin = config::get_thread_cpu_ns();
+    const double begin = base::get_thread_cpu_ns();
     function();
-    best = std::min(best, config::get_thread_cpu_ns() - begin);
+    best = std::min(best, base::get_thread_cpu_ns() - begin);
   }
   return best;
 }

@@ -93,7 +93,7 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
   }
 }
 
-bool BankLevels::calc_projections(std::int32_t triangle, const stream::Vec3& barycentric, const stream::Vec3& direction,
+bool BankLevels::calc_projections(std::int32_t triangle, const Vec3& barycentric, const Vec3& direction,
                                   std::vector<double>& projections) const {
   if (triangle < 0 || static_cast<std::size_t>(triangle) >= bank_->triangles.size()) return false;
   projections.assign(modes_.size(), 0.0);
@@ -101,7 +101,7 @@ bool BankLevels::calc_projections(std::int32_t triangle, const stream::Vec3& bar
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     double sum = 0.0;
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      const bank::Vec3 phi = bank_->shape_at(static_cast<std::size_t>(corners[corner]), static_cast<std::size_t>(modes_[i].index));
+      const Vec3 phi = bank_->shape_at(static_cast<std::size_t>(corners[corner]), static_cast<std::size_t>(modes_[i].index));
       sum += barycentric[corner] * (phi[0] * direction[0] + phi[1] * direction[1] + phi[2] * direction[2]);
     }
     projections[i] = std::abs(sum);
@@ -109,14 +109,14 @@ bool BankLevels::calc_projections(std::int32_t triangle, const stream::Vec3& bar
   return true;
 }
 
-double BankLevels::calc_pushed_pa2_s(std::int32_t triangle, const stream::Vec3& barycentric, const stream::Vec3& impulse_n_s,
-                                     stream::PulseShape shape, double duration_s) const {
+double BankLevels::calc_pushed_pa2_s(std::int32_t triangle, const Vec3& barycentric, const Vec3& impulse_n_s, stream::PulseShape shape,
+                                     double duration_s) const {
   if (triangle < 0 || static_cast<std::size_t>(triangle) >= bank_->triangles.size()) return 0.0;
   const auto& corners = bank_->triangles[static_cast<std::size_t>(triangle)];
   double sum = 0.0;
   for (const PushedMode& mode : pushed_) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      const bank::Vec3 phi = bank_->shape_at(static_cast<std::size_t>(corners[corner]), mode.index);
+      const Vec3 phi = bank_->shape_at(static_cast<std::size_t>(corners[corner]), mode.index);
       sum += mode.gain_s2 * barycentric[corner] * (phi[0] * impulse_n_s[0] + phi[1] * impulse_n_s[1] + phi[2] * impulse_n_s[2]);
     }
   }

@@ -49,14 +49,13 @@ class BankLevels {
 
   /// |phi_m . direction| of every mode of get_modes() at a point of a triangle. False, and nothing is written, when there is no such
   /// triangle.
-  bool calc_projections(std::int32_t triangle, const stream::Vec3& barycentric, const stream::Vec3& direction,
-                        std::vector<double>& projections) const;
+  bool calc_projections(std::int32_t triangle, const Vec3& barycentric, const Vec3& direction, std::vector<double>& projections) const;
 
   /// A-weighted exposure at 1 m [Pa^2 s] of what a push moves below its lowest mode, where modes follow the force without ringing: their
   /// pressure is the slope of the force times the sum of g (phi . J) / omega^2, from kLowestHz to 0.7 of the lowest. It is all that is
   /// heard of modes beyond hearing. 0 when there is no such triangle.
-  double calc_pushed_pa2_s(std::int32_t triangle, const stream::Vec3& barycentric, const stream::Vec3& impulse_n_s,
-                           stream::PulseShape shape, double duration_s) const;
+  double calc_pushed_pa2_s(std::int32_t triangle, const Vec3& barycentric, const Vec3& impulse_n_s, stream::PulseShape shape,
+                           double duration_s) const;
 
   /// Whether there is any mode from kLowestHz to half the rate.
   bool can_ring() const { return !pushed_.empty(); }

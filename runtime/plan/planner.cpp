@@ -18,7 +18,7 @@
 #include <queue>
 #include <utility>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/ears.hpp"
 #include "runtime/synth/pulse.hpp"
 

@@ -24,7 +24,6 @@
 
 namespace carillon::plan {
 
-using stream::Vec3;
 using synth::Effect;
 using synth::EffectSet;
 

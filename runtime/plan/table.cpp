@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "runtime/config/document.hpp"
+#include "runtime/base/document.hpp"
 
 namespace carillon::plan {
 namespace {
@@ -22,7 +22,7 @@ std::string describe_time(const EffectPlan& plan, double duration_s) {
 }
 
 /// Bytes of UTF-8 are columns here: names of effects and our words are ASCII.
-std::string quote(const std::string& text) { return config::quote(text); }
+std::string quote(const std::string& text) { return base::quote(text); }
 
 }  // namespace
 

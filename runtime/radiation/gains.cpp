@@ -18,18 +18,16 @@
 
 #include "runtime/bank/air.hpp"
 #include "runtime/bank/surface.hpp"
+#include "runtime/base/vector.hpp"
 #include "runtime/radiation/flow.hpp"
 
 namespace carillon::radiation {
 namespace {
 
-using bank::Vec3;
 using std::numbers::pi;
 
 constexpr std::size_t kOrders = kMostLobes + 1;
 constexpr std::size_t kHarmonics = kOrders * kOrders;
-
-double calc_dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// The factors of the recurrences of calc_harmonics.
 struct Recurrence {
@@ -108,13 +106,13 @@ Skin make_skin(const bank::Bank& bank) {
       corner[k] = bank.vertices_m[triangle[0]][k] - base[k];
       for (const std::int32_t v : triangle) sum[k] += bank.vertices_m[v][k] - base[k];
     }
-    const double tetrahedron = calc_dot(corner, normal);
+    const double tetrahedron = dot(corner, normal);
     volume += tetrahedron;
     for (int k = 0; k < 3; ++k) {
       moment[k] += tetrahedron * sum[k] / 4.0;
       normal[k] /= 2.0;
     }
-    area += std::sqrt(calc_dot(normal, normal));
+    area += std::sqrt(dot(normal, normal));
     skin.normals_m2.push_back(normal);
   }
   for (int k = 0; k < 3; ++k) skin.centre_m[k] = base[k] + moment[k] / volume;
@@ -155,14 +153,14 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
     for (std::size_t t = first; t < std::min(first + kFlowBlock, skin.triangles.size()); ++t) {
       const bank::Triangle& corners = skin.triangles[t];
       const Vec3& normal = skin.normals_m2[t];
-      const double area = std::sqrt(calc_dot(normal, normal));
+      const double area = std::sqrt(dot(normal, normal));
       if (!(area > 0.0)) continue;
       Vec3 direction{};
       for (int k = 0; k < 3; ++k) {
         for (const std::int32_t v : corners) direction[k] += bank.vertices_m[v][k] / 3.0;
         direction[k] -= skin.centre_m[k];
       }
-      const double length = std::sqrt(calc_dot(direction, direction));
+      const double length = std::sqrt(dot(direction, direction));
       for (double& x : direction) x = length > 0.0 ? x / length : 0.0;
       const std::array<double, kHarmonics> harmonics = calc_harmonics(recurrence, direction);
       std::copy(harmonics.begin(), harmonics.end(), harmonic.begin() + static_cast<std::ptrdiff_t>((t - first) * kFlowColumns));

@@ -7,9 +7,6 @@
 
 namespace carillon::rigid {
 
-using impact::cross;
-using impact::dot;
-
 Mat3 make_rotation(const Quaternion& q) {
   const double w = q[0], x = q[1], y = q[2], z = q[3];
   return {Vec3{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},

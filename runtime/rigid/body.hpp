@@ -7,19 +7,12 @@
 #include <memory>
 #include <vector>
 
+#include "runtime/base/vector.hpp"
 #include "runtime/impact/modes.hpp"
-#include "runtime/impact/vector.hpp"
 #include "runtime/shape/touch.hpp"
 
 namespace carillon::rigid {
 
-using impact::Mat3;
-using impact::norm;
-using impact::transpose;
-using impact::Vec3;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
 using Quaternion = std::array<double, 4>;  // w x y z, unit
 
 Mat3 make_rotation(const Quaternion& q);

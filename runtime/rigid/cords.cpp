@@ -13,9 +13,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-using impact::dot;
-
 struct StopTouch {
   double gap_m = 0.0;
   Vec3 where_m{}, normal{};  // from b to a: a is pushed along it

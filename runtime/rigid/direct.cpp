@@ -16,13 +16,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-using impact::dot;
-using impact::find_across;
-using impact::norm;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
 using Block = Eigen::Matrix<double, 6, 6>;
 using Row6 = Eigen::Matrix<double, 6, 1>;
 

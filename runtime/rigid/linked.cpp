@@ -11,16 +11,13 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/rigid/groups.hpp"
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
 
 namespace carillon::rigid {
 namespace {
-
-using impact::cross;
-using impact::dot;
 
 constexpr double kRight = 0.01;  // of the kinetic energy: the most that a step of an impact is put right by
 

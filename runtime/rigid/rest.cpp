@@ -15,9 +15,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-using impact::dot;
-
 constexpr double kSlow = 5e-3;          // m/s; of what may be about to rest
 constexpr double kPatience = 0.02;      // s; for so long
 constexpr double kLong = 0.3;           // s; what was slow for so long is no faster than kSlow: less balance is enough

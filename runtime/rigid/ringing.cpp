@@ -18,9 +18,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-using impact::dot;
-
 constexpr int kMostPresses = 8;     // of one impact
 constexpr int kMostTogether = 12;   // with those that rest
 constexpr double kLongest = 50e-3;  // s; what presses for longer rests

@@ -18,14 +18,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
-using impact::calc_inverse;
-using impact::cross;
-using impact::dot;
-using impact::norm;
-using impact::transpose;
 using sweeps::combine;
 using sweeps::dot;
 using sweeps::Four;
@@ -209,7 +201,7 @@ void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>&
   const int still = static_cast<int>(movers.size());
   const auto is_linked = [&](int body) { return body >= 0 && movers[static_cast<std::size_t>(body)].linkage != nullptr; };
   const auto get_axes = [](const Point& p) {
-    const Vec3 across = impact::find_across(p.normal);
+    const Vec3 across = find_across(p.normal);
     return Mat3{p.normal, across, cross(p.normal, across)};
   };
   for (std::size_t i = 0; i < points.size(); ++i) {

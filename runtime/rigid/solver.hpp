@@ -3,14 +3,11 @@
 
 #include <vector>
 
-#include "runtime/impact/vector.hpp"
+#include "runtime/base/vector.hpp"
 #include "runtime/rigid/linkage.hpp"
 #include "runtime/rigid/sweeps.hpp"
 
 namespace carillon::rigid {
-
-using impact::Mat3;
-using impact::Vec3;
 
 /// A body in a step, world axes: what impulses do to it. Fixed ones and the ground have none of their own; their index is -1.
 struct Mover {

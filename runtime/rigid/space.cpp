@@ -11,15 +11,12 @@
 #include <cmath>
 #include <tuple>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/rigid/groups.hpp"
 #include "runtime/rigid/limits.hpp"
 
 namespace carillon::rigid {
 namespace {
-
-using impact::cross;
-using impact::dot;
 
 constexpr double kReach = 0.3;            // of the size of the smaller body: from so far touches are found
 constexpr double kMostSteps = 1024;       // of a window

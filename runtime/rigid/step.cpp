@@ -18,9 +18,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-using impact::dot;
-
 constexpr double kShortest = 1e-9;                           // s; what is left of a step and shorter than this is not made
 constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
 constexpr double kSettling = 0.02;                           // m/s; a group that is slower is about to rest

@@ -11,16 +11,13 @@
 #include <set>
 #include <tuple>
 
-#include "runtime/config/crossing.hpp"
+#include "runtime/base/crossing.hpp"
 #include "runtime/impact/predict.hpp"
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
 
 namespace carillon::rigid {
 namespace {
-
-using impact::cross;
-using impact::dot;
 
 constexpr double kInstant = 1e-9;      // m; how well an instant of impact is found,
 constexpr int kLooks = 20;             // and in how many looks at most
@@ -134,7 +131,7 @@ std::optional<double> Space::find_instant(const Ref& ref, double apex_s, double 
     if (shut_m > kNear) return std::nullopt;
   }
   if (shut_m >= -kInstant) return shut;
-  return config::find_crossing(look, open, open_m, shut, shut_m, kInstant, 0.0, kLooks);
+  return base::find_crossing(look, open, open_m, shut, shut_m, kInstant, 0.0, kLooks);
 }
 
 /// Looks at the pairs of an impact again, as they are at its instant: an edge that passes another one close by was taken for a plane until

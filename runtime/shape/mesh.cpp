@@ -11,7 +11,7 @@
 
 #include "runtime/bank/edges.hpp"
 #include "runtime/bank/triangle.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::shape {
 namespace {

@@ -6,21 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/impact/vector.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::shape {
-
-using impact::cross;
-using impact::dot;
-using impact::find_across;
-using impact::Mat3;
-using impact::norm;
-using impact::normalise;
-using impact::turn_back;
-using impact::Vec3;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
 
 inline double norm2(const Vec3& a) { return dot(a, a); }
 

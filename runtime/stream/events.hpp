@@ -8,9 +8,10 @@
 #include <cstdint>
 #include <variant>
 
+#include "runtime/base/vector.hpp"
+
 namespace carillon::stream {
 
-using Vec3 = std::array<double, 3>;
 using Quaternion = std::array<double, 4>;  // w x y z, unit
 
 /// Course of a contact force in time: sin^1.5 (Hertz), or the Gaussian of O'Brien, Shen and Gatchalian 2002, of the same variance.

@@ -16,8 +16,8 @@
 #include <utility>
 #include <variant>
 
-#include "runtime/config/document.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::stream {
 namespace {
@@ -109,7 +109,7 @@ void write(Out out, const Listener& e) {
 /// Reads the keys that `Event` has; who calls it finishes the object.
 class EventReader {
  public:
-  EventReader(config::Object object, const std::vector<RecordedBody>& bodies) : in_(std::move(object)), bodies_(bodies) {}
+  EventReader(base::Object object, const std::vector<RecordedBody>& bodies) : in_(std::move(object)), bodies_(bodies) {}
 
   Mark read_mark() { return finish(Mark{in_.number("time_s")}); }
 
@@ -229,11 +229,11 @@ class EventReader {
     return event;
   }
 
-  config::Object in_;
+  base::Object in_;
   const std::vector<RecordedBody>& bodies_;
 };
 
-Event parse_event(config::Object line, const std::vector<RecordedBody>& bodies) {
+Event parse_event(base::Object line, const std::vector<RecordedBody>& bodies) {
   const auto finish = [&](const Event& event) {
     line.finish();
     return event;
@@ -249,10 +249,10 @@ Event parse_event(config::Object line, const std::vector<RecordedBody>& bodies) 
 }
 
 /// The bodies, and how many events there are, if the line says.
-std::optional<long long> parse_header(config::Object line, std::vector<RecordedBody>& bodies) {
+std::optional<long long> parse_header(base::Object line, std::vector<RecordedBody>& bodies) {
   line.integer("carillon_contacts", 1, 1);
   const std::optional<long long> count = line.integer_if("events", 0, kInt64);
-  for (config::Object& body : line.objects("bodies")) {
+  for (base::Object& body : line.objects("bodies")) {
     RecordedBody& recorded = bodies.emplace_back();
     recorded.name = body.string("name");
     recorded.triangles = body.integer("triangles", 1, kInt32);
@@ -280,7 +280,7 @@ std::string format_header(const std::vector<RecordedBody>& bodies, std::uint64_t
   std::string text = fmt::format(R"({{"carillon_contacts": 1, "events": {}, "bodies": [)", events);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const RecordedBody& body = bodies[i];
-    fmt::format_to(std::back_inserter(text), R"({}{{"name": {}, "triangles": {})", i == 0 ? "" : ", ", config::quote(body.name),
+    fmt::format_to(std::back_inserter(text), R"({}{{"name": {}, "triangles": {})", i == 0 ? "" : ", ", base::quote(body.name),
                    body.triangles);
     if (body.surface) {
       fmt::format_to(std::back_inserter(text), R"(, "size_m": {}, "order_m": {})", format_numbers(body.surface->size_m),
@@ -314,7 +314,7 @@ class Lines {
   void take(std::string_view line) {
     ++number_;
     if (line.find_first_not_of(" \t\r") == std::string_view::npos) return;
-    const config::Object object = config::parse_document(line, file_, number_).root();
+    const base::Object object = base::parse_document(line, file_, number_).root();
     if (!has_header_) {
       announced_ = parse_header(object, bodies_);
       has_header_ = true;
@@ -375,7 +375,7 @@ std::vector<RecordedBody> read_recording(const std::filesystem::path& file, cons
                                          const std::function<void(const std::vector<RecordedBody>&)>& begin) {
   Lines lines(file, sink, begin);
   std::string line;
-  config::read_pieces(file, "contacts file", kPiece, [&](std::string_view piece) {
+  base::read_pieces(file, "contacts file", kPiece, [&](std::string_view piece) {
     while (!piece.empty()) {
       const std::size_t end = piece.find('\n');
       if (line.size() + std::min(end, piece.size()) > kLongestLine) {

@@ -17,14 +17,12 @@
 #include <numbers>
 
 #include "runtime/bank/nearest.hpp"
-#include "runtime/config/document.hpp"
-#include "runtime/impact/vector.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::support {
 namespace {
 
-using impact::cross;
-using impact::dot;
 using Complex = std::complex<double>;
 constexpr Complex kI{0.0, 1.0};
 constexpr double kEuler = std::numbers::egamma;
@@ -45,7 +43,7 @@ struct Patch {
   double length_m = 0.0;  // of its long side
 };
 
-Complex calc_impedance(const config::Base& base, double omega) {
+Complex calc_impedance(const material::Base& base, double omega) {
   return kI * omega * base.mass_kg + base.damping_n_s_m + base.stiffness_n_m * (1.0 + kI * base.loss_factor) / (kI * omega);
 }
 
@@ -58,7 +56,7 @@ Complex calc_near_field(Complex k_a) {
 /// Of what moves alike over a length of several waves: a plate driven along a line. `limit` is k l where point and line answer alike.
 double calc_line_share(double limit, Complex k, double length_m) { return std::min(1.0, limit / std::max(limit, std::abs(k) * length_m)); }
 
-Admittance calc_plate(const config::Base& wall, const Patch& patch, double omega) {
+Admittance calc_plate(const material::Base& wall, const Patch& patch, double omega) {
   const Complex e = wall.young_modulus_pa * (1.0 + kI * wall.loss_factor), h = wall.thickness_m;
   const double nu = wall.poisson_ratio;
   const Complex bending = e * h * h * h / (12.0 * (1.0 - nu * nu)), shear = e * h / (2.0 * (1.0 + nu)), stretch = e * h / (1.0 - nu * nu);
@@ -78,7 +76,7 @@ Admittance calc_plate(const config::Base& wall, const Patch& patch, double omega
   return {normal, in_plane, in_plane, twist, tilt, tilt};
 }
 
-Admittance calc_half_space(const config::Base& block, const Patch& patch, double omega) {
+Admittance calc_half_space(const material::Base& block, const Patch& patch, double omega) {
   const double nu = block.poisson_ratio, a = patch.radius_m;
   const double shear = block.young_modulus_pa / (2.0 * (1.0 + nu)), wave = std::sqrt(block.density_kg_m3 * shear);
   const auto calc = [&](double stiffness, double damping) {
@@ -93,22 +91,22 @@ Admittance calc_half_space(const config::Base& block, const Patch& patch, double
 }
 
 /// An impedance that is spread evenly over the patch.
-Admittance calc_lumped(const config::Base& base, const Patch& patch, double omega) {
+Admittance calc_lumped(const material::Base& base, const Patch& patch, double omega) {
   const Complex force = 1.0 / calc_impedance(base, omega);
   const double tilting = patch.area_m2 / (4.0 * std::numbers::pi);  // radius of gyration, squared
   const Complex tilt = tilting > 0.0 ? force / tilting : Complex(0.0);
   return {force, force, force, 0.5 * tilt, tilt, tilt};
 }
 
-Admittance calc_admittance(const config::Base& base, const Patch& patch, double omega) {
+Admittance calc_admittance(const material::Base& base, const Patch& patch, double omega) {
   switch (base.kind) {
-    case config::BaseKind::kPlate:
+    case material::BaseKind::kPlate:
       return calc_plate(base, patch, omega);
-    case config::BaseKind::kHalfSpace:
+    case material::BaseKind::kHalfSpace:
       return calc_half_space(base, patch, omega);
-    case config::BaseKind::kLumped:
+    case material::BaseKind::kLumped:
       return calc_lumped(base, patch, omega);
-    case config::BaseKind::kRigid:
+    case material::BaseKind::kRigid:
       break;
   }
   return {};
@@ -122,18 +120,18 @@ std::array<Vec3, 2> find_across(const Vec3& n) {
   Vec3 axis{};
   axis[least] = 1.0;
   Vec3 first = cross(n, axis);
-  const double size = impact::norm(first);
+  const double size = norm(first);
   for (double& x : first) x /= size;
   return {first, cross(n, first)};
 }
 
 /// A reaction along the axes of the patch, as Admittance has them. A wall turns about its middle plane: forces in its plane have the arm
 /// h/2.
-std::array<double, 6> find_components(const double* reaction, const Patch& patch, const config::Base& base) {
+std::array<double, 6> find_components(const double* reaction, const Patch& patch, const material::Base& base) {
   Vec3 force{reaction[0], reaction[1], reaction[2]}, couple{reaction[3], reaction[4], reaction[5]};
   if (!patch.has_normal) return {force[0], force[1], force[2], couple[0], couple[1], couple[2]};
   const Vec3& n = patch.normal;
-  if (base.kind == config::BaseKind::kPlate) {
+  if (base.kind == material::BaseKind::kPlate) {
     const Vec3 moved = cross(n, force);
     for (std::size_t k = 0; k < 3; ++k) couple[k] -= 0.5 * base.thickness_m * moved[k];
   }
@@ -143,20 +141,20 @@ std::array<double, 6> find_components(const double* reaction, const Patch& patch
 
 struct Given {
   std::string name;
-  config::Fixing fixing;
+  material::Fixing fixing;
 };
 
 /// What the bank says of its supports.
 std::vector<Given> read_given(const bank::Bank& bank) {
   std::vector<Given> list;
   if (bank.supports.count() == 0) return list;
-  const config::Document document = config::parse_document(bank.supports.text, "supports/text of the bank");
-  config::Object root = document.root();
-  for (config::Entry& entry : root.entries("supports", kMostSupports)) {
+  const base::Document document = base::parse_document(bank.supports.text, "supports/text of the bank");
+  base::Object root = document.root();
+  for (base::Entry& entry : root.entries("supports", kMostSupports)) {
     if (!entry.object) throw InputError(fmt::format("{}: a support is no object; compute the bank again", entry.place));
     Given& given = list.emplace_back();
     given.name = entry.object->string("name");
-    given.fixing = config::read_fixing(*entry.object).value_or(config::Fixing{});
+    given.fixing = material::read_fixing(*entry.object).value_or(material::Fixing{});
     entry.object->finish();
   }
   if (list.size() != bank.supports.count())
@@ -170,7 +168,7 @@ struct Sums {
   std::vector<double> with_next;
 };
 
-void add_support(const bank::Bank& bank, std::size_t support, const config::Fixing& fixing, Sums& sums) {
+void add_support(const bank::Bank& bank, std::size_t support, const material::Fixing& fixing, Sums& sums) {
   const bank::Supports& s = bank.supports;
   Patch patch;
   patch.normal = s.normal[support];
@@ -183,7 +181,7 @@ void add_support(const bank::Bank& bank, std::size_t support, const config::Fixi
   for (std::size_t m = 0; m < modes; ++m) {
     const double lambda = bank.eigenvalue_rad2_s2[m], omega = std::sqrt(lambda);
     sums.own[m] += 0.5 * fixing.joint_loss * s.energy[m * s.count() + support] * omega;
-    if (fixing.base.kind == config::BaseKind::kRigid) continue;
+    if (fixing.base.kind == material::BaseKind::kRigid) continue;
     const Admittance y = calc_admittance(fixing.base, patch, omega);
     const auto r = get(m);
     for (std::size_t k = 0; k < 6; ++k) sums.own[m] += y[k] * (r[k] * r[k] / (2.0 * lambda));
@@ -240,7 +238,7 @@ Losses calc_losses(const bank::Bank& bank, const Wish& wish) {
   for (const Given& one : given) names.push_back(one.name);
   for (const auto& [name, fixing] : wish.by_name) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-    const std::string nearest = config::find_nearest(name, names);
+    const std::string nearest = base::find_nearest(name, names);
     throw InputError(
         fmt::format("the bank has no support \"{}\"; {}", name,
                     nearest.empty() ? fmt::format("its first is \"{}\"", names.front()) : fmt::format("did you mean \"{}\"?", nearest)));
@@ -248,15 +246,15 @@ Losses calc_losses(const bank::Bank& bank, const Wish& wish) {
   Sums sums{std::vector<Complex>(bank.mode_count()), std::vector<double>(bank.mode_count())};
   for (std::size_t s = 0; s < given.size(); ++s) {
     const auto named = wish.by_name.find(given[s].name);
-    const config::Fixing& fixing = named != wish.by_name.end() ? named->second : wish.all ? *wish.all : given[s].fixing;
-    if (fixing.base.kind == config::BaseKind::kRigid && fixing.joint_loss == 0.0) continue;
+    const material::Fixing& fixing = named != wish.by_name.end() ? named->second : wish.all ? *wish.all : given[s].fixing;
+    if (fixing.base.kind == material::BaseKind::kRigid && fixing.joint_loss == 0.0) continue;
     add_support(bank, s, fixing, sums);
-    losses.supports.push_back(fmt::format("{} {}", given[s].name, config::describe(fixing)));
+    losses.supports.push_back(fmt::format("{} {}", given[s].name, material::describe(fixing)));
   }
   if (!wish.held.empty()) {
     for (const Holder& holder : wish.held) {
       add_holder(bank, holder, sums);
-      losses.supports.push_back(fmt::format("held by {}", config::describe(holder.by)));
+      losses.supports.push_back(fmt::format("held by {}", material::describe(holder.by)));
     }
   }
   if (losses.supports.empty()) return losses;
@@ -290,10 +288,10 @@ void apply(const Losses& losses, bank::Bank& bank) {
 std::string write_key(const Wish& wish) {
   std::string text;
   const auto out = std::back_inserter(text);
-  if (wish.all) fmt::format_to(out, "{{{}}}", config::write_fixing(*wish.all));
-  for (const auto& [name, fixing] : wish.by_name) fmt::format_to(out, "{}: {{{}}}", config::quote(name), config::write_fixing(fixing));
+  if (wish.all) fmt::format_to(out, "{{{}}}", material::write_fixing(*wish.all));
+  for (const auto& [name, fixing] : wish.by_name) fmt::format_to(out, "{}: {{{}}}", base::quote(name), material::write_fixing(fixing));
   for (const Holder& holder : wish.held) {
-    const config::Base& by = holder.by;
+    const material::Base& by = holder.by;
     fmt::format_to(out, "held {} {} {} {} {} {} {}", by.mass_kg, by.damping_n_s_m, by.stiffness_n_m, by.loss_factor, holder.point_m[0],
                    holder.point_m[1], holder.point_m[2]);
   }

@@ -13,22 +13,20 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/config/supports.hpp"
+#include "runtime/material/supports.hpp"
 
 namespace carillon::support {
 
-using bank::Vec3;
-
 /// Something that touches a body at a point of its surface.
 struct Holder {
-  config::Base by;
+  material::Base by;
   Vec3 point_m{};  // frame of the mesh; the nearest point of the surface is meant
 };
 
 /// What a scene says of a body. Nothing: as the bank has it.
 struct Wish {
-  std::optional<config::Fixing> all{};              // behind every patch of fixed nodes
-  std::map<std::string, config::Fixing> by_name{};  // behind one of them, in place of `all`
+  std::optional<material::Fixing> all{};              // behind every patch of fixed nodes
+  std::map<std::string, material::Fixing> by_name{};  // behind one of them, in place of `all`
   std::vector<Holder> held{};
 
   bool is_empty() const { return !all && by_name.empty() && held.empty(); }

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::synth {
 namespace {

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::synth {
 namespace {

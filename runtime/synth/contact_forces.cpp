@@ -15,7 +15,8 @@
 #include <cmath>
 #include <string>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -35,8 +36,6 @@ double calc_smooth_step(double x) noexcept {
 }
 
 double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m_s - kAtRest) / (kMoving - kAtRest)); }
-
-double calc_norm(const stream::Vec3& v) noexcept { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 /// Of the surface of one of the two bodies along the path of a contact: the same for whoever looks at it. `first`: two surfaces of the same
 /// seed are still two.
@@ -120,7 +119,7 @@ ContactNoise calc_contact_noise(const stream::Contact& contact, const Surface& o
   other_texture.start(other.roughness_m, 0);
   return calc_noise({.sweep_m_s = contact.sweep_m_s,
                      .other_sweep_m_s = contact.other_sweep_m_s,
-                     .slip_m_s = calc_norm(contact.slip_m_s),
+                     .slip_m_s = norm(contact.slip_m_s),
                      .force_n = contact.force_n,
                      .patch_m = contact.patch_radius_m,
                      .modulus_pa = calc_pair_modulus(own.modulus_pa, other.modulus_pa),
@@ -390,7 +389,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
   Node node;
   node.values = values;
   node.level = slot.level;
-  const double slip = calc_norm(values.slip_m_s), sliding = calc_sliding(slip, values.sweep_m_s, values.other_sweep_m_s);
+  const double slip = norm(values.slip_m_s), sliding = calc_sliding(slip, values.sweep_m_s, values.other_sweep_m_s);
   const double rough = effects_.has(Effect::kRoughness) ? sliding : 0.0;
   const double along = rough + (effects_.has(Effect::kRolling) ? 1.0 - sliding : 0.0);
   if (along > 0.0) {

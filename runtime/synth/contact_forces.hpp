@@ -140,7 +140,7 @@ class ContactForces {
   struct Record {
     double time = 0.0;
     double force_n = 0.0, sweep_m_s = 0.0, other_sweep_m_s = 0.0, patch_m = 1.0, impedance = 0.0;
-    stream::Vec3 normal{}, slip_m_s{}, barycentric{};
+    Vec3 normal{}, slip_m_s{}, barycentric{};
     std::int32_t triangle = 0;
     bool ends = false;
     std::int32_t next = -1;

@@ -14,7 +14,7 @@
 #include <complex>
 #include <numbers>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
 namespace carillon::synth {
@@ -158,7 +158,7 @@ struct DrivenBank::Mode {
   Complex calc_power(double samples) const { return std::exp(root * samples); }
 };
 
-DrivenBank::DrivenBank(const Model& model, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction, Isa isa)
+DrivenBank::DrivenBank(const Model& model, std::int32_t triangle, const Vec3& barycentric, const Vec3& direction, Isa isa)
     : kernels_(&get_kernels(isa)) {
   for (const double x : {barycentric[0], barycentric[1], barycentric[2], direction[0], direction[1], direction[2]}) {
     if (!std::isfinite(x)) throw InputError("the point and the direction of a driving force must be finite numbers");

@@ -19,7 +19,7 @@ class DrivenBank {
  public:
   /// The force acts at a point of a triangle, along `direction` (a unit vector; its length scales the force). Throws InputError when the
   /// bank has no such triangle or a number is not finite.
-  DrivenBank(const Model& model, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction, Isa isa = Isa::kBest);
+  DrivenBank(const Model& model, std::int32_t triangle, const Vec3& barycentric, const Vec3& direction, Isa isa = Isa::kBest);
 
   /// Adds the pressure at 1 m [Pa]: sample n is that at its instant when force_n[n] [N] acts from the instant of sample n - 1 to that of n.
   /// Any length, both the same. No delay. A force that is not finite counts as the one before it; should a sum overflow all the same, the

@@ -15,6 +15,8 @@
 #include <numbers>
 #include <vector>
 
+#include "runtime/base/vector.hpp"
+
 namespace carillon::synth {
 namespace {
 
@@ -58,8 +60,6 @@ Taps calc_taps(double phase) noexcept {
   return taps;
 }
 
-double calc_dot(const Vec3& a, const Vec3& b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 /// A quantum or less of what comes by one phase. False when all is silence.
 bool read_row(const Kernels& kernels, const History& sent, std::int64_t first, const Taps& taps, std::span<float> row) noexcept {
   const std::int64_t count = kTaps + static_cast<std::int64_t>(row.size()) - 1;
@@ -96,11 +96,11 @@ Way calc_straight_way(const Track& source, const Track& listener, const Vec3& of
     way.direction[k] = here.position_m[k] + offset_m[k] - there.position_m[k];
     change[k] = here.velocity_m_s[k] - there.velocity_m_s[k];
   }
-  const double exact = std::sqrt(calc_dot(way.direction, way.direction)), distance = std::max(exact, kNearestM);
+  const double exact = std::sqrt(dot(way.direction, way.direction)), distance = std::max(exact, kNearestM);
   for (double& x : way.direction) x = exact > 0.0 ? x / exact : 0.0;
   way.spreading_1_m = 1.0 / distance;
   if (exact < kNearestM) return way;
-  const double stretch = calc_dot(way.direction, change);
+  const double stretch = dot(way.direction, change);
   way.spreading_slope = -stretch / (distance * distance);
   for (std::size_t k = 0; k < 3; ++k) way.direction_slope[k] = (change[k] - way.direction[k] * stretch) / distance;
   return way;
@@ -120,28 +120,28 @@ Way calc_way(const Track& source, const Track& listener, const Vec3& offset_m, d
     const Waypoint there = source.find(emission);
     velocity = there.velocity_m_s;
     for (std::size_t k = 0; k < 3; ++k) way.direction[k] = here.position_m[k] + offset_m[k] - there.position_m[k];
-    distance = std::sqrt(calc_dot(way.direction, way.direction));
+    distance = std::sqrt(dot(way.direction, way.direction));
     for (double& x : way.direction) x = distance > 0.0 ? x / distance : 0.0;
     near = distance < kNearestM;
     distance = std::max(distance, kNearestM);
     const double late = emission + distance / kSoundSpeedMs - time_s;
     if (std::abs(late) < 1e-12) break;
-    const double slope = near ? 1.0 : 1.0 - calc_dot(way.direction, velocity) / kSoundSpeedMs;
+    const double slope = near ? 1.0 : 1.0 - dot(way.direction, velocity) / kSoundSpeedMs;
     emission = std::min(time_s, emission - late / std::max(slope, 0.05));
   }
-  const double approach = near ? 0.0 : calc_dot(way.direction, velocity) / kSoundSpeedMs;
-  const double leave = near ? 0.0 : calc_dot(way.direction, here.velocity_m_s) / kSoundSpeedMs;
+  const double approach = near ? 0.0 : dot(way.direction, velocity) / kSoundSpeedMs;
+  const double leave = near ? 0.0 : dot(way.direction, here.velocity_m_s) / kSoundSpeedMs;
   const double pace = (1.0 - leave) / std::max(1.0 - approach, 0.05);  // of the emission against the arrival
   Vec3 change{};
   for (std::size_t k = 0; k < 3; ++k) change[k] = here.velocity_m_s[k] - velocity[k] * pace;
-  const double stretch = near ? 0.0 : calc_dot(way.direction, change);
+  const double stretch = near ? 0.0 : dot(way.direction, change);
   way.convection = 1.0 / std::max(1.0 - approach, 0.05);
   way.delay_s = time_s - emission;
   way.delay_slope = near ? 0.0 : 1.0 - pace;
   way.spreading_1_m = 1.0 / distance;
   way.spreading_slope = -stretch / (distance * distance);
   for (std::size_t k = 0; k < 3; ++k) way.direction_slope[k] = near ? 0.0 : (change[k] - way.direction[k] * stretch) / distance;
-  way.convection_slope = way.convection * way.convection * calc_dot(way.direction_slope, velocity) / kSoundSpeedMs;
+  way.convection_slope = way.convection * way.convection * dot(way.direction_slope, velocity) / kSoundSpeedMs;
   return way;
 }
 

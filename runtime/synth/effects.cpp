@@ -6,7 +6,7 @@
 #include <array>
 #include <string>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::synth {
 namespace {

@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::synth {
 

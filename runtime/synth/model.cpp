@@ -13,7 +13,7 @@
 #include <numbers>
 
 #include "runtime/bank/large.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/oscillator.hpp"
 
 namespace carillon::synth {
@@ -238,7 +238,7 @@ void Model::find_bounds() {
   largest_ = {};
 }
 
-double Model::calc_projection(int mode, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction) const {
+double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& barycentric, const Vec3& direction) const {
   if (triangle < 0 || static_cast<std::size_t>(triangle) >= triangles_.size()) throw InputError("the bank has no such triangle");
   const int column = mode < ringing_ ? mode : static_cast<int>(sound_.size()) * kGroup + mode - ringing_;
   double sum = 0.0;

@@ -43,7 +43,7 @@ class Model {
   /// How many of them ring: the first ones.
   int get_ringing_mode_count() const { return ringing_; }
   /// phi(x) . direction [kg^-1/2] at a point of a triangle. Throws InputError when the bank has no such triangle.
-  double calc_projection(int mode, std::int32_t triangle, const bank::Vec3& barycentric, const bank::Vec3& direction) const;
+  double calc_projection(int mode, std::int32_t triangle, const Vec3& barycentric, const Vec3& direction) const;
   double get_rate_hz() const { return rate_hz_; }
   /// Of the rigid body, for acceleration noise: its mass, and the sphere that stands for it. 0 where the bank does not say.
   double get_mass_kg() const { return mass_kg_; }

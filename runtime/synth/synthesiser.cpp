@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
 namespace carillon::synth {

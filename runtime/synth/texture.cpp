@@ -20,7 +20,7 @@
 #include <numbers>
 #include <vector>
 
-#include "runtime/config/chance.hpp"
+#include "runtime/base/chance.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -67,7 +67,7 @@ struct Tables {
       const double amplitude = std::pow(static_cast<double>(k) / kWaves, -0.5 * (1.0 + 2.0 * Texture::kHurst));
       const double spline = (2.0 + std::cos(2.0 * pi * k / kPoints)) / 3.0;
       power += 0.5 * amplitude * amplitude;
-      x[static_cast<std::size_t>(k)] = std::polar(amplitude / spline, 2.0 * pi * config::to_unit(config::draw(seed)));
+      x[static_cast<std::size_t>(k)] = std::polar(amplitude / spline, 2.0 * pi * base::to_unit(base::draw(seed)));
     }
     transform(x);
     for (int n = 0; n < kPoints + 3; ++n) {
@@ -98,7 +98,7 @@ void Texture::make_tables() { get_tables(); }
 void Texture::start(double roughness_m, std::uint64_t seed) noexcept {
   roughness_m_ = std::clamp(roughness_m, 0.0, kHighestM);
   place_ = 0;
-  for (std::uint64_t& offset : offset_) offset = config::draw(seed);
+  for (std::uint64_t& offset : offset_) offset = base::draw(seed);
 }
 
 Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, double give_rad_s, double rate_hz) const noexcept {

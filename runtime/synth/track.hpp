@@ -7,11 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "runtime/base/vector.hpp"
 #include "runtime/stream/events.hpp"
 
 namespace carillon::synth {
-
-using Vec3 = std::array<double, 3>;
 
 struct Waypoint {
   double time_s = 0.0;

@@ -8,22 +8,17 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/config/chance.hpp"
+#include "runtime/base/chance.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::synth {
 namespace {
-
-using bank::Vec3;
 
 // Standard deviations of what strikes of a variation of 1 scatter by.
 constexpr double kEnergyScatter = 0.18;                             // 0.8 dB
 constexpr double kTiltScatter = 0.05;                               // rad, about each of two axes: 3 degrees
 constexpr double kLengthScatter = 0.05;                             // of the pulse, beside what goes with its energy
 constexpr double kPlaceScatterM = 2e-3, kPlaceScatterShare = 0.02;  // along the surface, each way; of the body's extent
-
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-Vec3 subtract(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 Vec3 calc_extent(const bank::Bank& bank) {
   Vec3 low = bank.vertices_m.front(), high = low;
@@ -33,7 +28,7 @@ Vec3 calc_extent(const bank::Bank& bank) {
       high[k] = std::max(high[k], vertex[k]);
     }
   }
-  return subtract(high, low);
+  return high - low;
 }
 
 /// Numbers of mean 0 and variance 1 within 3.5: the same for the same seed and strike.
@@ -42,7 +37,7 @@ class Chance {
   Chance(std::uint64_t seed, std::uint64_t strike) : state_(seed + strike * 0xd1342543de82ef95U) {}
   double draw() {
     double sum = 0.0;
-    for (int i = 0; i < 4; ++i) sum += 2.0 * config::to_unit(config::draw(state_)) - 1.0;
+    for (int i = 0; i < 4; ++i) sum += 2.0 * base::to_unit(base::draw(state_)) - 1.0;
     return sum * std::sqrt(0.75);
   }
 
@@ -64,8 +59,8 @@ std::array<Vec3, 2> make_across(const Vec3& axis) {
 
 }  // namespace
 
-void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(const bank::Vec3&)>& find, double variation,
-                 std::uint64_t seed, std::uint64_t strike, stream::Impulse& impulse) {
+void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(const Vec3&)>& find, double variation, std::uint64_t seed,
+                 std::uint64_t strike, stream::Impulse& impulse) {
   if (!(variation > 0.0)) return;
   Chance chance(seed, strike);
   // The mean of the energy stays.
@@ -84,7 +79,7 @@ void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(
   impulse.duration_s = std::min(impulse.duration_s, 2.0 * impulse.time_s);
   const auto& corner = bank.triangles[static_cast<std::size_t>(impulse.triangle)];
   const Vec3 &p = bank.vertices_m[corner[0]], &q = bank.vertices_m[corner[1]], &r = bank.vertices_m[corner[2]];
-  Vec3 normal = cross(subtract(q, p), subtract(r, p));
+  Vec3 normal = cross(q - p, r - p);
   const double area = std::sqrt(dot(normal, normal));
   if (!(area > 0.0)) return;
   for (double& x : normal) x /= area;

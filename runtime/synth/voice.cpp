@@ -14,7 +14,8 @@
 #include <utility>
 
 #include "runtime/bank/air.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/vector.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
 namespace carillon::synth {
@@ -24,12 +25,9 @@ namespace {
 constexpr bool kHasContacts = kCompiledEffects.has_any(kContactEffects);
 constexpr std::int64_t kCullEvery = 8;  // periods
 
-bool is_finite(const stream::Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
-stream::Vec3 widen(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
-double dot(const stream::Vec3& a, const stream::Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-stream::Vec3 subtract(const stream::Vec3& a, double s, const stream::Vec3& b) {
-  return {a[0] - s * b[0], a[1] - s * b[1], a[2] - s * b[2]};
-}
+bool is_finite(const Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
+Vec3 widen(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+Vec3 subtract(const Vec3& a, double s, const Vec3& b) { return {a[0] - s * b[0], a[1] - s * b[1], a[2] - s * b[2]}; }
 
 // A direction that the samples of a force have no more of than this share of the largest is rounding of single precision.
 constexpr double kParallel = 3e-7;
@@ -112,7 +110,7 @@ bool Voice::push(const stream::Force& force) noexcept {
   steps.count = force.count;
   for (std::size_t corner = 0; corner < 3; ++corner) steps.barycentric[corner] = static_cast<float>(force.barycentric[corner]);
   // Directions one by one, each that of the largest sample of what is left.
-  std::array<stream::Vec3, stream::kMostForceSteps> left{};
+  std::array<Vec3, stream::kMostForceSteps> left{};
   const auto count = static_cast<std::size_t>(force.count);
   double strength = 0.0, largest = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -126,7 +124,7 @@ bool Voice::push(const stream::Force& force) noexcept {
     const double size = std::sqrt(dot(*most, *most));
     if (steps.axes == 0) largest = size;
     if (!(size > kParallel * largest)) break;
-    const stream::Vec3 unit{(*most)[0] / size, (*most)[1] / size, (*most)[2] / size};
+    const Vec3 unit{(*most)[0] / size, (*most)[1] / size, (*most)[2] / size};
     for (std::size_t axis = 0; axis < 3; ++axis) steps.axis[steps.axes][axis] = static_cast<float>(unit[axis]);
     for (std::size_t k = 0; k < count; ++k) {
       const double along = dot(left[k], unit);

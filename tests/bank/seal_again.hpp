@@ -5,6 +5,7 @@
 #include <string>
 
 #include "runtime/bank/seal.hpp"
+#include "runtime/base/sha256.hpp"
 
 namespace carillon::bank {
 
@@ -19,11 +20,11 @@ inline std::string seal_again(std::string bytes) {
   std::string text = bytes.substr(0, line) + length + bytes.substr(end, kTextBytes - end);
   text.resize(kTextBytes, '\n');
   bytes.replace(0, kTextBytes, text);
-  Digest digest;
+  base::Sha256 digest;
   const auto all = std::as_bytes(std::span(bytes));
-  digest.update(all.first(kTextBytes));
-  digest.update(all.subspan(kSealBytes));
-  bytes.replace(kTextBytes, kDigestBytes, digest.finish());
+  digest.add(all.first(kTextBytes));
+  digest.add(all.subspan(kSealBytes));
+  bytes.replace(kTextBytes, kDigestBytes, base::to_hex(digest.finish()));
   return bytes;
 }
 

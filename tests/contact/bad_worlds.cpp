@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/contact/world.hpp"
 #include "tests/contact/solids.hpp"
 

@@ -6,19 +6,13 @@
 #include <cmath>
 #include <vector>
 
+#include "runtime/base/vector.hpp"
 #include "runtime/contact/world.hpp"
-#include "runtime/impact/vector.hpp"
 
 namespace carillon::contact::tests {
 
-using impact::norm;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
-
 inline Vec3 rotate(const std::array<double, 4>& q, const Vec3& v) {
   const Vec3 u{q[1], q[2], q[3]};
-  using impact::cross;
   const Vec3 t = 2.0 * cross(u, v);
   return v + q[0] * t + cross(u, t);
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/contact/checks.hpp"
 #include "tests/contact/solids.hpp"
 

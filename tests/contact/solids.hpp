@@ -59,7 +59,7 @@ inline bank::Bank make_ball(double radius_m, int levels = 4) {
     const auto middle = [&](std::int32_t a, std::int32_t b) {
       const auto [it, fresh] = middles.emplace(std::minmax(a, b), static_cast<std::int32_t>(x.size()));
       if (fresh) {
-        bank::Vec3 m{x[a][0] + x[b][0], x[a][1] + x[b][1], x[a][2] + x[b][2]};
+        Vec3 m{x[a][0] + x[b][0], x[a][1] + x[b][1], x[a][2] + x[b][2]};
         const double norm = std::hypot(m[0], m[1], m[2]);
         x.push_back({m[0] / norm, m[1] / norm, m[2] / norm});
       }
@@ -92,7 +92,7 @@ inline bank::Bank make_box(std::array<double, 3> size_m, std::array<int, 3> n = 
   const auto vertex = [&](std::array<int, 3> i) {
     const auto [it, fresh] = index.emplace(i, static_cast<std::int32_t>(bank.vertices_m.size()));
     if (fresh) {
-      bank::Vec3 x{};
+      Vec3 x{};
       for (int k = 0; k < 3; ++k) x[k] = size_m[k] * (static_cast<double>(i[k]) / n[k] - 0.5);
       bank.vertices_m.push_back(x);
     }
@@ -167,7 +167,7 @@ inline bank::Bank make_cells(const std::vector<std::array<int, 3>>& cells, doubl
 /// A lumpy head with two ears and hollows between them: smooth, neither convex nor symmetric, the edges as fine as a real mesh's.
 inline bank::Bank make_eared_ball(double radius_m, int levels) {
   bank::Bank bank = make_ball(radius_m, levels);
-  const bank::Vec3 ears[2] = {{0.48, 0.36, 0.8}, {-0.6, 0.0, 0.8}};
+  const Vec3 ears[2] = {{0.48, 0.36, 0.8}, {-0.6, 0.0, 0.8}};
   for (auto& x : bank.vertices_m) {
     double stretch = 1.0 + 0.05 * std::sin(9.0 * x[0] / radius_m) * std::sin(7.0 * x[1] / radius_m + 1.0);
     for (const auto& ear : ears) {

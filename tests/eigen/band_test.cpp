@@ -8,7 +8,7 @@
 
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/eigen/spring_network.hpp"
 
 namespace carillon::eigen {

@@ -19,7 +19,7 @@ extern "C" void dsygv_(const int* type, const char* job, const char* half, const
 namespace carillon::eigen {
 namespace {
 
-const spec::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
+const job::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
 
 std::vector<double> to_dense(Mat matrix, int n) {
   std::vector<double> dense(static_cast<std::size_t>(n) * n, 0.0);
@@ -49,7 +49,7 @@ std::vector<double> calc_dense_eigenvalues(Mat stiffness, Mat mass) {
 struct Case {
   const char* name;
   int order;
-  spec::Mass mass;
+  job::Mass mass;
   Factorisation factorisation;
 };
 class Sparse : public testing::TestWithParam<Case> {};
@@ -84,10 +84,10 @@ TEST_P(Sparse, gives_the_frequencies_that_dense_lapack_gives) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Table, Sparse,
-                         testing::Values(Case{"T4_lumped_mumps", 1, spec::Mass::lumped, Factorisation::kMumps},
-                                         Case{"T4_consistent_cholmod", 1, spec::Mass::consistent, Factorisation::kCholmod},
-                                         Case{"T10_consistent_mumps", 2, spec::Mass::consistent, Factorisation::kMumps},
-                                         Case{"T10_consistent_cholmod", 2, spec::Mass::consistent, Factorisation::kCholmod}),
+                         testing::Values(Case{"T4_lumped_mumps", 1, job::Mass::lumped, Factorisation::kMumps},
+                                         Case{"T4_consistent_cholmod", 1, job::Mass::consistent, Factorisation::kCholmod},
+                                         Case{"T10_consistent_mumps", 2, job::Mass::consistent, Factorisation::kMumps},
+                                         Case{"T10_consistent_cholmod", 2, job::Mass::consistent, Factorisation::kCholmod}),
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include "precompute/eigen/node_matrix.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/eigen/spring_network.hpp"
 
 namespace carillon::eigen {

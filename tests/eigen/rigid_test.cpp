@@ -5,7 +5,7 @@
 
 #include "precompute/eigen/rigid_modes.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/eigen/spring_network.hpp"
 
 namespace carillon::eigen {

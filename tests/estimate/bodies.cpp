@@ -21,7 +21,6 @@ namespace carillon::tests {
 namespace {
 
 using mesh::TetMesh;
-using mesh::Vec3;
 
 double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -175,16 +174,16 @@ std::string describe(MeshKind kind) {
 
 const std::vector<Body>& get_bodies() {
   // Spruce along x; 2, 3 are the radial and the tangential directions.
-  static const spec::Material spruce{.density_kg_m3 = 400,
-                                     .orthotropic = spec::Orthotropic{.young_modulus_pa = {10.8e9, 0.84e9, 0.46e9},
-                                                                      .shear_modulus_pa = {0.69e9, 0.032e9, 0.66e9},
-                                                                      .poisson_ratio = {0.372, 0.435, 0.467}}};
+  static const job::Material spruce{.density_kg_m3 = 400,
+                                    .orthotropic = job::Orthotropic{.young_modulus_pa = {10.8e9, 0.84e9, 0.46e9},
+                                                                    .shear_modulus_pa = {0.69e9, 0.032e9, 0.66e9},
+                                                                    .poisson_ratio = {0.372, 0.435, 0.467}}};
   const auto solid = [](double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
-    return std::vector<spec::Material>{
+    return std::vector<job::Material>{
         {.young_modulus_pa = young_modulus_pa, .poisson_ratio = poisson_ratio, .density_kg_m3 = density_kg_m3}};
   };
   const auto pair = [&](double nu_steel, double nu_aluminium) {
-    return std::vector<spec::Material>{solid(200e9, nu_steel, 7850)[0], solid(70e9, nu_aluminium, 2700)[0]};
+    return std::vector<job::Material>{solid(200e9, nu_steel, 7850)[0], solid(70e9, nu_aluminium, 2700)[0]};
   };
   // A fineness is cells along the shortest edge of a box (negative: not shaken), ten times the cells across a strip and its
   // layers, rings of a cylinder, or the nodes of a shape.
@@ -300,15 +299,15 @@ double Outcome::median_width() const {
   return widths[widths.size() / 2];
 }
 
-Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t>& held, std::span<const spec::Material> materials,
+Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t>& held, std::span<const job::Material> materials,
               bool lumped, double low_hz, double high_hz, int max_modes, double tolerance) {
-  const spec::Mass mass = lumped ? spec::Mass::lumped : spec::Mass::consistent;
+  const job::Mass mass = lumped ? job::Mass::lumped : job::Mass::consistent;
   const fem::Distribution pieces = fem::distribute(comm, mesh, held);
   fem::Materials solid;
   solid.list.assign(materials.begin(), materials.end());
   if (materials.size() > 1) solid.of_tet = pieces.local.region;
   std::vector<estimate::Solid> solids;
-  for (const spec::Material& material : materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  for (const job::Material& material : materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const fem::System system = fem::assemble(comm, pieces.local, solid, mass);
   eigen::NodeLayout layout;
   layout.position.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + pieces.local.free_nodes);

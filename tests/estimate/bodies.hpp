@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "jobs/spec/material.hpp"
 #include "precompute/estimate/error_bars.hpp"
+#include "precompute/job/material.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 
 namespace carillon::tests {
@@ -28,12 +28,12 @@ std::string describe(MeshKind kind);
 
 struct Body {
   std::string name;
-  std::vector<spec::Material> materials;  // by region of the mesh
-  bool round = false;                     // has curved faces
-  bool training = false;                  // the safety factors were chosen on it
-  std::vector<int> fineness;              // meshes from coarse to fine, in numbers that make_mesh knows
-  bool locks = false;                     // T4 are not for it
-  bool fixed = false;                     // at its face of lowest x
+  std::vector<job::Material> materials;  // by region of the mesh
+  bool round = false;                    // has curved faces
+  bool training = false;                 // the safety factors were chosen on it
+  std::vector<int> fineness;             // meshes from coarse to fine, in numbers that make_mesh knows
+  bool locks = false;                    // T4 are not for it
+  bool fixed = false;                    // at its face of lowest x
 };
 
 const std::vector<Body>& get_bodies();
@@ -65,7 +65,7 @@ Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, doub
 Outcome solve(MPI_Comm comm, const Body& body, const mesh::TetMesh& mesh, MeshKind kind, double tolerance = 1e-8);
 
 /// The same for any mesh, without truth, up to `high_hz`. Collective.
-Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held, std::span<const spec::Material> materials,
+Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held, std::span<const job::Material> materials,
               bool lumped, double low_hz, double high_hz, int max_modes, double tolerance = 1e-8);
 
 /// One body of the list on one mesh.

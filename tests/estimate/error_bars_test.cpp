@@ -125,11 +125,11 @@ Solved solve_by_hand(const std::string& name, int fineness, MeshKind kind, int m
   const Body& body = get_body(name);
   std::vector<std::int32_t> held;
   const mesh::TetMesh mesh = make_mesh(body, fineness, kind, held);
-  const spec::Material& material = body.materials.front();
+  const job::Material& material = body.materials.front();
   Solved solved;
   solved.pieces = fem::distribute(PETSC_COMM_WORLD, mesh, held);
   const auto& local = solved.pieces.local;
-  solved.system = fem::assemble(PETSC_COMM_WORLD, local, material, spec::Mass::consistent);
+  solved.system = fem::assemble(PETSC_COMM_WORLD, local, material, job::Mass::consistent);
   solved.solid = estimate::make_isotropic(material.young_modulus_pa, material.poisson_ratio, material.density_kg_m3);
   if (max_modes == 0) return solved;
   eigen::NodeLayout layout;
@@ -179,7 +179,7 @@ TEST(AlgebraicBar, contains_the_true_eigenvalue_of_modes_that_were_spoilt) {
   }
   const estimate::ErrorBars bars = estimate::calc_error_bars(
       PETSC_COMM_WORLD, solved.pieces.local, solved.system.stiffness, solved.system.mass, std::span(&solved.solid, 1), {},
-      spec::Mass::consistent, {spoilt, residual, solved.modes.shapes, 20, std::sqrt(spoilt.back()) / (2 * std::numbers::pi)});
+      job::Mass::consistent, {spoilt, residual, solved.modes.shapes, 20, std::sqrt(spoilt.back()) / (2 * std::numbers::pi)});
   for (std::size_t m = 0; m < lambda.size(); ++m) {
     const double error = 600 * std::abs(std::log2(spoilt[m] / lambda[m]));
     EXPECT_GT(error, 1e-7) << "the test must spoil something";
@@ -201,7 +201,7 @@ class MassBounds : public testing::TestWithParam<Case> {};
 TEST_P(MassBounds, enclose_the_mass_between_multiples_of_its_diagonal) {
   const auto& [name, fineness, kind] = GetParam();
   Solved solved = solve_by_hand(name, fineness, kind, 0);
-  const estimate::MassBounds bounds = estimate::find_mass_bounds(PETSC_COMM_WORLD, solved.pieces.local, spec::Mass::consistent);
+  const estimate::MassBounds bounds = estimate::find_mass_bounds(PETSC_COMM_WORLD, solved.pieces.local, job::Mass::consistent);
   EXPECT_GT(bounds.least, 0.02);
   EXPECT_LT(bounds.greatest, 10);
   // D^-1/2 M D^-1/2 by power iteration, from above and, shifted, from below.
@@ -285,7 +285,7 @@ TEST(Materials, are_smoothed_each_by_itself) {
   const std::vector<double> lambda{1e6}, residual{1e-8};
   // As with a lumped mass: a consistent one would count the tractions at the ends, too.
   const auto bars = estimate::calc_error_bars(PETSC_COMM_WORLD, local, solved.system.stiffness, solved.system.mass, solids, material_of_tet,
-                                              spec::Mass::lumped, {lambda, residual, shapes, 20, 1e6});
+                                              job::Mass::lumped, {lambda, residual, shapes, 20, 1e6});
   ASSERT_EQ(bars.parts.size(), 1U);
   EXPECT_GT(bars.parts[0].energy, 0);
   EXPECT_LT(bars.parts[0].interpolation, 1e-6 * bars.parts[0].energy);
@@ -293,14 +293,14 @@ TEST(Materials, are_smoothed_each_by_itself) {
 
 /// The parts of the estimate for a given displacement of the coarse bar of T10: not a mode, lambda = 1e6.
 template <typename Field>
-estimate::ErrorBars::Parts estimate_field(const Solved& solved, spec::Mass mass_kind, const Field& field) {
+estimate::ErrorBars::Parts estimate_field(const Solved& solved, job::Mass mass_kind, const Field& field) {
   const auto& local = solved.pieces.local;
   petsc::MatHandle shapes;
   petsc::check(MatCreateDense(PETSC_COMM_WORLD, 3 * local.free_nodes, PETSC_DECIDE, PETSC_DETERMINE, 1, nullptr, shapes.out()));
   PetscScalar* values = nullptr;
   petsc::check(MatDenseGetArray(shapes, &values));
   for (std::int32_t i = 0; i < local.free_nodes; ++i) {
-    const mesh::Vec3 u = field(local.nodes_m[i]);
+    const Vec3 u = field(local.nodes_m[i]);
     std::copy(u.begin(), u.end(), values + 3 * i);
   }
   petsc::check(MatDenseRestoreArray(shapes, &values));
@@ -316,10 +316,10 @@ TEST(Recovery, keeps_linear_strains_exactly_wherever_elements_are_few) {
   // Pure bending, u quadratic in place, is what T10 follow: no error may be seen, not at the corners of one layer of elements either.
   // As with a lumped mass: a consistent one would count the tractions at the ends, too.
   const Solved solved = solve_by_hand("bar", -1, MeshKind::T10, 0);
-  const auto parts = estimate_field(solved, spec::Mass::lumped, [](const mesh::Vec3& p) {
+  const auto parts = estimate_field(solved, job::Mass::lumped, [](const Vec3& p) {
     const auto& [x, y, z] = p;
     const double nu = 0.33;
-    return mesh::Vec3{x * z, -nu * y * z, -(x * x + nu * (z * z - y * y)) / 2};
+    return Vec3{x * z, -nu * y * z, -(x * x + nu * (z * z - y * y)) / 2};
   });
   EXPECT_GT(parts.energy, 0);
   EXPECT_LT(parts.interpolation, 1e-9 * parts.energy);
@@ -330,10 +330,10 @@ TEST(Tractions, on_the_free_surface_count_as_the_energy_of_a_layer_that_takes_th
   // elements' 10 mm height or of the root of their face's area, 0.5 x 15 x 12 mm^2, whichever is less.
   const Solved solved = solve_by_hand("bar", -1, MeshKind::T10, 0);
   const double nu = 0.33, e = 70e9, modulus = e * (1 - nu) / (1 + nu) / (1 - 2 * nu);
-  const auto stretch = [&](const mesh::Vec3& p) { return mesh::Vec3{p[0], -nu * p[1], -nu * p[2]}; };
+  const auto stretch = [&](const Vec3& p) { return Vec3{p[0], -nu * p[1], -nu * p[2]}; };
   const double depth = std::sqrt(0.5 * 0.015 * 0.012) / 8, ends = 2 * 0.03 * 0.012;
-  EXPECT_NEAR(estimate_field(solved, spec::Mass::consistent, stretch).interpolation / (depth * ends * e * e / modulus / 1e6), 1, 1e-4);
-  EXPECT_LT(estimate_field(solved, spec::Mass::lumped, stretch).interpolation, 1e-9 * e * 0.3 * 0.03 * 0.012 / 1e6);
+  EXPECT_NEAR(estimate_field(solved, job::Mass::consistent, stretch).interpolation / (depth * ends * e * e / modulus / 1e6), 1, 1e-4);
+  EXPECT_LT(estimate_field(solved, job::Mass::lumped, stretch).interpolation, 1e-9 * e * 0.3 * 0.03 * 0.012 / 1e6);
 }
 
 TEST(Prediction, of_the_bars_on_a_finer_mesh_is_right_to_a_factor_of_two) {
@@ -353,7 +353,7 @@ TEST(Arguments, that_do_not_fit_are_refused_on_every_rank) {
   Solved solved = solve_by_hand("box", -3, MeshKind::T4, 2);
   const std::vector<double> one{solved.modes.lambda[0]}, residual{1e-9};
   EXPECT_THROW((void)estimate::calc_error_bars(PETSC_COMM_WORLD, solved.pieces.local, solved.system.stiffness, solved.system.mass,
-                                               std::span(&solved.solid, 1), {}, spec::Mass::consistent,
+                                               std::span(&solved.solid, 1), {}, job::Mass::consistent,
                                                {one, residual, solved.modes.shapes, 20, 1e6}),
                InputError);
 }

@@ -21,7 +21,7 @@ using tests::get_rank;
 using tests::get_ranks;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
-const spec::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
+const job::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
 constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
 
 mesh::TetMesh on_rank_0(const mesh::TetMesh& whole) { return get_rank() == 0 ? whole : mesh::TetMesh{}; }
@@ -60,7 +60,7 @@ double find_norm(const Mat matrix) {
   return norm;
 }
 
-class Assembly : public testing::TestWithParam<std::tuple<int, spec::Mass>> {
+class Assembly : public testing::TestWithParam<std::tuple<int, job::Mass>> {
  protected:
   int order() const { return std::get<0>(GetParam()); }
   mesh::TetMesh box = tests::make_box({5, 4, 3}, kSize, order());
@@ -113,7 +113,7 @@ TEST_P(Assembly, gives_exactly_the_kinetic_energy_of_a_linear_field_when_consist
   const auto x = sample(system, pieces.local, [](const Vec3& p) { return Vec3{p[0], 0, 0}; });
   const double exact = 7850 * std::pow(kSize[0], 3) / 3 * kSize[1] * kSize[2];
   const double value = product(system.mass, x, x);
-  if (std::get<1>(GetParam()) == spec::Mass::consistent) {
+  if (std::get<1>(GetParam()) == job::Mass::consistent) {
     EXPECT_NEAR(value, exact, 1e-12 * exact);
   } else {
     EXPECT_NEAR(value, exact, 0.05 * exact);
@@ -125,7 +125,7 @@ TEST_P(Assembly, stores_nine_entries_of_stiffness_and_three_of_mass_for_each_pai
   for (std::int64_t e = 0; e < box.tet_count(); ++e)
     for (const auto i : box.tet(e))
       for (const auto j : box.tet(e)) pairs.emplace(i, j);
-  const bool lumped = std::get<1>(GetParam()) == spec::Mass::lumped;
+  const bool lumped = std::get<1>(GetParam()) == job::Mass::lumped;
   const auto count = [](const Mat matrix) {
     MatInfo info;
     petsc::check(MatGetInfo(matrix, MAT_GLOBAL_SUM, &info));
@@ -141,11 +141,10 @@ TEST_P(Assembly, gives_symmetric_matrices) {
   for (const Mat matrix : {system.stiffness.get(), system.mass.get()}) EXPECT_NEAR(product(matrix, x, y) / product(matrix, y, x), 1, 1e-10);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Assembly,
-                         testing::Combine(testing::Values(1, 2), testing::Values(spec::Mass::consistent, spec::Mass::lumped)),
+INSTANTIATE_TEST_SUITE_P(All, Assembly, testing::Combine(testing::Values(1, 2), testing::Values(job::Mass::consistent, job::Mass::lumped)),
                          [](const auto& info) {
                            return std::string(std::get<0>(info.param) == 1 ? "T4_" : "T10_") +
-                                  (std::get<1>(info.param) == spec::Mass::consistent ? "consistent" : "lumped");
+                                  (std::get<1>(info.param) == job::Mass::consistent ? "consistent" : "lumped");
                          });
 
 TEST(Distribution, gives_every_rank_its_own_elements_and_their_nodes_and_nothing_else) {
@@ -243,7 +242,7 @@ TEST(Elimination, of_held_nodes_leaves_the_rows_of_the_others_as_they_were) {
   for (std::size_t i = 0; i < box.nodes.size(); ++i)
     if (box.nodes[i][0] == 0) held.push_back(static_cast<std::int32_t>(i));
   const Distribution pieces = distribute_box(box, held);
-  const System system = assemble(kWorld, pieces.local, kSteel, spec::Mass::consistent);
+  const System system = assemble(kWorld, pieces.local, kSteel, job::Mass::consistent);
   PetscInt rows = 0;
   petsc::check(MatGetSize(system.stiffness, &rows, nullptr));
   EXPECT_EQ(rows, 3 * static_cast<PetscInt>(box.nodes.size() - held.size()));
@@ -258,7 +257,7 @@ TEST(Assembling, a_mesh_with_an_element_inside_out_fails_on_every_rank_and_names
   std::swap(box.tets[4 * 17], box.tets[4 * 17 + 1]);
   const Distribution pieces = distribute_box(box);
   try {
-    assemble(kWorld, pieces.local, kSteel, spec::Mass::consistent);
+    assemble(kWorld, pieces.local, kSteel, job::Mass::consistent);
     FAIL() << "accepted";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("element 18 of the mesh"));

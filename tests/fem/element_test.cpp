@@ -17,7 +17,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-const spec::Material kMaterial{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
+const job::Material kMaterial{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
 
 const std::vector<Vec3> kTet{{0.1, -0.2, 0.05}, {1.3, 0.1, 0.2}, {0.2, 0.9, -0.1}, {0.3, 0.2, 1.1}};
 
@@ -135,7 +135,7 @@ class Elements : public testing::TestWithParam<double> {  // bulge of the mid-si
 
 TEST_P(Elements, give_no_force_under_the_six_rigid_motions) {
   ElementMatrices element;
-  ASSERT_TRUE(calc_element(x(), kMaterial, spec::Mass::consistent, element));
+  ASSERT_TRUE(calc_element(x(), kMaterial, job::Mass::consistent, element));
   const Eigen::MatrixXd k = stiffness(element);
   for (int motion = 0; motion < 6; ++motion) {
     const Vector3d axis = Vector3d::Unit(motion % 3);
@@ -146,7 +146,7 @@ TEST_P(Elements, give_no_force_under_the_six_rigid_motions) {
 
 TEST_P(Elements, hold_exactly_the_energy_of_a_uniform_strain) {
   ElementMatrices element;
-  ASSERT_TRUE(calc_element(x(), kMaterial, spec::Mass::consistent, element));
+  ASSERT_TRUE(calc_element(x(), kMaterial, job::Mass::consistent, element));
   Matrix3d gradient;
   gradient << 1e-3, 2e-3, -5e-4, 3e-4, -7e-4, 1e-3, 2e-4, 0, 4e-4;
   const VectorXd u = sample(x(), [&](const Vector3d& p) -> Vector3d { return gradient * p; });
@@ -161,7 +161,7 @@ TEST_P(Elements, hold_exactly_the_energy_of_a_uniform_strain) {
 
 TEST_P(Elements, carry_exactly_their_mass_in_a_translation_consistent_and_lumped) {
   const ElementMoments moments = calc_moments(x(), kMaterial.density_kg_m3);
-  for (const auto kind : {spec::Mass::consistent, spec::Mass::lumped}) {
+  for (const auto kind : {job::Mass::consistent, job::Mass::lumped}) {
     ElementMatrices element;
     ASSERT_TRUE(calc_element(x(), kMaterial, kind, element));
     EXPECT_NEAR(mass(element).sum(), moments.mass_kg, 1e-12 * moments.mass_kg);
@@ -173,7 +173,7 @@ TEST_P(Elements, carry_exactly_their_mass_in_a_translation_consistent_and_lumped
 
 TEST_P(Elements, have_lumped_masses_that_are_positive_and_on_the_diagonal) {
   ElementMatrices element;
-  ASSERT_TRUE(calc_element(x(), kMaterial, spec::Mass::lumped, element));
+  ASSERT_TRUE(calc_element(x(), kMaterial, job::Mass::lumped, element));
   const Eigen::MatrixXd m = mass(element);
   EXPECT_GT(m.diagonal().minCoeff(), 0);
   EXPECT_EQ((m - Eigen::MatrixXd(m.diagonal().asDiagonal())).norm(), 0);
@@ -184,7 +184,7 @@ TEST_P(Elements, have_lumped_masses_that_are_positive_and_on_the_diagonal) {
 
 TEST_P(Elements, have_symmetric_matrices_with_six_zero_and_else_positive_stiffnesses) {
   ElementMatrices element;
-  ASSERT_TRUE(calc_element(x(), kMaterial, spec::Mass::consistent, element));
+  ASSERT_TRUE(calc_element(x(), kMaterial, job::Mass::consistent, element));
   const Eigen::MatrixXd k = stiffness(element), m = mass(element);
   EXPECT_EQ((k - k.transpose()).norm(), 0);
   EXPECT_LT((m - m.transpose()).norm(), 1e-15 * m.norm());
@@ -202,7 +202,7 @@ TEST(QuadraticElement, agrees_with_a_slow_quadrature_of_another_make) {
   for (const double bulge : {0.0, 0.02}) {
     const auto x = make_t10(bulge);
     ElementMatrices element;
-    ASSERT_TRUE(calc_element(x, kMaterial, spec::Mass::consistent, element));
+    ASSERT_TRUE(calc_element(x, kMaterial, job::Mass::consistent, element));
     const Interpolant place(as_rows(x));
     for (int seed = 0; seed < 3; ++seed) {
       const VectorXd u = random_vector(30, seed);
@@ -228,7 +228,7 @@ TEST(QuadraticElement, agrees_with_a_slow_quadrature_of_another_make) {
 TEST(QuadraticElement, holds_exactly_the_energy_of_a_quadratic_field) {
   const auto x = make_t10(0);
   ElementMatrices element;
-  ASSERT_TRUE(calc_element(x, kMaterial, spec::Mass::consistent, element));
+  ASSERT_TRUE(calc_element(x, kMaterial, job::Mass::consistent, element));
   const auto field = [](const Vector3d& p) -> Vector3d {
     return {p[0] * p[0] - p[1] * p[2], 2 * p[0] * p[1] + p[2], p[2] * p[2] + p[0] * p[1] - 3 * p[1] * p[1]};
   };
@@ -254,16 +254,16 @@ TEST(QuadraticElement, whose_mid_node_is_far_out_of_place_is_refused) {
   auto x = make_t10(0);
   x[4] = {2.0, -1.0, 1.5};
   ElementMatrices element;
-  EXPECT_FALSE(calc_element(x, kMaterial, spec::Mass::consistent, element));
+  EXPECT_FALSE(calc_element(x, kMaterial, job::Mass::consistent, element));
 }
 
 TEST(LinearElement, turned_inside_out_or_flat_is_refused) {
   auto x = kTet;
   ElementMatrices element;
   std::swap(x[0], x[1]);
-  EXPECT_FALSE(calc_element(x, kMaterial, spec::Mass::consistent, element));
+  EXPECT_FALSE(calc_element(x, kMaterial, job::Mass::consistent, element));
   x = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
-  EXPECT_FALSE(calc_element(x, kMaterial, spec::Mass::consistent, element));
+  EXPECT_FALSE(calc_element(x, kMaterial, job::Mass::consistent, element));
 }
 
 TEST(Moments, of_a_tetrahedron_obey_the_formula_of_barycentric_integrals) {

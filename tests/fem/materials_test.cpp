@@ -42,8 +42,8 @@ Distribution distribute_halves(int order) {
   return distribute(kWorld, get_rank() == 0 ? whole : mesh::TetMesh{}, {});
 }
 
-spec::JobSpec parse(const std::string& materials) {
-  return spec::parse_job("{\"mesh\": \"m\", \"bank\": \"b\",\n" + materials + "}", "/jobs/job.json");
+job::JobSpec parse(const std::string& materials) {
+  return job::parse_job("{\"mesh\": \"m\", \"bank\": \"b\",\n" + materials + "}", "/jobs/job.json");
 }
 
 std::string isotropic(double density, const std::string& damping = R"({"rayleigh": {}})") {
@@ -150,7 +150,7 @@ TEST(DecayOfACompositeBar, follows_from_the_shares_of_energy_of_each_half) {
                                               return Vec3{x[0] * x[0], 0, 0};
                                             }});
   const std::vector<double> lambda{1e6, 4e8};
-  const Decay decay = calc_decay(kWorld, pieces.local, materials, spec::Mass::consistent, lambda, shapes);
+  const Decay decay = calc_decay(kWorld, pieces.local, materials, job::Mass::consistent, lambda, shapes);
   ASSERT_EQ(decay.shares.elastic.size(), 4u);
   EXPECT_NEAR(decay.shares.elastic[0], 1.0 / 4, 1e-12);
   EXPECT_NEAR(decay.shares.elastic[1], 3.0 / 4, 1e-12);
@@ -172,10 +172,10 @@ TEST(DecayOfOneMaterial, is_its_law_and_of_two_alike_halves_the_same) {
                                               return Vec3{0, x[0] * x[2], 0};
                                             }});
   const auto whole = parse("\"material\": " + isotropic(1000, law));
-  const Decay one = calc_decay(kWorld, pieces.local, find_materials(kWorld, pieces.local, whole), spec::Mass::consistent, lambda, shapes);
+  const Decay one = calc_decay(kWorld, pieces.local, find_materials(kWorld, pieces.local, whole), job::Mass::consistent, lambda, shapes);
   EXPECT_NEAR(one.decay_per_s[0], (12 + 0.001 * 1e3 + 2e-7 * 1e6) / 2, 1e-12);
   const auto halves = parse("\"materials\": {\"7\": " + isotropic(1000, law) + ", \"9\": " + isotropic(1000, law) + "}");
-  const Decay two = calc_decay(kWorld, pieces.local, find_materials(kWorld, pieces.local, halves), spec::Mass::consistent, lambda, shapes);
+  const Decay two = calc_decay(kWorld, pieces.local, find_materials(kWorld, pieces.local, halves), job::Mass::consistent, lambda, shapes);
   for (int j = 0; j < 2; ++j) EXPECT_NEAR(two.decay_per_s[j] / one.decay_per_s[j], 1, 1e-12);
 }
 
@@ -183,14 +183,14 @@ TEST(DecayOfOneMaterial, is_its_law_and_of_two_alike_halves_the_same) {
 const std::string kSpruce = R"({"orthotropic": {"young_modulus_pa": [11e9, 0.9e9, 0.5e9], "shear_modulus_pa": [0.7e9, 0.04e9, 0.6e9],
                                 "poisson_ratio": [0.37, 0.43, 0.47]AXES}, "density_kg_m3": 400, "damping": {"rayleigh": {}}})";
 
-spec::Material make_spruce(const std::string& axes) {
+job::Material make_spruce(const std::string& axes) {
   std::string text = kSpruce;
   text.replace(text.find("AXES"), 4, axes);
   return parse("\"material\": " + text).material;
 }
 
 double calc_energy(const Materials& materials, const LocalMesh& local, const std::function<Vec3(const Vec3&)>& field) {
-  const System system = assemble(kWorld, local, materials, spec::Mass::consistent);
+  const System system = assemble(kWorld, local, materials, job::Mass::consistent);
   const auto shapes = sample(local, {field});
   petsc::VecHandle x, y;
   petsc::check(MatCreateVecs(system.stiffness, x.out(), y.out()));
@@ -258,8 +258,8 @@ TEST_P(IsotropicConstants, given_as_orthotropic_ones_make_the_same_stiffness) {
       R"({{"orthotropic": {{"young_modulus_pa": [{0}, {0}, {0}], "shear_modulus_pa": [{1:.17g}, {1:.17g}, {1:.17g}], "poisson_ratio": [{2}, {2}, {2}],
            "axes": [[1, 2, 2], [2, 1, -2]]}}, "density_kg_m3": 1, "damping": {{"rayleigh": {{}}}}}})",
       e, g, nu);
-  const spec::Material as_orthotropic = parse("\"material\": " + text).material;
-  spec::Material as_isotropic;
+  const job::Material as_orthotropic = parse("\"material\": " + text).material;
+  job::Material as_isotropic;
   as_isotropic.young_modulus_pa = e;
   as_isotropic.poisson_ratio = nu;
   as_isotropic.density_kg_m3 = 1;
@@ -272,8 +272,8 @@ TEST_P(IsotropicConstants, given_as_orthotropic_ones_make_the_same_stiffness) {
     for (int d = 0; d < 3; ++d) straight[4 + k][d] = (curved[mesh::kEdges[k][0]][d] + curved[mesh::kEdges[k][1]][d]) / 2;
   for (const std::vector<Vec3>& x : {curved, straight, std::vector<Vec3>(curved.begin(), curved.begin() + 4)}) {
     ElementMatrices a, b;
-    ASSERT_TRUE(calc_element(x, as_orthotropic, spec::Mass::consistent, a));
-    ASSERT_TRUE(calc_element(x, as_isotropic, spec::Mass::consistent, b));
+    ASSERT_TRUE(calc_element(x, as_orthotropic, job::Mass::consistent, a));
+    ASSERT_TRUE(calc_element(x, as_isotropic, job::Mass::consistent, b));
     // The inverse of the compliance loses as many digits as the stiffest strain is stiffer than the softest.
     for (std::size_t i = 0; i < a.stiffness.size(); ++i)
       EXPECT_NEAR(a.stiffness[i], b.stiffness[i], 1e-14 * stiffest * stiffest / e) << x.size() << " nodes, nu " << nu;
@@ -287,8 +287,8 @@ TEST(OrthotropicRubber, keeps_the_energy_of_every_uniform_strain) {
   const std::string rubber =
       R"("material": {"orthotropic": {"young_modulus_pa": [3e6, 2e6, 1.5e6], "shear_modulus_pa": [0.9e6, 0.5e6, 0.7e6],
     "poisson_ratio": [0.24995, 0.83316, 0.74985]}, "density_kg_m3": 1100, "damping": {"rayleigh": {}}})";
-  const spec::Material material = parse(rubber).material;
-  const spec::Elasticity c = material.calc_elasticity_pa();
+  const job::Material material = parse(rubber).material;
+  const job::Elasticity c = material.calc_elasticity_pa();
   EXPECT_GT(Solid(material).mean_lambda_pa, 0.9 * c[1]);
   const std::array<double, 6> strain{0.3, -0.2, 0.15, 0.1, -0.25, 0.2};  // Voigt
   const auto field = [&](const Vec3& x) {

@@ -15,9 +15,9 @@ namespace carillon::fem {
 namespace {
 
 constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
-const spec::Material kAluminium{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
+const job::Material kAluminium{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
 
-std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, spec::Mass mass) {
+std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, job::Mass mass) {
   const Distribution pieces = distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {});
   const System system = assemble(PETSC_COMM_WORLD, pieces.local, kAluminium, mass);
   std::vector<int> number;
@@ -36,15 +36,15 @@ std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, spec::
 constexpr double kS110 = 9380.300465361, kP100 = 10329.70716337, kS210 = 13008.13627197;
 
 double order_of_convergence(std::array<int, 3> coarse, int order, double exact, int mode) {
-  const double first = calc_frequencies(coarse, order, spec::Mass::consistent)[mode] / exact - 1;
+  const double first = calc_frequencies(coarse, order, job::Mass::consistent)[mode] / exact - 1;
   for (int& n : coarse) n *= 2;
-  const double second = calc_frequencies(coarse, order, spec::Mass::consistent)[mode] / exact - 1;
+  const double second = calc_frequencies(coarse, order, job::Mass::consistent)[mode] / exact - 1;
   EXPECT_GT(second, 0) << "a conforming element is too stiff";
   return std::log2(first / second);
 }
 
 TEST(BoxOnRollers, has_its_first_modes_with_T10_to_a_thousandth) {
-  const auto f = calc_frequencies({9, 6, 3}, 2, spec::Mass::consistent);
+  const auto f = calc_frequencies({9, 6, 3}, 2, job::Mass::consistent);
   EXPECT_NEAR(f[0] / kS110, 1, 1e-3);
   EXPECT_NEAR(f[1] / kP100, 1, 1e-3);
   EXPECT_NEAR(f[2] / kS210, 1, 2e-3);
@@ -55,7 +55,7 @@ TEST(BoxOnRollers, converges_with_the_second_order_for_T4) { EXPECT_NEAR(order_o
 TEST(BoxOnRollers, converges_with_the_fourth_order_for_T10) { EXPECT_NEAR(order_of_convergence({6, 4, 2}, 2, kS110, 0), 4, 0.3); }
 
 TEST(BoxOnRollers, converges_from_below_with_lumped_T10) {
-  const auto f = calc_frequencies({6, 4, 2}, 2, spec::Mass::lumped);
+  const auto f = calc_frequencies({6, 4, 2}, 2, job::Mass::lumped);
   EXPECT_LT(f[0], kS110);
   EXPECT_NEAR(f[0] / kS110, 1, 0.02);
 }

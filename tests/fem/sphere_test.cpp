@@ -19,12 +19,12 @@ using tests::kT2;
 
 /// The first ten elastic modes: five times T2, five times S2.
 std::vector<double> calc_modes(const mesh::TetMesh& mesh, double nu, Form form) {
-  spec::Material material;
+  job::Material material;
   material.young_modulus_pa = 2 * (1 + nu);
   material.poisson_ratio = nu;
   material.density_kg_m3 = 1;
   const Distribution pieces = distribute(PETSC_COMM_WORLD, mesh, {});
-  const System system = assemble(PETSC_COMM_WORLD, pieces.local, material, spec::Mass::consistent, form);
+  const System system = assemble(PETSC_COMM_WORLD, pieces.local, material, job::Mass::consistent, form);
   const auto pairs = tests::iterate_subspace(tests::copy(system.stiffness), tests::copy(system.mass), 16, 4, 20);
   std::vector<double> omega;
   for (int i = 6; i < 16; ++i) omega.push_back(std::sqrt(pairs.lambda[i]));

@@ -17,7 +17,7 @@ namespace {
 using tests::get_rank;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
-const spec::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
+const job::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
 constexpr std::array<double, 3> kSize{0.3, 0.04, 0.02};
 constexpr std::array<int, 3> kCells{15, 4, 2};
 
@@ -26,7 +26,7 @@ using Field = std::function<Vec3(const Vec3&)>;
 using Fix = std::function<std::int32_t(const Vec3&)>;
 
 struct Body {
-  Body(int order, spec::Mass mass, const Fix& fix) : mass(mass) {
+  Body(int order, job::Mass mass, const Fix& fix) : mass(mass) {
     const mesh::TetMesh whole = tests::make_box(kCells, kSize, order);
     std::vector<std::int32_t> fixed;
     for (std::size_t i = 0; i < whole.nodes.size(); ++i)
@@ -60,7 +60,7 @@ struct Body {
     return calc_supports(kWorld, pieces.local, kSteel, mass, lambda, shapes);
   }
 
-  spec::Mass mass;
+  job::Mass mass;
   Distribution pieces;
   System system;
 };
@@ -72,7 +72,7 @@ std::int32_t nowhere(const Vec3&) { return -1; }
 class Reactions : public testing::TestWithParam<int> {};
 
 TEST_P(Reactions, of_constant_strain_are_stress_times_area) {
-  const Body body(GetParam(), spec::Mass::consistent, at_end);
+  const Body body(GetParam(), job::Mass::consistent, at_end);
   // Stretched along x without giving way across; sheared along z.
   const std::vector<Field> fields{[](const Vec3& x) {
                                     return Vec3{1e-3 * x[0], 0, 0};
@@ -93,7 +93,7 @@ TEST_P(Reactions, of_constant_strain_are_stress_times_area) {
 TEST_P(Reactions, balance_force_and_couple_of_all_that_moves) {
   // (K phi - lambda M phi) over all nodes is -lambda times the integrals of rho phi and (x - c) cross rho phi, and on the free nodes the
   // residual; those are known from K and M of the free nodes alone, and from a polynomial's integral over the box.
-  const Body body(GetParam(), spec::Mass::consistent, at_end);
+  const Body body(GetParam(), job::Mass::consistent, at_end);
   const Field field = [](const Vec3& x) { return Vec3{x[0] * x[2], x[0], -2 * x[0]}; };
   const double lambda = 3e7;
   const Field used = GetParam() == 2 ? field : Field([](const Vec3& x) { return Vec3{3 * x[0], x[0], -2 * x[0]}; });
@@ -142,7 +142,7 @@ TEST_P(Reactions, balance_force_and_couple_of_all_that_moves) {
 }
 
 TEST_P(Reactions, come_by_patches_that_no_element_joins) {
-  const Body body(GetParam(), spec::Mass::lumped, at_both_ends);
+  const Body body(GetParam(), job::Mass::lumped, at_both_ends);
   const Supports supports = body.calc({[](const Vec3& x) { return Vec3{0, 0, x[0] * (kSize[0] - x[0])}; }}, {1e6});
   ASSERT_EQ(supports.list.size(), 2U);
   for (int s = 0; s < 2; ++s) {
@@ -161,7 +161,7 @@ TEST_P(Reactions, come_by_patches_that_no_element_joins) {
 }
 
 TEST_P(Reactions, count_the_energy_of_elements_within_one_thickness) {
-  const Body body(GetParam(), spec::Mass::consistent, at_end);
+  const Body body(GetParam(), job::Mass::consistent, at_end);
   const std::vector<Field> fields{[](const Vec3& x) { return Vec3{x[0], 0, 0}; }};
   const double lambda = (kSteel.lame_lambda_pa() + 2 * kSteel.lame_mu_pa()) * kSize[0] * kSize[1] * kSize[2];  // phi^T K phi
   // Cells of 20 mm, thickness 20 mm: the first of fifteen, whose constant strain has its part of the energy.
@@ -169,7 +169,7 @@ TEST_P(Reactions, count_the_energy_of_elements_within_one_thickness) {
 }
 
 TEST(Supports, of_a_free_body_are_none) {
-  const Body body(1, spec::Mass::consistent, nowhere);
+  const Body body(1, job::Mass::consistent, nowhere);
   EXPECT_TRUE(body.calc({[](const Vec3& x) { return x; }}, {1.0}).list.empty());
 }
 
@@ -178,7 +178,7 @@ TEST(Supports, of_two_entries_that_meet_stay_two_and_a_single_node_has_no_area) 
     if (x[0] < 1e-9) return x[1] < kSize[1] / 2 - 1e-9 ? 1 : 0;
     return x[0] > kSize[0] - 1e-9 && x[1] < 1e-9 && x[2] < 1e-9 ? 2 : -1;
   };
-  const Body body(1, spec::Mass::consistent, fix);
+  const Body body(1, job::Mass::consistent, fix);
   const Supports supports = body.calc({[](const Vec3& x) { return Vec3{x[0], 0, 0}; }}, {1e12});
   ASSERT_EQ(supports.list.size(), 3U);
   for (int s = 0; s < 3; ++s) EXPECT_EQ(supports.list[s].entry, s);

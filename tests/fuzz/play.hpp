@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/host/program.hpp"
 #include "tests/synth/cube_bank.hpp"
 

@@ -14,17 +14,16 @@
 
 namespace carillon::hard {
 
+using carillon::norm;
 using contact::BodySpec;
 using contact::GroundSpec;
 using contact::World;
 using contact::WorldSpec;
 using contact::tests::make_ball;
 using contact::tests::make_box;
-using contact::tests::norm;
-using contact::tests::operator+;
-using contact::tests::operator-;
-using contact::tests::operator*;
-using stream::Vec3;
+using carillon::operator+;
+using carillon::operator-;
+using carillon::operator*;
 
 inline constexpr double kGravity = 9.81;
 

@@ -62,7 +62,7 @@ double find_largest_angle(const Answer& alone, const Answer& together, std::size
 
 }  // namespace
 
-spec::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
+job::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
   return {.young_modulus_pa = young_modulus_pa, .poisson_ratio = poisson_ratio, .density_kg_m3 = density_kg_m3};
 }
 
@@ -84,7 +84,7 @@ Answer solve(MPI_Comm comm, const Body& body, const eigen::Options& options) {
   fem::Materials materials;
   materials.list = body.materials;
   if (body.materials.size() > 1) materials.of_tet = local.region;
-  answer.system = fem::assemble(comm, local, materials, spec::Mass::consistent);
+  answer.system = fem::assemble(comm, local, materials, job::Mass::consistent);
   eigen::NodeLayout layout;
   layout.position.assign(local.nodes_m.begin(), local.nodes_m.begin() + local.free_nodes);
   layout.component.assign(local.component.begin(), local.component.begin() + local.free_nodes);
@@ -98,11 +98,11 @@ Answer solve(MPI_Comm comm, const Body& body, const eigen::Options& options) {
 
 estimate::ErrorBars calc_bars(MPI_Comm comm, const Body& body, const Answer& answer, const eigen::Options& options) {
   std::vector<estimate::Solid> solids;
-  for (const spec::Material& material : body.materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  for (const job::Material& material : body.materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const std::vector<std::int32_t> of_tet = body.materials.size() > 1 ? answer.pieces.local.region : std::vector<std::int32_t>{};
   const bool is_cut = answer.modes.band_count > static_cast<std::int64_t>(answer.freq_hz.size());
   return estimate::calc_error_bars(
-      comm, answer.pieces.local, answer.system.stiffness, answer.system.mass, solids, of_tet, spec::Mass::consistent,
+      comm, answer.pieces.local, answer.system.stiffness, answer.system.mass, solids, of_tet, job::Mass::consistent,
       {answer.modes.lambda, answer.modes.residual, answer.modes.shapes, options.low_hz, is_cut ? answer.freq_hz.back() : options.high_hz,
        answer.modes.count_below_low - answer.modes.rigid_count - answer.modes.mechanism_count});
 }

@@ -16,11 +16,11 @@ namespace carillon::hard {
 
 struct Body {
   mesh::TetMesh mesh;
-  std::vector<spec::Material> materials;  // by region of the mesh
+  std::vector<job::Material> materials;  // by region of the mesh
 };
 
 /// A material without damping.
-spec::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
+job::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
 
 /// Both in one mesh, without contact: the materials of `b` follow those of `a`.
 Body join(const Body& a, const Body& b);
@@ -28,7 +28,7 @@ Body join(const Body& a, const Body& b);
 /// All nodes, mid-side nodes too, go where `place` says.
 template <class Place>
 mesh::TetMesh move_nodes(mesh::TetMesh mesh, Place&& place) {
-  for (mesh::Vec3& x : mesh.nodes) x = place(x);
+  for (Vec3& x : mesh.nodes) x = place(x);
   return mesh;
 }
 

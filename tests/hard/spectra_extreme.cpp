@@ -20,14 +20,10 @@ namespace {
 
 constexpr double kRho = 7850, kNu = 0.3, kE = 200e9;
 
-Body make_brick(int order, const spec::Material& material = make_solid(kE, kNu, kRho), mesh::Vec3 origin = {}) {
+Body make_brick(int order, const job::Material& material = make_solid(kE, kNu, kRho), Vec3 origin = {}) {
   const std::array<int, 3> cells = order == 1 ? std::array{4, 5, 6} : std::array{2, 2, 3};
   const mesh::TetMesh box = shapes::make_box({0.05, 0.065, 0.085}, cells, order);
-  return {move_nodes(box,
-                     [&](const mesh::Vec3& x) {
-                       return mesh::Vec3{x[0] + origin[0], x[1] + origin[1], x[2] + origin[2]};
-                     }),
-          {material}};
+  return {move_nodes(box, [&](const Vec3& x) { return Vec3{x[0] + origin[0], x[1] + origin[1], x[2] + origin[2]}; }), {material}};
 }
 
 eigen::Options make_band(double low_hz, double high_hz) {
@@ -106,7 +102,7 @@ TEST(spectra, almost_equal_components) {
 Body make_dumbbell(int order, double soft_e_pa) {
   mesh::TetMesh rod = shapes::make_box({0.22, 0.1, 0.1}, {5, 1, 1}, 1);
   const std::array<double, 6> planes{-0.11, -0.06, -0.01, 0.01, 0.06, 0.11};
-  for (mesh::Vec3& x : rod.nodes) x[0] = planes[static_cast<std::size_t>(std::lround((x[0] + 0.11) / 0.044))];
+  for (Vec3& x : rod.nodes) x[0] = planes[static_cast<std::size_t>(std::lround((x[0] + 0.11) / 0.044))];
   for (std::size_t e = 0; e < rod.regions.size(); ++e) {
     double middle = 0;
     for (std::size_t i = 0; i < 4; ++i) middle += rod.nodes[static_cast<std::size_t>(rod.tets[4 * e + i])][0] / 4;

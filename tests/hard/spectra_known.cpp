@@ -95,10 +95,10 @@ TEST(spectra, bowl_pairs) {
                                                    .dimensions = {{"length", 0.09}, {"outer-radius", 0.036}, {"wall", 0.004}},
                                                    .order = order,
                                                    .target_nodes = order == 1 ? 400 : 1000});
-    const auto bend = [](const mesh::Vec3& x) {
+    const auto bend = [](const Vec3& x) {
       const double polar = std::numbers::pi / 180 * (5 + 85 * (x[0] / 0.09 + 0.5));
       const double rho = std::hypot(x[1], x[2]), r = 0.06 + (rho - 0.034);
-      return mesh::Vec3{-r * std::cos(polar), r * std::sin(polar) * x[1] / rho, r * std::sin(polar) * x[2] / rho};
+      return Vec3{-r * std::cos(polar), r * std::sin(polar) * x[1] / rho, r * std::sin(polar) * x[2] / rho};
     };
     Body bowl{move_nodes(tube, bend), {make_solid(72e9, 0.22, 2700)}};
     mesh::check_mesh(bowl.mesh);

@@ -22,7 +22,6 @@ using contact::tests::add_modes;
 using contact::tests::make_ball;
 using contact::tests::make_body;
 using contact::tests::make_box;
-using stream::Vec3;
 constexpr double kGravity = 9.81;
 
 /// What a world did until its end.

@@ -13,14 +13,10 @@ namespace {
 using impact::Body;
 using impact::Books;
 using impact::Contact;
-using impact::dot;
 using impact::Impact;
 using impact::Modes;
 using impact::Options;
 using impact::Pulse;
-using impact::Vec3;
-using impact::operator-;
-using impact::operator*;
 using impact::tests::make_ball;
 using impact::tests::make_contact;
 using impact::tests::make_plate;

@@ -15,16 +15,15 @@
 namespace carillon::hard {
 namespace {
 
+using carillon::norm;
 using contact::BodySpec;
 using contact::GroundSpec;
 using contact::World;
 using contact::WorldSpec;
 using contact::tests::make_ball;
 using contact::tests::make_box;
-using contact::tests::norm;
-using contact::tests::operator-;
+using carillon::operator-;
 using joints::Kind;
-using stream::Vec3;
 
 bank::Bank weigh(bank::Bank bank, double mass_kg) {
   const double part = mass_kg / bank.rigid.mass_kg;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/hard/closed_form.hpp"
 #include "tests/hard/figure.hpp"

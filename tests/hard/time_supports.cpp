@@ -15,14 +15,14 @@ TEST(time, support_extremes) {
   for (const double softer : {1.0, 1e3, 1e6, 1e12}) {
     for (const double area : {0.0, 1e-30, 2e-4, 1e6}) {
       for (const double normal : {1.0, 0.0}) {
-        for (const std::string& name : config::list_base_names()) {
+        for (const std::string& name : material::list_base_names()) {
           bank::Bank bank = bank::example::make_supported_bank(2, 9);
           for (std::size_t s = 0; s < 2; ++s) {
             bank.supports.area_m2[s] = area;
             bank.supports.normal[s] = {normal, 0.0, 0.0};
           }
-          config::Object words = config::parse_document("{\"on\": " + config::quote(name) + ", \"loss\": 1}", "words").root();
-          config::Fixing fixing = *config::read_fixing(words);
+          base::Object words = base::parse_document("{\"on\": " + base::quote(name) + ", \"loss\": 1}", "words").root();
+          material::Fixing fixing = *material::read_fixing(words);
           fixing.base.young_modulus_pa /= softer;
           const support::Losses losses = support::calc_losses(bank, {.all = fixing});
           for (std::size_t m = 0; m < bank.mode_count(); ++m) {

@@ -8,7 +8,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     const carillon::host::Scene scene =
-        carillon::host::parse_scene(carillon::config::parse_document({reinterpret_cast<const char*>(data), size}, "scene.json"));
+        carillon::host::parse_scene(carillon::base::parse_document({reinterpret_cast<const char*>(data), size}, "scene.json"));
     carillon::host::calc_ears(scene.listener);
   } catch (const carillon::InputError&) {
   }

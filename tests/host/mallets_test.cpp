@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/host/strikes.hpp"
 #include "runtime/impact/spring.hpp"
 #include "runtime/synth/voice.hpp"

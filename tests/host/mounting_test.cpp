@@ -34,7 +34,7 @@ class Mounting : public testing::Test {
   }
 
   Scene parse(const std::string& bodies) const {
-    return parse_scene(config::parse_document("{\"duration_s\": 1,\n\"bodies\": [" + bodies + "]}", folder_ / "scene.json"));
+    return parse_scene(base::parse_document("{\"duration_s\": 1,\n\"bodies\": [" + bodies + "]}", folder_ / "scene.json"));
   }
   std::string fail(const std::string& bodies) const {
     try {

@@ -461,7 +461,7 @@ TEST(Render, ATrajectoryHoldsFewPosesAndThePlacesOfTheImpulses) {
     c.simulation.poses[0].push_back({i * 1e-4, {i * 2e-4, 1.0, 0.0}, {std::sqrt(0.5), 0.0, 0.0, std::sqrt(0.5)}});
   const Events events = make_events(c.list_events());
   std::string json;
-  write_trajectory(c.scene, {&c.bank}, events, config::Spool(), [&](std::string_view piece) { json += piece; });
+  write_trajectory(c.scene, {&c.bank}, events, base::Spool(), [&](std::string_view piece) { json += piece; });
   std::size_t rows = 0;
   for (std::size_t at = json.find("\n    ["); at != std::string::npos; at = json.find("\n    [", at + 1)) ++rows;
   EXPECT_LE(rows, 101u);

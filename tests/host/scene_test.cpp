@@ -19,7 +19,7 @@ std::string read_text(const std::string& file) {
   return text.str();
 }
 
-Scene parse(const std::string& text) { return parse_scene(config::parse_document(text, "/somewhere/scene.json")); }
+Scene parse(const std::string& text) { return parse_scene(base::parse_document(text, "/somewhere/scene.json")); }
 
 const std::string kBody = R"("bodies": [{"name": "a", "bank": "a.h5"}])";
 std::string with_strike(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n\"strikes\": [{" + keys + "}]}"; }
@@ -116,7 +116,7 @@ TEST(Scene, ManyStrikesAreReadInOnePassOfTheText) {
     text += i + 1 < kStrikes ? ",\n" : "\n";
   }
   text += "]}";
-  const config::Document document = config::parse_document(text, "/somewhere/scene.json");
+  const base::Document document = base::parse_document(text, "/somewhere/scene.json");
   const Scene scene = parse_scene(document);
   ASSERT_EQ(scene.strikes.size(), static_cast<std::size_t>(kStrikes));
   EXPECT_EQ(scene.strikes.back().place, "/somewhere/scene.json:" + std::to_string(kStrikes + 2));

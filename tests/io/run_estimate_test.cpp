@@ -107,7 +107,7 @@ TEST(RunEstimate, a_run_at_the_predicted_prices_is_half_done_after_half_the_time
 // whose bending, torsion and stretching have closed forms: with its section small against the waves, the law for solids undercounts, and
 // the bounds must still hold the truth.
 TEST(Weyl, bounds_hold_the_modes_of_a_slender_bar) {
-  spec::Material steel;
+  job::Material steel;
   steel.density_kg_m3 = 7850;
   steel.young_modulus_pa = 2e11;
   steel.poisson_ratio = 0.3;

@@ -4,6 +4,7 @@
 
 #include <ctime>
 
+#include "runtime/base/host.hpp"
 #include "tests/support/ranks.hpp"
 
 namespace carillon::io {
@@ -31,13 +32,13 @@ TEST(Stations, take_the_seconds_of_the_slowest_rank_and_the_memory_of_all) {
 }
 
 TEST(PeakMemory, is_told_of_every_rank_and_counts_what_was_touched) {
-  const std::int64_t before = find_peak_bytes();
+  const std::int64_t before = base::find_memory().peak;
   {
     std::vector<char> touched(std::size_t{64} << 20, 1);
     EXPECT_EQ(touched.back(), 1);
   }
-  EXPECT_GE(find_peak_bytes(), before);
-  EXPECT_GE(find_peak_bytes(), std::int64_t{64} << 20);
+  EXPECT_GE(base::find_memory().peak, before);
+  EXPECT_GE(base::find_memory().peak, std::int64_t{64} << 20);
   const auto all = gather_peak_bytes(MPI_COMM_WORLD);
   int ranks = 1;
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);

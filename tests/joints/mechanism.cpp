@@ -12,12 +12,6 @@
 namespace carillon::joints {
 namespace {
 
-using impact::cross;
-using impact::dot;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
-
 constexpr double kG = 9.81;
 constexpr double kFine = 1e-10;  // a tolerance for comparisons to many digits
 constexpr Vec3 kGravity{0, 0, -kG};

@@ -14,9 +14,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-using impact::dot;
-
 constexpr double kG = 9.81;
 constexpr Vec3 kGravity{0, 0, -kG};
 

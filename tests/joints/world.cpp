@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/contact/bodies.hpp"
 
 namespace carillon::contact::tests {

@@ -100,11 +100,11 @@ void run(const std::string& file, bool with_mumps, int rank) {
     if (rank == 0) body = mesh::read_mesh(file);
   });
   const fem::Distribution pieces = fem::distribute(PETSC_COMM_WORLD, body, {});
-  spec::Material ceramic;
+  job::Material ceramic;
   ceramic.young_modulus_pa = 5.4543e9;
   ceramic.poisson_ratio = 0.3303;
   ceramic.density_kg_m3 = 2700;
-  const fem::System system = fem::assemble(PETSC_COMM_WORLD, pieces.local, ceramic, spec::Mass::consistent);
+  const fem::System system = fem::assemble(PETSC_COMM_WORLD, pieces.local, ceramic, job::Mass::consistent);
   const double omega = 2 * std::numbers::pi * 12'000.0;
   run_own(system, omega * omega, rank);
   if (with_mumps) run_mumps(system, omega * omega, rank);

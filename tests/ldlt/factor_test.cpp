@@ -16,7 +16,7 @@
 
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/ldlt/pencil.hpp"
 
 namespace carillon::ldlt {

@@ -4,7 +4,7 @@
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/read.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace carillon::mesh;

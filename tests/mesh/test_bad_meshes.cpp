@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "precompute/mesh/read.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/mesh/truth.hpp"
 
 namespace carillon::mesh {

@@ -9,7 +9,7 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/mesh/write.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/mesh/truth.hpp"
 
 namespace carillon::mesh {

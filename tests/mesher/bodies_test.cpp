@@ -11,7 +11,7 @@
 #include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/tet_quality.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/mesher/surfaces.hpp"
 #include "tests/support/box_mesh.hpp"
 

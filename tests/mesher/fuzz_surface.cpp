@@ -6,7 +6,7 @@
 #include "precompute/mesher/quiet.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace carillon;

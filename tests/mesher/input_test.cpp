@@ -7,7 +7,7 @@
 
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/mesher/surfaces.hpp"
 
 namespace carillon::mesher {

@@ -29,7 +29,7 @@
 #include "precompute/mesh/read.hpp"
 #include "precompute/mesh/write.hpp"
 #include "precompute/mesher/surface.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace {
 

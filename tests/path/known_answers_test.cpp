@@ -181,7 +181,7 @@ TEST(Cantilever, of_aluminium_rings_as_the_clamped_bar_of_3_D_theory) {
   EXPECT_EQ(bank.counts.rigid_modes, 0);
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
     if (bank.vertices_m[v][0] < -0.15 + 1e-9) {
-      EXPECT_EQ(bank.shape_at(v, 0), (bank::Vec3{}));
+      EXPECT_EQ(bank.shape_at(v, 0), (Vec3{}));
     }
   }
 }

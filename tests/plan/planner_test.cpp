@@ -7,7 +7,7 @@
 #include <complex>
 #include <numbers>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/plan/table.hpp"
 #include "tests/synth/cube_bank.hpp"
 
@@ -80,11 +80,11 @@ TEST(Planner, APulseInPiecesIsJudgedAsOne) {
   constexpr double kLength = 2e-3;
   constexpr int kSteps = 2000;
   const auto make_pieces = [](double impulse_n_s) {
-    std::vector<stream::Vec3> steps;
+    std::vector<Vec3> steps;
     for (int k = 0; k < kSteps; ++k) steps.push_back({0, 0, std::pow(std::sin(pi * (k + 0.5) / kSteps), 1.5)});
     double area = 0.0;
-    for (const stream::Vec3& step : steps) area += step[2];
-    for (stream::Vec3& step : steps) step[2] *= impulse_n_s / area;
+    for (const Vec3& step : steps) area += step[2];
+    for (Vec3& step : steps) step[2] *= impulse_n_s / area;
     std::vector<stream::Event> events;
     stream::split_force({.time_s = 1.0 - 0.5 * kLength, .step_s = kLength / kSteps, .triangle = 3}, steps,
                         [&](const stream::Force& piece) { events.emplace_back(piece); });
@@ -117,7 +117,7 @@ TEST(Planner, APulseInPiecesCostsWhatItsLengthAndItsStepsDo) {
                     .ear_sample_ns = 0.0};
   Planner planner(stage.facts, costs);
   stream::split_force({.time_s = 1.0 - 0.5 * kLength, .step_s = kLength / kSteps, .triangle = 3},
-                      std::vector<stream::Vec3>(kSteps, {0, 0, 1.0 / kSteps}), [&](const stream::Force& piece) { planner.watch(piece); });
+                      std::vector<Vec3>(kSteps, {0, 0, 1.0 / kSteps}), [&](const stream::Force& piece) { planner.watch(piece); });
   planner.advance(stage.facts.duration_s);
   const double modes = static_cast<double>(stage.facts.bodies[0].bank->mode_count());
   // Of the first pieces it is not known yet that the pulse will be long enough to be told from a blow.

@@ -50,10 +50,10 @@ TEST_F(Settle, a_cancelled_job_says_what_it_was_and_why) {
 
 TEST_F(Settle, a_retry_and_what_is_asked_with_it_are_one_change) {
   // A job whose id follows from what it asks for: retry looks.
-  const spec::JobSpec job = spec::parse_job(
+  const job::JobSpec job = job::parse_job(
       R"({"body": {"shape": "bar", "length_m": 0.2, "width_m": 0.03, "thickness_m": 0.01, "nodes": 600},
           "material": {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"internal_friction": {"tan_phi": 1e-3}}}})",
-      "bar.json", spec::BankKey::optional);
+      "bar.json", job::BankKey::optional);
   const store::Request request = store::RequestMaker("solver").make(job);
   store::prepare_work(store_, {{&job, &request}});
   registry_.submit({{"/jobs/bar.json", request}});

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/radiation/flow.hpp"
 #include "tests/radiation/sphere_bank.hpp"
 #include "tests/synth/cube_bank.hpp"
@@ -14,7 +14,6 @@
 namespace carillon::radiation {
 namespace {
 
-using bank::Vec3;
 using std::numbers::pi;
 using testing::SphereRow;
 

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/synth/voice.hpp"
 #include "tests/synth/cube_bank.hpp"

@@ -29,7 +29,7 @@ inline bank::Bank make_sphere_surface(double radius_m, int level) {
     const auto find_middle = [&](std::int32_t a, std::int32_t b) {
       const auto [at, fresh] = middles.try_emplace(std::minmax(a, b), static_cast<std::int32_t>(bank.vertices_m.size()));
       if (fresh) {
-        const bank::Vec3 x = bank.vertices_m[a], y = bank.vertices_m[b];
+        const Vec3 x = bank.vertices_m[a], y = bank.vertices_m[b];
         const double size = std::hypot(x[0] + y[0], x[1] + y[1], x[2] + y[2]) / std::hypot(x[0], x[1], x[2]);
         bank.vertices_m.push_back({(x[0] + y[0]) / size, (x[1] + y[1]) / size, (x[2] + y[2]) / size});
       }
@@ -43,7 +43,7 @@ inline bank::Bank make_sphere_surface(double radius_m, int level) {
     bank.triangles = finer;
   }
   const double scale = radius_m / std::hypot(1.0, g);
-  for (bank::Vec3& x : bank.vertices_m)
+  for (Vec3& x : bank.vertices_m)
     for (double& component : x) component *= scale;
   return bank;
 }
@@ -56,7 +56,7 @@ void set_modes(bank::Bank& bank, const std::vector<double>& ka, double radius_m,
   for (const double one : ka) bank.eigenvalue_rad2_s2.push_back(std::pow(one / radius_m * bank::kSoundSpeedMs, 2));
   bank.decay_per_s.assign(modes, 1.0);
   bank.radiation_gain.assign(modes, 7.0);
-  for (const bank::Vec3& x : bank.vertices_m)
+  for (const Vec3& x : bank.vertices_m)
     for (std::size_t m = 0; m < modes; ++m)
       for (const double component : motion(x, m)) shapes.push_back(component);
   bank::quantise_shapes(bank, shapes);
@@ -97,10 +97,10 @@ inline bank::Bank make_lobed_sphere(const std::vector<SphereRow>& rows, double r
   bank::Bank bank = make_sphere_surface(radius_m, level);
   std::vector<double> ka;
   for (const SphereRow& row : rows) ka.push_back(row.ka);
-  set_modes(bank, ka, radius_m, [&](const bank::Vec3& x, std::size_t m) {
+  set_modes(bank, ka, radius_m, [&](const Vec3& x, std::size_t m) {
     const double cosine = (0.48 * x[0] + 0.6 * x[1] + 0.64 * x[2]) / radius_m;
     const double size = calc_legendre(rows[m].l, cosine) / radius_m;
-    return bank::Vec3{size * x[0], size * x[1], size * x[2]};
+    return Vec3{size * x[0], size * x[1], size * x[2]};
   });
   return bank;
 }

@@ -17,7 +17,7 @@ constexpr int kLevel = 4;
 double calc_osg02_gain(const bank::Bank& bank, std::size_t mode) {
   double flow = 0.0, area = 0.0;
   for (const bank::Triangle& triangle : bank.triangles) {
-    const bank::Vec3 normal = bank::calc_normal(bank.vertices_m, triangle);
+    const carillon::Vec3 normal = bank::calc_normal(bank.vertices_m, triangle);
     double through = 0.0;
     for (const std::int32_t v : triangle)
       for (int k = 0; k < 3; ++k) through += bank.shape_at(v, mode)[k] * normal[k] / 6.0;

@@ -3,7 +3,7 @@
 #include <unistd.h>
 
 #include "jobs/outcome/outcome.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/registry/jobs.hpp"
 
 namespace carillon::tests {

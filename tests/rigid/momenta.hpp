@@ -16,7 +16,7 @@ inline Momenta add_up(const Space& space) {
     const State& s = space.state(i);
     const Vec3 p = space.solid(i).mass_kg * s.velocity;
     sum.linear = sum.linear + p;
-    sum.angular = sum.angular + impact::cross(s.centre, p) + s.momentum;
+    sum.angular = sum.angular + cross(s.centre, p) + s.momentum;
     sum.kinetic_j += calc_kinetic(space.solid(i), s);
   }
   return sum;

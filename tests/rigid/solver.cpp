@@ -9,13 +9,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-using impact::dot;
-using impact::norm;
-using impact::operator+;
-using impact::operator-;
-using impact::operator*;
-
 Mover make_block(double mass_kg, Vec3 size_m, Vec3 velocity) {
   Mover m{1.0 / mass_kg, {}, velocity, {}};
   for (std::size_t k = 0; k < 3; ++k) {

@@ -13,8 +13,6 @@
 namespace carillon::rigid {
 namespace {
 
-using impact::cross;
-
 TEST(space, free_crowd_keeps_momentum_and_angular_momentum_and_gains_no_energy) {
   // 27 boxes fly to one place and strike each other many times within a step.
   std::vector<Solid> solids;

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/shape/mesh.hpp"
 #include "runtime/shape/polyhedron.hpp"
 #include "runtime/shape/skin.hpp"

@@ -10,7 +10,7 @@
 #include <functional>
 #include <random>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/slabs/write_vtkhdf.hpp"
 #include "tests/support/box_mesh.hpp"
 

@@ -14,7 +14,7 @@
 
 #include "precompute/petsc/session.hpp"
 #include "precompute/shapes/shapes.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/slabs/write_vtkhdf.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/ranks.hpp"

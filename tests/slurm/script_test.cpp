@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "jobs/slurm/command.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slurm {
 namespace {

@@ -18,7 +18,7 @@ constexpr const char* kMaterial =
     R"("material": {"young_modulus_pa": 7e10, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}}})";
 
 std::string find_id(const std::filesystem::path& job, const std::string& solver = kSolver) {
-  return store::RequestMaker(solver).make(spec::read_job(job, spec::BankKey::optional)).id;
+  return store::RequestMaker(solver).make(job::read_job(job, job::BankKey::optional)).id;
 }
 
 std::string job_with(const std::string& mesh, const std::string& rest) { return "{\"mesh\": \"" + mesh + "\", " + kMaterial + rest + "}"; }
@@ -101,9 +101,9 @@ TEST(Identity, a_mesh_that_changes_is_hashed_again) {
   const auto job = folder.write("a.json", job_with("m.msh", ""));
   folder.write("m.msh", "first");
   store::RequestMaker maker(kSolver);
-  const std::string before = maker.make(spec::read_job(job, spec::BankKey::optional)).input_sha256;
+  const std::string before = maker.make(job::read_job(job, job::BankKey::optional)).input_sha256;
   folder.write("m.msh", "later");
-  EXPECT_NE(maker.make(spec::read_job(job, spec::BankKey::optional)).input_sha256, before);
+  EXPECT_NE(maker.make(job::read_job(job, job::BankKey::optional)).input_sha256, before);
 }
 
 TEST(Identity, hashes_are_those_of_sha256sum) {
@@ -141,13 +141,13 @@ TEST(Identity, work_is_a_job_that_runs_from_the_copies_in_the_store) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   const store::Store store = store::Store::open(folder / "store");
-  const spec::JobSpec job = spec::read_job(folder.write("a.json", job_with("m.msh", "")), spec::BankKey::optional);
+  const job::JobSpec job = job::read_job(folder.write("a.json", job_with("m.msh", "")), job::BankKey::optional);
   const store::Request request = store::RequestMaker(kSolver).make(job);
   EXPECT_EQ(store::prepare_work(store, {{&job, &request}}), std::vector<bool>{true});
   EXPECT_EQ(store::prepare_work(store, {{&job, &request}}), std::vector<bool>{false});
   folder.write("m.msh", "something else by now");
   const store::Id id = store::require_id(request.id, "test");
-  const spec::JobSpec inner = spec::read_job(store.work_folder(id) / store::kJobFile);
+  const job::JobSpec inner = job::read_job(store.work_folder(id) / store::kJobFile);
   EXPECT_EQ(tests::read_all(inner.mesh), "$MeshFormat\n");
   EXPECT_TRUE(inner.mesh.string().starts_with((folder / "store/inputs").string())) << inner.mesh;
   EXPECT_EQ(inner.bank, store.work_folder(id) / store::kBankFile);
@@ -162,7 +162,7 @@ TEST(Identity, an_input_that_is_no_longer_what_was_hashed_is_refused) {
   const Folder folder;
   folder.write("m.msh", "before");
   const store::Store store = store::Store::open(folder / "store");
-  const spec::JobSpec job = spec::read_job(folder.write("a.json", job_with("m.msh", "")), spec::BankKey::optional);
+  const job::JobSpec job = job::read_job(folder.write("a.json", job_with("m.msh", "")), job::BankKey::optional);
   const store::Request request = store::RequestMaker(kSolver).make(job);
   folder.write("m.msh", "after");
   EXPECT_THROW(store::prepare_work(store, {{&job, &request}}), InputError);

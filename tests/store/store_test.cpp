@@ -11,7 +11,7 @@
 #include <iterator>
 
 #include "jobs/store/files.hpp"
-#include "runtime/config/file.hpp"
+#include "runtime/base/file.hpp"
 #include "tests/store/folder.hpp"
 
 namespace {
@@ -235,7 +235,7 @@ TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
 
 TEST(Store, a_quota_that_is_full_is_a_full_disk) {
   for (const int error : {ENOSPC, EDQUOT}) {
-    EXPECT_TRUE(config::is_full_error(error));
+    EXPECT_TRUE(base::is_full_error(error));
     try {
       store::throw_errno("/some/file", "write", error);
     } catch (const SystemError& refusal) {
@@ -245,7 +245,7 @@ TEST(Store, a_quota_that_is_full_is_a_full_disk) {
       EXPECT_TRUE(store::is_disk_full("/proc", what)) << what;
     }
   }
-  EXPECT_FALSE(config::is_full_error(EACCES));
+  EXPECT_FALSE(base::is_full_error(EACCES));
   const Folder folder;
   EXPECT_EQ(store::is_disk_full(folder.path(), "Permission denied"), store::is_disk_full(folder.path()));
 }

@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::stream::tests {
 namespace {

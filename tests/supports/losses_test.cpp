@@ -30,9 +30,9 @@ bank::Bank make_bank(const std::vector<double>& reaction, double share = 0.0, do
   return bank;
 }
 
-config::Fixing on(const std::string& members) {
-  config::Object object = config::parse_document("{" + members + "}", "test").root();
-  return *config::read_fixing(object);
+material::Fixing on(const std::string& members) {
+  base::Object object = base::parse_document("{" + members + "}", "test").root();
+  return *material::read_fixing(object);
 }
 
 Wish wish(const std::string& members) { return {.all = on(members)}; }
@@ -117,7 +117,7 @@ struct Ringing {
   double lost_j = 0.0, dissipated_j = 0.0, start_j = 0.0;
 };
 
-Ringing ring(double mass, double stiffness, const config::Base& base, int periods) {
+Ringing ring(double mass, double stiffness, const material::Base& base, int periods) {
   struct State {
     double x, v, u, w;
   };
@@ -166,13 +166,13 @@ TEST(FirstOrder, is_what_an_oscillator_on_its_support_does_and_the_books_of_ener
   // r = omega^2 sqrt(M): the whole mass moves. Springs 100 and 1000 times as stiff as the body's.
   const double mass = 0.4, omega = 2 * kPi * 300.0, stiffness = mass * omega * omega;
   for (const double ratio : {30.0, 300.0}) {
-    const config::Base base{.kind = config::BaseKind::kLumped,
-                            .mass_kg = 0.02,
-                            .damping_n_s_m = 0.2 * ratio * stiffness / omega,
-                            .stiffness_n_m = ratio * stiffness};
+    const material::Base base{.kind = material::BaseKind::kLumped,
+                              .mass_kg = 0.02,
+                              .damping_n_s_m = 0.2 * ratio * stiffness / omega,
+                              .stiffness_n_m = ratio * stiffness};
     bank::Bank bank = make_bank({omega * omega * std::sqrt(mass), 0, 0, 0, 0, 0});
     for (double& lambda : bank.eigenvalue_rad2_s2) lambda = omega * omega;
-    const Losses losses = calc_losses(bank, {.all = config::Fixing{base, "", 0.0}});
+    const Losses losses = calc_losses(bank, {.all = material::Fixing{base, "", 0.0}});
     const Ringing exact = ring(mass, stiffness, base, 40);
     EXPECT_NEAR(losses.decay_per_s[0] / exact.decay_per_s, 1.0, 3.0 / ratio);
     EXPECT_NEAR(losses.shift_rad_s[0] / (exact.omega - omega), 1.0, 3.0 / ratio);
@@ -187,10 +187,10 @@ TEST(Holder, is_what_an_oscillator_with_a_dashpot_or_a_spring_does) {
   const bank::Bank bank = bank::example::make_bank();
   const std::size_t vertex = bank.triangles[5][1];
   const Vec3 at = bank.vertices_m[vertex];
-  const auto held = [&](const config::Base& by) { return calc_losses(bank, {.held = {{by, at}}}); };
-  const Losses cord = held({.kind = config::BaseKind::kLumped, .damping_n_s_m = 0.2}),
-               pad = held({.kind = config::BaseKind::kLumped, .stiffness_n_m = 2e4, .loss_factor = 0.3}),
-               skin = held({.kind = config::BaseKind::kLumped, .mass_kg = 5e-4});
+  const auto held = [&](const material::Base& by) { return calc_losses(bank, {.held = {{by, at}}}); };
+  const Losses cord = held({.kind = material::BaseKind::kLumped, .damping_n_s_m = 0.2}),
+               pad = held({.kind = material::BaseKind::kLumped, .stiffness_n_m = 2e4, .loss_factor = 0.3}),
+               skin = held({.kind = material::BaseKind::kLumped, .mass_kg = 5e-4});
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const Vec3 phi = bank.shape_at(vertex, m);
     const double square = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2], omega = std::sqrt(bank.eigenvalue_rad2_s2[m]);
@@ -206,12 +206,12 @@ TEST(Holder, is_what_an_oscillator_with_a_dashpot_or_a_spring_does) {
 
 TEST(Limits, a_support_at_a_node_and_an_impedance_of_zero_take_nothing) {
   const bank::Bank bank = make_bank({0, 0, 0, 0, 0, 0});
-  for (const std::string& name : config::list_base_names()) {
-    const Losses losses = calc_losses(bank, wish("\"on\": " + config::quote(name)));
+  for (const std::string& name : material::list_base_names()) {
+    const Losses losses = calc_losses(bank, wish("\"on\": " + base::quote(name)));
     for (const double d : losses.decay_per_s) EXPECT_EQ(d, 0.0) << name;
     for (const double shift : losses.shift_rad_s) EXPECT_EQ(shift, 0.0) << name;
   }
-  const Losses none = calc_losses(bank, {.held = {{config::Base{.kind = config::BaseKind::kLumped}, bank.vertices_m[0]}}});
+  const Losses none = calc_losses(bank, {.held = {{material::Base{.kind = material::BaseKind::kLumped}, bank.vertices_m[0]}}});
   for (const double d : none.decay_per_s) EXPECT_EQ(d, 0.0);
 }
 
@@ -234,7 +234,7 @@ TEST(Limits, walls_a_million_times_too_soft_end_in_a_bounded_decay_and_one_warni
     for (const double area : {1e-4, 1e-12, 0.0}) {
       bank::Bank before = make_bank({0.4, 0.3, 0.2, 0.01, 0.01, 0.02}, 0.3, area);  // parts of the mass's root
       for (std::size_t i = 0; i < before.supports.reaction.size(); ++i) before.supports.reaction[i] *= before.eigenvalue_rad2_s2[i / 6];
-      config::Fixing fixing = on(R"("on": "plasterboard wall", "joint": "glued")");
+      material::Fixing fixing = on(R"("on": "plasterboard wall", "joint": "glued")");
       fixing.base.young_modulus_pa /= softer;
       const Losses losses = calc_losses(before, {.all = fixing});
       EXPECT_EQ(losses.beyond, before.mode_count());
@@ -257,8 +257,8 @@ TEST(Limits, tiny_patches_and_patches_without_a_normal_give_numbers) {
     bank::Bank bank = make_bank({3.0, 2.0, 1.0, 0.1, 0.2, 0.3}, 0.1, area);
     for (const bool has_normal : {true, false}) {
       if (!has_normal) bank.supports.normal[0] = {};
-      for (const std::string& name : config::list_base_names()) {
-        const Losses losses = calc_losses(bank, wish("\"on\": " + config::quote(name) + ", \"joint\": \"screwed\""));
+      for (const std::string& name : material::list_base_names()) {
+        const Losses losses = calc_losses(bank, wish("\"on\": " + base::quote(name) + ", \"joint\": \"screwed\""));
         for (const double d : losses.decay_per_s) EXPECT_TRUE(std::isfinite(d) && d > 0.0) << name << " " << area;
         for (const double shift : losses.shift_rad_s) EXPECT_TRUE(std::isfinite(shift)) << name << " " << area;
       }

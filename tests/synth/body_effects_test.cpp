@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/synth/cube_bank.hpp"
 

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::synth {
 namespace {

@@ -144,7 +144,7 @@ TEST(ContactForces, DriveTheModesAsQuadratureSays) {
         to_q[end] = h * testing::integrate([&](double u) { return share(u) * place((1.0 - u) * h); }, 0.0, 1.0);
         to_v[end] = h * testing::integrate([&](double u) { return share(u) * velocity((1.0 - u) * h); }, 0.0, 1.0);
       }
-      const bank::Vec3 along{0.2, 0.3, 0.5};
+      const Vec3 along{0.2, 0.3, 0.5};
       for (std::size_t n = 1; n < force.size(); ++n) {
         const auto amplitude = [&](std::size_t k) {
           const double speed = 0.3 + 2.0 * static_cast<double>(k) / kRate;

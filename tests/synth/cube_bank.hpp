@@ -13,7 +13,7 @@ struct InventedMode {
   double freq_hz = 0.0;
   double decay_per_s = 0.0;
   double gain = 1.0;
-  bank::Vec3 direction{0.0, 0.0, 1.0};  // phi at every vertex [kg^-1/2], times 1 + slope * (vertex number)
+  Vec3 direction{0.0, 0.0, 1.0};  // phi at every vertex [kg^-1/2], times 1 + slope * (vertex number)
   double slope = 0.0;
 };
 

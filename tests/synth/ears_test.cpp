@@ -12,7 +12,7 @@
 #include <random>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::synth {
 namespace {

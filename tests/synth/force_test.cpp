@@ -30,10 +30,10 @@ constexpr double kRate = 48000.0, kPi = std::numbers::pi;
 /// The force of a whole pulse, in the mesh's frame.
 struct Course {
   double begin_s = 0.0, step_s = 0.0;
-  std::vector<bank::Vec3> impulses;
+  std::vector<Vec3> impulses;
 };
 
-std::vector<Force> make_pieces(const Course& course, std::int32_t triangle = 0, const bank::Vec3& barycentric = {1.0, 0.0, 0.0}) {
+std::vector<Force> make_pieces(const Course& course, std::int32_t triangle = 0, const Vec3& barycentric = {1.0, 0.0, 0.0}) {
   std::vector<Force> pieces;
   stream::split_force({.time_s = course.begin_s, .step_s = course.step_s, .triangle = triangle, .barycentric = barycentric},
                       course.impulses, [&](const Force& piece) { pieces.push_back(piece); });
@@ -55,7 +55,7 @@ std::vector<double> calc_sound(const bank::Bank& bank, const std::vector<Course>
     const double h = border - now;
     if (h > 0.0) {
       const impact::Propagator p = impact::make_propagator(omega, bank.decay_per_s, h);
-      bank::Vec3 force{};
+      Vec3 force{};
       for (const Course& c : courses) {
         const double at = std::floor((now + 0.5 * h - c.begin_s) / c.step_s);
         if (!(at >= 0.0 && at < static_cast<double>(c.impulses.size()))) continue;
@@ -300,7 +300,7 @@ TEST(Force, OfAWholeImpactLeavesTheModesAsTheWorldKnowsThem) {
     Voice voice(Model::make(bank, {.rate_hz = kRate}), {.silence_pa = 1e-30});
     for (const impact::Pulse& pulse : impact.take_pulses()) {
       Course course{kBegin + pulse.start_s, pulse.step_s, {}};
-      for (const impact::Vec3& j : pulse.impulse_n_s) course.impulses.push_back({-j[0], -j[1], -j[2]});
+      for (const Vec3& j : pulse.impulse_n_s) course.impulses.push_back({-j[0], -j[1], -j[2]});
       for (const Force& piece : make_pieces(course)) ASSERT_TRUE(voice.push(piece));
     }
     // All modes at once, from when the impact is over: velocities, then the energy at the end of a period.

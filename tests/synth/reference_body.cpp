@@ -13,7 +13,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/oscillator.hpp"
 
 namespace carillon::testing {

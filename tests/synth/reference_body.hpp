@@ -15,7 +15,6 @@
 
 namespace carillon::testing {
 
-using bank::Vec3;
 using synth::kMoments;
 using synth::Moments;
 

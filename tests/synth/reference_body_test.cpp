@@ -15,7 +15,6 @@
 namespace carillon::synth {
 namespace {
 
-using bank::Vec3;
 using std::numbers::pi;
 using testing::calc_velocity;
 using testing::InventedMode;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "runtime/bank/edits.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/synth/cube_bank.hpp"
 

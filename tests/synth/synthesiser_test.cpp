@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "runtime/config/error.hpp"
+#include "runtime/base/error.hpp"
 #include "tests/synth/cube_bank.hpp"
 
 namespace carillon::synth {

@@ -29,7 +29,7 @@ using testing::InventedMode;
 using testing::make_cube_bank;
 using testing::make_many_modes;
 constexpr double kRate = 48000.0;
-const bank::Vec3 kUnitImpulse{0.0, 0.0, 1.0};
+const Vec3 kUnitImpulse{0.0, 0.0, 1.0};
 
 std::shared_ptr<const Model> make_model(const bank::Bank& bank, double rate_hz = kRate) { return Model::make(bank, {.rate_hz = rate_hz}); }
 
@@ -115,7 +115,7 @@ TEST(Voice, SoundsLikeTheSlowBodyInDoublePrecision) {
     for (int i = 0; i < 60; ++i) {
       const double time_s = number(random) * 0.5, duration_s = i % 5 == 0 ? 0.0 : std::pow(10.0, -5.0 + 2.3 * number(random));
       const auto triangle = static_cast<std::int32_t>(12 * number(random));
-      const bank::Vec3 impulse{number(random) - 0.5, number(random) - 0.5, number(random) - 0.5};
+      const Vec3 impulse{number(random) - 0.5, number(random) - 0.5, number(random) - 0.5};
       voice.strike(
           {.time_s = time_s, .triangle = triangle, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = impulse, .duration_s = duration_s});
       body.strike({.sample = time_s * kRate,
@@ -140,7 +140,7 @@ TEST(Voice, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
   for (auto& mode : modes) mode.decay_per_s = 0.0;
   const bank::Bank bank = make_cube_bank(modes);
   Voice voice(make_model(bank));
-  const bank::Vec3 impulse{0.01, 0.02, -0.03};
+  const Vec3 impulse{0.01, 0.02, -0.03};
   voice.strike({.time_s = 3.3 / kRate, .triangle = 4, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = impulse});
   play(voice, kPeriod);
   double expected = 0.0;
@@ -148,7 +148,7 @@ TEST(Voice, EnergyIsThatOfTheImpulseAndStaysWithoutDamping) {
     double projection = 0.0;
     for (std::size_t corner = 0; corner < 3; ++corner) {
       const auto shape = bank.shape_at(static_cast<std::size_t>(bank.triangles[4][corner]), m);
-      projection += bank::Vec3{0.2, 0.3, 0.5}[corner] * std::inner_product(shape.begin(), shape.end(), impulse.begin(), 0.0);
+      projection += Vec3{0.2, 0.3, 0.5}[corner] * std::inner_product(shape.begin(), shape.end(), impulse.begin(), 0.0);
     }
     expected += 0.5 * projection * projection;
   }
@@ -202,7 +202,7 @@ TEST(Voice, ModesAtOrAboveNyquistAreNeverSounded) {
 
 TEST(Voice, TheDirectionOfTheImpulseIsKept) {
   const auto model = make_model(make_cube_bank({{1000.0, 1.0, 1.0, {1.0, 0.0, 0.0}}}));
-  const auto first = [&](const bank::Vec3& impulse) {
+  const auto first = [&](const Vec3& impulse) {
     Voice voice(model);
     voice.strike({.impulse_n_s = impulse});
     return play(voice, 1)[0];

@@ -21,8 +21,8 @@
 
 namespace {
 
+using carillon::Vec3;
 using carillon::bank::Bank;
-using carillon::bank::Vec3;
 
 constexpr double kStep = 1.0 / 2000.0;  // s
 constexpr double kSeconds = 1.5;

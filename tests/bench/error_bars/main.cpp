@@ -64,7 +64,7 @@ Outcome solve_file(const std::string& file, int count) {
   mesh::TetMesh mesh = mesh::read_mesh(file);
   mesh::check_mesh(mesh, file);
   const double lambda = 3.99e9, mu = 2.05e9;
-  const spec::Material ceramic{
+  const job::Material ceramic{
       .young_modulus_pa = mu * (3 * lambda + 2 * mu) / (lambda + mu), .poisson_ratio = lambda / (2 * (lambda + mu)), .density_kg_m3 = 2700};
   return solve(PETSC_COMM_WORLD, mesh, {}, std::span(&ceramic, 1), false, 20, 20e3, count);
 }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/impact/predict.hpp"
 #include "tests/impact/free_plate.hpp"
 #include "tests/impact/scenes.hpp"
@@ -26,9 +26,9 @@ double time_us(Work&& work) {
   const int rounds = quick ? 1 : 15, repeats = quick ? 1 : 40;
   double least = 1e300;
   for (int round = 0; round < rounds; ++round) {
-    const double begin = 1e6 * config::get_thread_cpu_s();
+    const double begin = 1e6 * base::get_thread_cpu_s();
     for (int i = 0; i < repeats; ++i) work();
-    least = std::min(least, (1e6 * config::get_thread_cpu_s() - begin) / repeats);
+    least = std::min(least, (1e6 * base::get_thread_cpu_s() - begin) / repeats);
   }
   return least;
 }

@@ -24,7 +24,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/synth/driven_bank.hpp"
 #include "tests/bench/runtime/fma_limit.hpp"
 #include "tests/synth/cube_bank.hpp"
@@ -121,7 +121,7 @@ int main(int argc, char** argv) {
   std::vector<std::unique_ptr<synth::DrivenBank>> banks;
   for (const synth::Isa isa : {synth::Isa::kAvx512, synth::Isa::kAvx2, synth::Isa::kSse2}) {
     if (synth::get_kernels(isa).isa != isa) continue;
-    banks.push_back(std::make_unique<synth::DrivenBank>(*model, 0, bank::Vec3{1, 0, 0}, bank::Vec3{0, 0, 1}, isa));
+    banks.push_back(std::make_unique<synth::DrivenBank>(*model, 0, carillon::Vec3{1, 0, 0}, carillon::Vec3{0, 0, 1}, isa));
     players.push_back({std::string("Carillon, ") + synth::get_name(isa),
                        [driven = banks.back().get()](const float* in, float* out) {
                          std::fill_n(out, kFrames, 0.0F);
@@ -151,12 +151,12 @@ int main(int argc, char** argv) {
   std::vector<float> out(kFrames);
   for (int round = 0; round < kRounds; ++round) {
     for (Player& player : players) {
-      const double started = config::get_thread_cpu_s();
+      const double started = base::get_thread_cpu_s();
       double spent = 0.0;
       long blocks = 0;
       while (spent < seconds) {
         for (std::size_t n = 0; n < noise.size(); n += kFrames, ++blocks) player.process(&noise[n], out.data());
-        spent = config::get_thread_cpu_s() - started;
+        spent = base::get_thread_cpu_s() - started;
       }
       player.seconds.push_back(spent / static_cast<double>(blocks));
     }

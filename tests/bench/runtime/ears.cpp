@@ -17,7 +17,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "tests/bench/runtime/fma_limit.hpp"
 
 namespace {
@@ -50,9 +50,9 @@ double measure(synth::Isa isa, const synth::Track& path, bool dipoles, const std
   for (int block = 0; block < kBlocks; ++block) {
     for (std::size_t k = 0; k < sent.size(); ++k)
       sent[k].push(std::span(noise).subspan((static_cast<std::size_t>(block) * 7 + k) % 1000, kBlock));
-    const double started = config::get_thread_cpu_s();
+    const double started = base::get_thread_cpu_s();
     ear.process(source, listener, static_cast<std::int64_t>(block) * kBlock, heard);
-    spent += config::get_thread_cpu_s() - started;
+    spent += base::get_thread_cpu_s() - started;
   }
   if (!std::isfinite(heard[0])) std::puts("not finite");
   return spent / kBlocks;
@@ -69,8 +69,8 @@ int main(int argc, char** argv) {
   // What asking for the time takes.
   double empty = 1.0;
   for (int i = 0; i < 1000; ++i) {
-    const double started = config::get_thread_cpu_s();
-    empty = std::min(empty, config::get_thread_cpu_s() - started);
+    const double started = base::get_thread_cpu_s();
+    empty = std::min(empty, base::get_thread_cpu_s() - started);
   }
   std::printf("| us a block of %d and ear | still | still, dipoles | moves | moves, dipoles |\n|---|--:|--:|--:|--:|\n", kBlock);
   std::vector<synth::Isa> sets;

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 
 namespace carillon::bench {
 namespace {
@@ -64,8 +64,8 @@ float run_sse2(float start) {
 double measure_fma_lanes_per_s(synth::Isa isa, double seconds) {
   volatile float keep = 1.0F;
   double best = 0.0;
-  const double until = config::get_thread_cpu_s() + seconds;
-  double now = config::get_thread_cpu_s();
+  const double until = base::get_thread_cpu_s() + seconds;
+  double now = base::get_thread_cpu_s();
   while (now < until) {
     double lanes = 0.0;
     if (isa == synth::Isa::kAvx512) {
@@ -78,7 +78,7 @@ double measure_fma_lanes_per_s(synth::Isa isa, double seconds) {
       keep = run_sse2(keep);
       lanes = 4.0 * 12.0;
     }
-    const double later = config::get_thread_cpu_s();
+    const double later = base::get_thread_cpu_s();
     best = std::max(best, lanes * static_cast<double>(kTurns) / (later - now));
     now = later;
     keep = 1.0F;

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/synth/voice.hpp"
 #include "tests/synth/cube_bank.hpp"
 
@@ -38,12 +38,12 @@ double measure(int modes, const Strike& strike, double length_s, int blocks, int
   std::array<float, kFrames> block{};
   const auto gap = static_cast<std::int64_t>(std::ceil((length_s * kRate + 1.0) / kFrames));  // blocks from pulse to pulse
   const auto play = [&](bool strikes) {
-    const double started = config::get_thread_cpu_s();
+    const double started = base::get_thread_cpu_s();
     for (std::int64_t b = 0; b < blocks; ++b) {
       if (strikes && b % gap == 0) strike(voice, (static_cast<double>(voice.get_horizon()) + 3.3) / kRate);
       voice.process(block);
     }
-    return config::get_thread_cpu_s() - started;
+    return base::get_thread_cpu_s() - started;
   };
   play(true);
   std::vector<double> differences;
@@ -73,7 +73,7 @@ int main(int argc, char** argv) {
     for (std::size_t i = 0; i < us.size(); ++i) {
       const int modes = i < 2 ? 256 : 1000;
       const bool rubs = i % 2 == 1;
-      std::vector<stream::Vec3> steps;
+      std::vector<carillon::Vec3> steps;
       for (int k = 0; k < c.steps; ++k) {
         const double x = (k + 0.5) / c.steps, force = 1e-3 * std::pow(std::sin(std::numbers::pi * x), 1.5);
         steps.push_back({rubs ? 0.2 * force * std::cos(3.0 * x) : 0.0, 0.0, force});

@@ -15,7 +15,7 @@
 namespace {
 
 using namespace carillon;
-using impact::operator-;
+using carillon::operator-;
 
 double get_cpu_s() {
   timespec now{};
@@ -31,7 +31,7 @@ std::unique_ptr<joints::Mechanism> make_chain(int links) {
     joints::Member m;
     m.mass_kg = mass;
     const double across = mass * length * length / 12.0;
-    m.inertia_kg_m2 = {impact::Vec3{0.1 * across, 0, 0}, impact::Vec3{0, across, 0}, impact::Vec3{0, 0, across}};
+    m.inertia_kg_m2 = {carillon::Vec3{0.1 * across, 0, 0}, carillon::Vec3{0, across, 0}, carillon::Vec3{0, 0, across}};
     m.start.centre = {length * (i + 0.5), 0, 0};
     members.push_back(m);
     joints.push_back({.kind = joints::Kind::kHinge, .body = i, .to = i - 1, .at = {length * i, 0, 0}, .axis = {0, 1, 0}});
@@ -40,7 +40,7 @@ std::unique_ptr<joints::Mechanism> make_chain(int links) {
 }
 
 struct Run {
-  impact::Vec3 end{};
+  carillon::Vec3 end{};
   double cpu_s = 0.0;
 };
 
@@ -68,11 +68,11 @@ int main(int argc, char** argv) {
   fmt::print("| links | tolerance | error after 0.5 s, m | CPU s/s |\n|--:|--:|--:|--:|\n");
   bool right = true;
   for (const int links : quick ? std::vector<int>{2} : std::vector<int>{1, 2, 20}) {
-    const impact::Vec3 exact = run(links, 1e-13, 0.5).end;
+    const carillon::Vec3 exact = run(links, 1e-13, 0.5).end;
     for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10, 1e-12}) {
       const Run one = run(links, tolerance, 0.5);
-      const impact::Vec3 off = one.end - exact;
-      const double error = std::sqrt(impact::dot(off, off));
+      const carillon::Vec3 off = one.end - exact;
+      const double error = std::sqrt(carillon::dot(off, off));
       fmt::print("| {} | {:.0e} | {:.1e} | {:.3f} |\n", links, tolerance, error, one.cpu_s);
       std::fflush(stdout);
       if (tolerance == 1e-10 && links <= 2 && error > 1e-6) right = false;

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/synth/voice.hpp"
 #include "tests/bench/runtime/fma_limit.hpp"
 #include "tests/synth/cube_bank.hpp"
@@ -58,7 +58,7 @@ std::vector<std::unique_ptr<synth::Voice>> make_voices(const std::vector<std::sh
 double measure(std::vector<std::unique_ptr<synth::Voice>>& voices, double seconds) {
   std::array<float, kFrames> block{};
   double mode_samples = 0.0;
-  const double started = config::get_thread_cpu_s();
+  const double started = base::get_thread_cpu_s();
   double spent = 0.0;
   while (spent < seconds) {
     for (auto& voice : voices) {
@@ -66,7 +66,7 @@ double measure(std::vector<std::unique_ptr<synth::Voice>>& voices, double second
       voice->process(block);
       mode_samples += static_cast<double>(voice->get_live_mode_count()) * kFrames;
     }
-    spent = config::get_thread_cpu_s() - started;
+    spent = base::get_thread_cpu_s() - started;
   }
   return mode_samples / spent;
 }

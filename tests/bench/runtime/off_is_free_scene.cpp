@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
-#include "runtime/config/error.hpp"
+#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "tests/synth/cube_bank.hpp"
 
@@ -61,9 +61,9 @@ CARILLON_VISIBLE double carillon_bench_play(int blocks, std::uint64_t* sum) {
                                              .impulse_n_s = {0.0, 1e-4, 1e-3 * scene.unit(scene.random)},
                                              .duration_s = 5e-5 + 2e-4 * scene.unit(scene.random)});
     }
-    const double started = config::get_thread_cpu_s();
+    const double started = base::get_thread_cpu_s();
     scene.synthesiser.process(out.data(), 2, kFrames);
-    spent += config::get_thread_cpu_s() - started;
+    spent += base::get_thread_cpu_s() - started;
     for (const float x : left) {
       std::uint32_t bits = 0;
       std::memcpy(&bits, &x, sizeof bits);

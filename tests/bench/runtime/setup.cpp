@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/contact/world.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/synth/model.hpp"
@@ -25,9 +25,9 @@ template <class Work>
 double time_ms(Work&& work) {
   double least = 1e300;
   for (int round = 0; round < 3; ++round) {
-    const double begin = 1e3 * config::get_thread_cpu_s();
+    const double begin = 1e3 * base::get_thread_cpu_s();
     work();
-    least = std::min(least, 1e3 * config::get_thread_cpu_s() - begin);
+    least = std::min(least, 1e3 * base::get_thread_cpu_s() - begin);
   }
   return least;
 }
@@ -36,9 +36,9 @@ bank::Bank make_sphere(int level, int modes) {
   bank::Bank bank = testing::make_sphere_surface(0.1, level);
   std::vector<double> ka;
   for (int m = 0; m < modes; ++m) ka.push_back(0.5 + 20.0 * m / modes);
-  testing::set_modes(bank, ka, 0.1, [](const bank::Vec3& x, std::size_t m) {
+  testing::set_modes(bank, ka, 0.1, [](const carillon::Vec3& x, std::size_t m) {
     const double wave = std::sin(40.0 * x[0] + static_cast<double>(m)) * std::cos(30.0 * x[1] * static_cast<double>(1 + m % 7)) / 0.1;
-    return bank::Vec3{wave * x[0], wave * x[1], wave * x[2]};
+    return carillon::Vec3{wave * x[0], wave * x[1], wave * x[2]};
   });
   bank.rigid = {.mass_kg = 1.0, .centre_m = {}, .inertia_kg_m2 = {4e-3, 0, 0, 0, 4e-3, 0, 0, 0, 4e-3}, .volume_m3 = 4.2e-3};
   bank.material = {.young_modulus_pa = 7e10, .poisson_ratio = 0.3, .density_kg_m3 = 240.0, .alpha1_s = 0.0, .alpha2_per_s = 2.0};
@@ -59,12 +59,12 @@ void print_row(const std::string& name, bank::Bank& bank, double read_ms) {
     synth::Voice voice(model, {.silence_pa = 1e-30});
     voice.strike({.time_s = 1e-4, .impulse_n_s = {0.3, 0.5, 1}});
     std::array<float, synth::kPeriod> block{};
-    const double begin = 1e3 * config::get_thread_cpu_s();
+    const double begin = 1e3 * base::get_thread_cpu_s();
     for (int i = 0; i < 375; ++i) {
       block.fill(0.0F);
       voice.process(block);
     }
-    playing = std::min(playing, 1e3 * config::get_thread_cpu_s() - begin);
+    playing = std::min(playing, 1e3 * base::get_thread_cpu_s() - begin);
   }
   const double all = read_ms + gains + making + world;
   fmt::print("| {} | {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.0f} | {:.0f} | {:.0f} |\n", name, bank.triangles.size(), bank.mode_count(),

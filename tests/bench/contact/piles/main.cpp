@@ -23,7 +23,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "runtime/contact/world.hpp"
 #include "tests/contact/leaning_train.hpp"
 #include "tests/contact/solids.hpp"
@@ -32,7 +32,7 @@
 namespace {
 
 using namespace carillon;
-using bank::Vec3;
+using carillon::Vec3;
 
 constexpr double kSlice = 2e-3;  // s
 constexpr int kBulletSteps = 4;  // of a slice: 2 kHz
@@ -241,9 +241,9 @@ Cost measure(double end_s, Advance&& advance) {
   Cost cost;
   std::vector<double> slices;
   for (int n = 1; n <= static_cast<int>(std::lround(end_s / kSlice)); ++n) {
-    const double begin = config::get_thread_cpu_s();
+    const double begin = base::get_thread_cpu_s();
     const bool awake = advance(n * kSlice);
-    slices.push_back(config::get_thread_cpu_s() - begin);
+    slices.push_back(base::get_thread_cpu_s() - begin);
     if (awake) cost.last_awake_s = n * kSlice;
   }
   double sum = 0.0;
@@ -324,11 +324,11 @@ Cost run_bullet(const Scene& scene, double end_s) {
 std::vector<std::vector<stream::Motion>> follow(const contact::WorldSpec& spec, double end_s, double step_s, double& cpu_s_per_s) {
   contact::World world(spec, {.contact_step_s = step_s, .end_s = end_s});
   std::vector<std::vector<stream::Motion>> motions(spec.bodies.size());
-  const double begin = config::get_thread_cpu_s();
+  const double begin = base::get_thread_cpu_s();
   world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const stream::Event& event) {
     if (const auto* motion = std::get_if<stream::Motion>(&event)) motions[static_cast<std::size_t>(motion->body)].push_back(*motion);
   });
-  cpu_s_per_s = (config::get_thread_cpu_s() - begin) / end_s;
+  cpu_s_per_s = (base::get_thread_cpu_s() - begin) / end_s;
   return motions;
 }
 
@@ -395,9 +395,9 @@ int main(int argc, char** argv) {
   try {
     const std::string engine = argv[2];
     const double end_s = std::atof(argv[3]);
-    const double begin = config::get_thread_cpu_s();
+    const double begin = base::get_thread_cpu_s();
     const Scene scene = make_scene(argv[1], argc == 5 ? std::atoi(argv[4]) : 12);
-    const double made = config::get_thread_cpu_s() - begin;
+    const double made = base::get_thread_cpu_s() - begin;
     const Cost cost = engine == "bullet" ? run_bullet(scene, end_s) : run_ours(scene, end_s);
     fmt::print(
         R"({{"scene": "{}", "engine": "{}", "triangles": {}, "made_s": {:.6f}, "cpu_s_per_s": {:.6f}, "worst_100_ms": {:.6f}, "worst_2_ms": {:.6f}, "awake_until_s": {:.3f}, "hits": {}}})"

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "tests/shape/solids.hpp"
 
 namespace carillon::shape::tests {
@@ -19,9 +19,9 @@ double time_us(Work&& work, int repeats = 200) {
   const int rounds = quick ? 1 : 7;
   double least = 1e300;
   for (int round = 0; round < rounds; ++round) {
-    const double begin = 1e6 * config::get_thread_cpu_s();
+    const double begin = 1e6 * base::get_thread_cpu_s();
     for (int i = 0; i < repeats; ++i) work(i);
-    least = std::min(least, (1e6 * config::get_thread_cpu_s() - begin) / repeats);
+    least = std::min(least, (1e6 * base::get_thread_cpu_s() - begin) / repeats);
   }
   return least;
 }
@@ -67,11 +67,11 @@ void report_ground(const char* name, const Shape& a, const Frame& fa, double mar
 
 /// What making a shape and its search structures costs [ms].
 void report_making(const char* name, const Solid& solid) {
-  const double begin = 1e6 * config::get_thread_cpu_s();
+  const double begin = 1e6 * base::get_thread_cpu_s();
   const auto shape = solid.make();
-  const double made = 1e6 * config::get_thread_cpu_s();
+  const double made = 1e6 * base::get_thread_cpu_s();
   shape->prepare();
-  const double end = 1e6 * config::get_thread_cpu_s();
+  const double end = 1e6 * base::get_thread_cpu_s();
   std::printf("%-44s %8.1f %8.1f %8zu\n", name, 1e-3 * (made - begin), 1e-3 * (end - made), solid.triangles.size());
 }
 

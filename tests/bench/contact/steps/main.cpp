@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/config/cpu_clock.hpp"
+#include "runtime/base/cpu_clock.hpp"
 #include "tests/hard/contact_course.hpp"
 
 namespace {
@@ -23,9 +23,9 @@ void print_row(const std::string& what, const WorldSpec& spec, double seconds) {
   contact::Statistics cost;
   for (int round = 0; round < 5; ++round) {
     World world(spec, {.end_s = seconds});
-    const double begin = config::get_thread_cpu_s();
+    const double begin = base::get_thread_cpu_s();
     world.advance(seconds, std::numeric_limits<double>::infinity(), [](const stream::Event&) {});
-    costs.push_back(config::get_thread_cpu_s() - begin);
+    costs.push_back(base::get_thread_cpu_s() - begin);
     cost = world.get_statistics();
   }
   std::sort(costs.begin(), costs.end());

@@ -1,0 +1,207 @@
+#include "precompute/job/job_spec.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "precompute/job/read_body.hpp"
+#include "precompute/job/read_material.hpp"
+
+namespace carillon::job {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMostHz = 1e12;
+constexpr std::size_t kMostFixed = 1000, kMostRegions = 10000;
+constexpr std::size_t kLongestName = 200;  // bytes
+constexpr long long kMostRanks = 1'000'000;
+constexpr double kMostGb = 1e9, kMostSeconds = 1e9;
+constexpr double kLeastScale = 1e-9, kMostScale = 1e6;
+constexpr double kLeastCents = 1e-3, kMostCents = 1200;
+
+/// The words of a schema and their meaning; a job may write `words` only.
+template <class Choice>
+struct Words {
+  std::vector<std::pair<std::string, Choice>> list;
+
+  std::vector<std::string> words() const {
+    std::vector<std::string> names;
+    for (const auto& [word, choice] : list) names.push_back(word);
+    return names;
+  }
+  std::string find(Choice wanted) const {
+    return std::find_if(list.begin(), list.end(), [&](const auto& entry) { return entry.second == wanted; })->first;
+  }
+  Choice read(base::Object& object, std::string_view key, Choice fallback) const {
+    const std::string word = object.choice_or(key, words(), find(fallback));
+    return std::find_if(list.begin(), list.end(), [&](const auto& entry) { return entry.first == word; })->second;
+  }
+};
+
+const Words<Element> kElements{{{"T4", Element::T4}, {"T10", Element::T10}}};
+const Words<Mass> kMasses{{{"consistent", Mass::consistent}, {"lumped", Mass::lumped}}};
+const Words<Method> kMethods{{{"automatic", Method::automatic},
+                              {"block-lanczos", Method::block_lanczos},
+                              {"krylov-schur", Method::krylov_schur},
+                              {"dense", Method::dense}}};
+const Words<Factorisation> kFactorisations{{{"automatic", Factorisation::automatic},
+                                            {"ldlt", Factorisation::ldlt},
+                                            {"mumps", Factorisation::mumps},
+                                            {"cholmod", Factorisation::cholmod}}};
+
+Fixed read_fixed(base::Object fixed) {
+  Fixed result;
+  if (fixed.has("node_set")) result.node_set = fixed.string("node_set");
+  if (auto box = fixed.object_if("box_m")) {
+    result.box_m = {box->numbers<3>("min"), box->numbers<3>("max")};
+    for (int axis = 0; axis < 3; ++axis) {
+      if ((*result.box_m)[0][axis] > (*result.box_m)[1][axis])
+        box->fail("max", "every coordinate of \"max\" must be at least that of \"min\"");
+    }
+    box->finish();
+  }
+  if (fixed.has("name")) {
+    result.name = fixed.string("name");
+    if (result.name.size() > kLongestName ||
+        std::any_of(result.name.begin(), result.name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+      fixed.fail("name", fmt::format("is no name: at most {} bytes, and none of them a control character", kLongestName));
+  }
+  if (auto fixing = material::read_fixing(fixed)) result.fixing = *fixing;
+  fixed.finish();
+  if (result.node_set.has_value() == result.box_m.has_value()) {
+    fixed.fail("", "\"fixed\" holds one of \"node_set\" (a name of the mesh) and \"box_m\" ({\"min\": [x, y, z], \"max\": [x, y, z]})");
+  }
+  return result;
+}
+
+/// A node set's name, an object, or a list of both.
+std::vector<Fixed> read_all_fixed(base::Object& job) {
+  std::vector<Fixed> list;
+  for (base::Entry& entry : job.entries("fixed", kMostFixed)) {
+    Fixed& fixed = list.emplace_back(entry.object ? read_fixed(*entry.object) : Fixed{entry.text, {}, {}, {}, {}});
+    fixed.place = entry.place;
+  }
+  return list;
+}
+
+void read_materials(base::Object& job, JobSpec& spec) {
+  const auto read = [&](base::Object object) { return read_material(std::move(object), spec.band_hz, spec.warnings); };
+  if (auto materials = job.object_if("materials")) {
+    if (materials->keys().empty() || materials->keys().size() > kMostRegions)
+      job.fail("materials",
+               fmt::format("holds one material for each region of the mesh, by its tag or name: {{\"1\": {{...}}, \"2\": {{...}}}}; "
+                           "give 1 to {}",
+                           kMostRegions));
+    for (const std::string& region : materials->keys()) {
+      if (region.empty()) materials->fail("", "a region's name is empty; give its tag or its name");
+      spec.materials[region] = read(materials->object(region));
+    }
+  }
+  spec.has_material = spec.materials.empty() || job.has("material");
+  spec.material = spec.has_material ? read(job.object("material")) : spec.materials.begin()->second;
+}
+
+void read_solver(base::Object& job, JobSpec& spec) {
+  auto solver = job.object_if("solver");
+  if (!solver) return;
+  if (spec.accuracy_cents && solver->has("tolerance"))
+    solver->fail("tolerance", "\"accuracy_cents\" chooses the tolerance; give one of the two");
+  spec.tolerance = solver->number_or("tolerance", spec.tolerance, {1e-14, 1e-4});
+  spec.method = kMethods.read(*solver, "method", spec.method);
+  spec.factorisation = kFactorisations.read(*solver, "factorisation", spec.factorisation);
+  solver->finish();
+}
+
+void read_resources(base::Object& job, JobSpec& spec) {
+  auto resources = job.object_if("resources");
+  if (!resources) return;
+  if (auto ranks = resources->integer_if("ranks", 1, kMostRanks)) spec.resources.ranks = static_cast<int>(*ranks);
+  spec.resources.memory_gb = resources->number_if("memory_gb", {0.0, kMostGb}).value_or(0.0);
+  spec.resources.time_limit_s = resources->number_if("time_limit_s", {0.0, kMostSeconds}).value_or(0.0);
+  resources->finish();
+}
+
+void read_geometry(base::Object& job, JobSpec& spec) {
+  if (job.has("body")) {
+    if (job.has("mesh")) job.fail("body", "\"mesh\" names the body already; give one of \"mesh\" (a file) and \"body\"");
+    if (job.has("mesh_scale"))
+      job.fail("mesh_scale", "is for a \"mesh\" file; a surface has \"scale\" inside \"body\", and shapes are in metres");
+    spec.body = read_body(job.object("body"));
+  } else {
+    spec.mesh = job.path("mesh");
+    spec.mesh_scale = job.number_or("mesh_scale", spec.mesh_scale, base::kPositive);
+    if (spec.mesh_scale < kLeastScale || spec.mesh_scale > kMostScale)
+      job.fail("mesh_scale", fmt::format("metres per unit of the mesh file, from {:g} to {:g} (0.001 for millimetres), and is {:g}",
+                                         kLeastScale, kMostScale, spec.mesh_scale));
+  }
+  if (!spec.accuracy_cents) return;
+  if (job.has("element")) job.fail("element", "\"accuracy_cents\" chooses the element; give one of the two");
+  if (spec.body && (spec.body->nodes || spec.body->edge_m)) {
+    base::Object body = job.object("body");
+    body.fail(spec.body->nodes ? "nodes" : "edge_m", "\"accuracy_cents\" chooses the mesh; give one of the two");
+  }
+}
+
+/// The same name, or two names of one file that exists.
+bool is_same_file(const fs::path& a, const fs::path& b) {
+  std::error_code none;
+  return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal() || fs::equivalent(a, b, none);
+}
+
+void check_outputs(base::Object& job, const JobSpec& spec) {
+  if (spec.bank.empty()) return;
+  const fs::path input = !spec.body ? spec.mesh : spec.body->surface;
+  const fs::path resolved = find_resolved_path(spec.bank);
+  if (!input.empty() && (is_same_file(spec.bank, input) || is_same_file(resolved, input))) {
+    job.fail("bank", fmt::format("the bank or its record would overwrite the {}; choose another file", spec.body ? "surface" : "mesh"));
+  }
+  if (is_same_file(spec.bank, spec.file)) job.fail("bank", "the bank would overwrite this job file; choose another file");
+}
+
+JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
+  JobSpec spec;
+  spec.file = file;
+  if (job.has("accuracy_cents")) {
+    spec.accuracy_cents = job.number("accuracy_cents", base::kPositive);
+    if (*spec.accuracy_cents < kLeastCents || *spec.accuracy_cents > kMostCents)
+      job.fail("accuracy_cents",
+               fmt::format("must be from {:g} to {:g} cents, and is {:g}", kLeastCents, kMostCents, *spec.accuracy_cents));
+  }
+  read_geometry(job, spec);
+  if (bank == BankKey::required || job.has("bank")) spec.bank = job.path("bank");
+  spec.band_hz = job.numbers_or<2>("band_hz", spec.band_hz);
+  if (!(spec.band_hz[0] > 0 && spec.band_hz[1] > spec.band_hz[0])) {
+    job.fail("band_hz", fmt::format("must be [low, high] with 0 < low < high in Hz, and is [{}, {}]", spec.band_hz[0], spec.band_hz[1]));
+  }
+  if (spec.band_hz[1] > kMostHz)
+    job.fail("band_hz", fmt::format("must end at {:g} Hz at most, and ends at {:g}", kMostHz, spec.band_hz[1]));
+  read_materials(job, spec);
+  spec.element = kElements.read(job, "element", spec.element);
+  spec.mass = kMasses.read(job, "mass", spec.mass);
+  if (auto count = job.integer_if("max_modes", 1, 40000)) spec.max_modes = static_cast<int>(*count);
+  spec.fixed = read_all_fixed(job);
+  read_solver(job, spec);
+  read_resources(job, spec);
+  job.ignore("run");
+  job.finish();
+  check_outputs(job, spec);
+  return spec;
+}
+
+}  // namespace
+
+fs::path find_resolved_path(const fs::path& bank) { return fs::path(bank) += ".resolved.json"; }
+
+JobSpec parse_job(std::string_view text, const fs::path& file, BankKey bank, int first_line) {
+  return read_root(base::parse_document(text, file, first_line).root(), file, bank);
+}
+
+JobSpec read_job(const fs::path& file, BankKey bank) { return read_root(base::read_document(file).root(), file, bank); }
+
+std::string to_text(Element element) { return kElements.find(element); }
+std::string to_text(Mass mass) { return kMasses.find(mass); }
+std::string to_text(Method method) { return kMethods.find(method); }
+std::string to_text(Factorisation factorisation) { return kFactorisations.find(factorisation); }
+
+}  // namespace carillon::job

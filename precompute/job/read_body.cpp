@@ -1,0 +1,104 @@
+#include "precompute/job/read_body.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace carillon::job {
+namespace {
+
+// As carillon-mesh has them.
+constexpr double kLeastLength = 1e-6, kMostLength = 1e4;      // [m]
+constexpr double kLeastOpening = 20.0, kMostOpening = 340.0;  // [degrees]
+constexpr long long kMostNodes = 20'000'000;
+
+double read_length(base::Object& body, const std::string& key) {
+  const double value = body.number(key, base::kPositive);
+  if (value < kLeastLength || value > kMostLength)
+    body.fail(key, fmt::format("lengths are metres, from {:g} to {:g}, and this is {:g}", kLeastLength, kMostLength, value));
+  return value;
+}
+
+std::optional<double> read_length_if(base::Object& body, const std::string& key) {
+  return body.has(key) ? std::optional(read_length(body, key)) : std::nullopt;
+}
+
+void read_shape(base::Object& body, Body& result) {
+  std::vector<std::string> names;
+  for (const ShapeKeys& keys : get_shape_keys()) names.emplace_back(keys.shape);
+  result.shape = body.choice("shape", names);
+  for (const ShapeKeys& keys : get_shape_keys()) {
+    if (keys.shape != result.shape) continue;
+    for (const std::string& dimension : keys.dimensions) {
+      const std::string key = find_dimension_key(dimension);
+      if (!body.has(key)) continue;
+      if (dimension != "opening-angle") {
+        result.dimensions[dimension] = read_length(body, key);
+        continue;
+      }
+      const double angle = body.number(key);
+      if (!(angle >= kLeastOpening && angle <= kMostOpening))
+        body.fail(key, fmt::format("must be {:g} to {:g} degrees (180 is a hemisphere), and is {:g}", kLeastOpening, kMostOpening, angle));
+      result.dimensions[dimension] = angle;
+    }
+  }
+}
+
+void read_surface(base::Object& body, Body& result) {
+  result.surface = body.path("surface");
+  result.wall_m = read_length_if(body, "wall_m");
+  result.height_m = read_length_if(body, "height_m");
+  result.scale = body.number_if("scale", base::kPositive);
+  result.close_holes = body.number_if("close_holes");
+  if (result.close_holes && !(*result.close_holes >= 0.0 && *result.close_holes <= 1.0))
+    body.fail("close_holes", fmt::format("is a part of the body's diagonal, from 0 to 1, and this is {:g}", *result.close_holes));
+  if (result.height_m && result.scale) body.fail("scale", "\"height_m\" gives the size already; give one of them");
+  result.up = body.choice_or("up", {"x", "y", "z"}, "y")[0];
+  result.method = body.choice_or("method", {"auto", "delaunay", "stuffing"}, "auto");
+}
+
+}  // namespace
+
+const std::vector<ShapeKeys>& get_shape_keys() {
+  static const std::vector<ShapeKeys> keys{{"bar", {"length", "width", "thickness"}},
+                                           {"tube", {"length", "outer-radius", "wall"}},
+                                           {"plate", {"length", "width", "thickness"}},
+                                           {"sphere", {"radius", "wall"}},
+                                           {"bowl", {"outer-radius", "wall", "opening-angle"}},
+                                           {"box", {"length", "width", "height"}},
+                                           {"hollow-box", {"length", "width", "height", "wall"}},
+                                           {"cylinder", {"length", "radius"}},
+                                           {"disc", {"radius", "thickness"}},
+                                           {"ring", {"radius", "thickness"}},
+                                           {"cone", {"radius", "top-radius", "height"}}};
+  return keys;
+}
+
+std::string find_dimension_key(const std::string& dimension) {
+  std::string key = dimension;
+  std::replace(key.begin(), key.end(), '-', '_');
+  return key + (dimension == "opening-angle" ? "_deg" : "_m");
+}
+
+Body read_body(base::Object body) {
+  Body result;
+  result.place = body.find_place("");
+  if (body.has("shape") == body.has("surface"))
+    body.fail(body.has("shape") ? "surface" : "",
+              "a body is a \"shape\" (bar, tube, plate ... with its dimensions) or a \"surface\" (a file); give one of the two");
+  if (body.has("shape"))
+    read_shape(body, result);
+  else
+    read_surface(body, result);
+  result.nodes = body.integer_if("nodes", 4, std::numeric_limits<long long>::max());
+  if (result.nodes.value_or(0) > kMostNodes)
+    body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
+                                   kMostNodes, *result.nodes));
+  result.edge_m = read_length_if(body, "edge_m");
+  if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" says how fine the mesh is already; give one of them");
+  body.finish();
+  return result;
+}
+
+}  // namespace carillon::job

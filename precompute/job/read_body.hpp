@@ -1,0 +1,21 @@
+// A body that the program meshes itself, from its JSON object.
+#pragma once
+
+#include "precompute/job/job_spec.hpp"
+
+namespace carillon::job {
+
+/// The shapes of carillon-mesh and their dimensions, by its names; a test holds this table against the shapes themselves.
+struct ShapeKeys {
+  const char* shape;
+  std::vector<std::string> dimensions;
+};
+const std::vector<ShapeKeys>& get_shape_keys();
+
+/// The key of a dimension in a job: "outer-radius" is "outer_radius_m", "opening-angle" is "opening_angle_deg".
+std::string find_dimension_key(const std::string& dimension);
+
+/// Reads and validates a body. Throws InputError.
+Body read_body(base::Object body);
+
+}  // namespace carillon::job

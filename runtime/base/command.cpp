@@ -1,0 +1,293 @@
+// Method: vfork() and exec, with all signals blocked in between; poll() on the pipes until the program has closed them or its time is over,
+//   then waitpid() without blocking: a program may go on without outputs, and one that waits for a dead disk cannot even be killed.
+// Source: POSIX; Linux vfork(2), prctl(2) (PR_SET_PDEATHSIG), proc(5) (oom_score_adj).
+// Deviations: between vfork() and exec the child does more than POSIX allows, and nothing that Linux does not: system calls and writes to
+//   `Plan`, which the parent waits for.
+#include "runtime/base/command.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+extern "C" char** environ;
+
+namespace carillon::base {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr long kLookNs = 2'000'000;       // between two looks whether a program has ended
+constexpr double kAskS = 0.1;             // between two questions to may_stop
+constexpr double kKillPatienceS = 5.0;    // for a program that was killed
+constexpr const char* kOomScore = "500";  // of 1,000
+
+class Descriptor {
+ public:
+  explicit Descriptor(int value = -1) : value_(value) {}
+  ~Descriptor() { close(); }
+  Descriptor(Descriptor&& other) noexcept : value_(std::exchange(other.value_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    close();
+    value_ = std::exchange(other.value_, -1);
+    return *this;
+  }
+  int get() const { return value_; }
+  void close() {
+    if (value_ >= 0) ::close(value_);
+    value_ = -1;
+  }
+
+ private:
+  int value_;
+};
+
+struct Pipe {
+  Descriptor read, write;
+  Pipe() {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) throw SystemError(fmt::format("cannot make a pipe: {}; close other programs", std::strerror(errno)));
+    const Descriptor low_read(ends[0]), low_write(ends[1]);
+    read = Descriptor(::fcntl(ends[0], F_DUPFD_CLOEXEC, 3));  // where a standard stream is closed its number is not for a pipe
+    write = Descriptor(::fcntl(ends[1], F_DUPFD_CLOEXEC, 3));
+    if (read.get() < 0 || write.get() < 0) throw SystemError("cannot make a pipe: too many files are open");
+  }
+};
+
+/// Writing to a program that takes no input is no reason to end.
+class IgnoredPipeSignal {
+ public:
+  IgnoredPipeSignal() {
+    struct sigaction ignore {};
+    ignore.sa_handler = SIG_IGN;
+    ::sigaction(SIGPIPE, &ignore, &before_);
+  }
+  ~IgnoredPipeSignal() { ::sigaction(SIGPIPE, &before_, nullptr); }
+  IgnoredPipeSignal(const IgnoredPipeSignal&) = delete;
+  IgnoredPipeSignal& operator=(const IgnoredPipeSignal&) = delete;
+
+ private:
+  struct sigaction before_ {};
+};
+
+double get_seconds() {
+  timespec now{};
+  ::clock_gettime(CLOCK_BOOTTIME, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+std::vector<char*> to_pointers(const std::vector<std::string>& texts) {
+  std::vector<char*> pointers;
+  for (const std::string& text : texts) pointers.push_back(const_cast<char*>(text.c_str()));
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
+/// All that the child reads, and the error that it leaves.
+struct Plan {
+  char* const* words = nullptr;
+  char* const* environment = nullptr;
+  const char* folder = nullptr;
+  std::array<int, 3> streams{};  // 3 or more
+  Command::Group group{};
+  int signal_at_end = 0;
+  bool yields_memory = false;
+  sigset_t mask{};
+  pid_t parent = 0;
+  int error = 0;
+};
+
+/// In the child, whose memory is that of the parent.
+[[noreturn]] void become(Plan& plan) {
+  if (plan.group == Command::Group::own) ::setpgid(0, 0);
+  if (plan.group == Command::Group::session) ::setsid();
+  if (plan.signal_at_end != 0) ::prctl(PR_SET_PDEATHSIG, plan.signal_at_end);
+  struct sigaction action {};
+  action.sa_handler = SIG_DFL;
+  for (int signal = 1; signal < NSIG; ++signal) ::sigaction(signal, &action, nullptr);
+  if (plan.yields_memory) {
+    const int score = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+    if (score >= 0) (void)!::write(score, kOomScore, std::strlen(kOomScore));
+  }
+  bool ready = plan.signal_at_end == 0 || ::getppid() == plan.parent;
+  for (int k = 0; k < 3; ++k) ready = ready && ::dup2(plan.streams[static_cast<std::size_t>(k)], k) == k;
+  ready = ready && (plan.folder == nullptr || ::chdir(plan.folder) == 0);
+  ::sigprocmask(SIG_SETMASK, &plan.mask, nullptr);
+  if (ready) ::execvpe(plan.words[0], plan.words, plan.environment);
+  plan.error = errno;
+  ::_exit(127);
+}
+
+/// A frame of its own: what the caller has in registers is safe from the child.
+[[gnu::noinline]] pid_t fork_and_become(Plan& plan) {
+  const pid_t child = ::vfork();
+  if (child == 0) become(plan);
+  return child;
+}
+
+/// Appends what is there; false at the end.
+bool take(int descriptor, std::string& text, const RunOptions& options) {
+  std::array<char, 65536> piece;
+  const ssize_t got = ::read(descriptor, piece.data(), piece.size());
+  if (got > 0) text.append(piece.data(), static_cast<std::size_t>(got));
+  if (options.keeps_tail && text.size() > 2 * options.max_bytes) text.erase(0, text.size() - options.max_bytes);
+  return got > 0 || (got < 0 && errno == EINTR);
+}
+
+/// Gives some more of the input; false when all is given, or the program takes no more.
+bool give(int descriptor, std::string_view& input) {
+  const ssize_t put = ::write(descriptor, input.data(), input.size());
+  if (put > 0) input.remove_prefix(static_cast<std::size_t>(put));
+  return !input.empty() && (put > 0 || errno == EINTR || errno == EAGAIN);
+}
+
+/// Until the program has closed its outputs or is to be killed.
+void talk(Descriptor& in, Descriptor& out, Descriptor& errors, const RunOptions& options, double deadline_s, Finished& finished) {
+  std::string_view input = options.input;
+  if (in.get() >= 0) ::fcntl(in.get(), F_SETFL, O_NONBLOCK);
+  while (out.get() >= 0 || errors.get() >= 0) {
+    const double left_s = deadline_s - get_seconds();
+    finished.was_slow = left_s <= 0.0;
+    finished.was_long = !options.keeps_tail && std::max(finished.output.size(), finished.errors.size()) > options.max_bytes;
+    finished.was_stopped = options.may_stop && options.may_stop(finished);
+    if (finished.was_slow || finished.was_long || finished.was_stopped) return;
+    std::array<pollfd, 3> all{{{in.get(), POLLOUT, 0}, {out.get(), POLLIN, 0}, {errors.get(), POLLIN, 0}}};
+    const double wait_s = std::min(left_s, options.may_stop ? kAskS : 1e3);
+    if (::poll(all.data(), all.size(), static_cast<int>(wait_s * 1e3 + 1.0)) < 0) {
+      if (errno != EINTR) throw SystemError(fmt::format("cannot wait for a program: {}", std::strerror(errno)));
+      continue;
+    }
+    if (all[0].revents != 0 && !give(in.get(), input)) in.close();
+    if (all[1].revents != 0 && !take(out.get(), finished.output, options)) out.close();
+    if (all[2].revents != 0 && !take(errors.get(), finished.errors, options)) errors.close();
+  }
+}
+
+/// Its status when it ends before the deadline.
+std::optional<int> await(pid_t child, double deadline_s, const std::function<bool()>& may_stop) {
+  for (;;) {
+    int status = 0;
+    const pid_t ended = ::waitpid(child, &status, WNOHANG);
+    if (ended == child) return status;
+    if (ended < 0 && errno != EINTR) return 0;  // it was waited for elsewhere
+    if (get_seconds() >= deadline_s || (may_stop && may_stop())) return std::nullopt;
+    const timespec pause{0, kLookNs};
+    ::nanosleep(&pause, nullptr);
+  }
+}
+
+}  // namespace
+
+fs::path find_self() {
+  std::error_code error;
+  fs::path self = fs::read_symlink("/proc/self/exe", error);
+  if (error) throw SystemError("/proc does not show this program; mount it");
+  return self;
+}
+
+bool is_program(const fs::path& file) {
+  std::error_code error;
+  return fs::is_regular_file(file, error) && ::access(file.c_str(), X_OK) == 0;
+}
+
+std::optional<fs::path> find_program(const std::string& name) {
+  std::error_code error;
+  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  if (!error && is_program(self.parent_path() / name)) return self.parent_path() / name;
+  const char* path = std::getenv("PATH");
+  std::string_view rest = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
+  while (!rest.empty()) {
+    const std::string_view folder = rest.substr(0, rest.find(':'));
+    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
+    if (!folder.empty() && is_program(fs::path(folder) / name)) return fs::absolute(fs::path(folder) / name, error);
+  }
+  return std::nullopt;
+}
+
+pid_t start(const Command& command) {
+  const auto refuse = [&](int error) {
+    throw StartError(fmt::format("{}: cannot be started: {}", command.words.at(0), std::strerror(error)));
+  };
+  const std::vector<char*> words = to_pointers(command.words);
+  const std::vector<char*> environment = command.environment ? to_pointers(*command.environment) : std::vector<char*>();
+  Plan plan;
+  plan.words = words.data();
+  plan.environment = command.environment ? environment.data() : environ;
+  plan.folder = command.folder.empty() ? nullptr : command.folder.c_str();
+  plan.group = command.group;
+  plan.signal_at_end = command.signal_at_end;
+  plan.yields_memory = command.yields_memory;
+  plan.parent = ::getpid();
+  ::sigemptyset(&plan.mask);
+  for (const int signal : command.blocked) ::sigaddset(&plan.mask, signal);
+  // Above the three that they become.
+  std::array<Descriptor, 3> streams;
+  const std::array<int, 3> given{command.input, command.output, command.errors};
+  const Descriptor null(::open("/dev/null", O_RDWR | O_CLOEXEC));
+  for (std::size_t k = 0; k < 3; ++k) {
+    const int from = given[k] >= 0 ? given[k] : given[k] == kInherit ? static_cast<int>(k) : null.get();
+    streams[k] = Descriptor(::fcntl(from, F_DUPFD_CLOEXEC, 3));
+    if (streams[k].get() < 0 && given[k] == kInherit) streams[k] = Descriptor(::fcntl(null.get(), F_DUPFD_CLOEXEC, 3));  // it is closed
+    if (streams[k].get() < 0) refuse(errno);
+    plan.streams[k] = streams[k].get();
+  }
+  sigset_t all, before;
+  ::sigfillset(&all);
+  ::pthread_sigmask(SIG_SETMASK, &all, &before);
+  const pid_t child = fork_and_become(plan);
+  const int error = child < 0 ? errno : plan.error;
+  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  if (error == 0) return child;
+  while (child > 0 && ::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
+  }
+  refuse(error);
+  return -1;
+}
+
+Finished run(Command command, const RunOptions& options) {
+  const IgnoredPipeSignal ignored;
+  std::optional<Pipe> in, out, errors;
+  if (!options.input.empty()) command.input = in.emplace().read.get();
+  if (command.output == kCapture) command.output = out.emplace().write.get();
+  if (command.errors == kCapture) command.errors = errors.emplace().write.get();
+  if (command.signal_at_end == 0) command.signal_at_end = SIGKILL;
+  const double deadline_s = get_seconds() + options.patience_s;
+  const pid_t child = start(command);
+  if (options.started) options.started(child);
+  Descriptor give_to, take_from, errors_from;
+  if (in) give_to = std::move(in->write), in->read.close();
+  if (out) take_from = std::move(out->read), out->write.close();
+  if (errors) errors_from = std::move(errors->read), errors->write.close();
+  Finished finished;
+  talk(give_to, take_from, errors_from, options, deadline_s, finished);
+  const auto may_stop = [&] { return options.may_stop && options.may_stop(finished); };
+  std::optional<int> status;
+  if (!finished.was_slow && !finished.was_long && !finished.was_stopped) {
+    status = await(child, deadline_s, may_stop);
+    if (!status) (get_seconds() >= deadline_s ? finished.was_slow : finished.was_stopped) = true;
+  }
+  if (!status) {
+    ::kill(child, SIGKILL);
+    status = await(child, get_seconds() + kKillPatienceS, {}).value_or(SIGKILL);
+  }
+  if (options.keeps_tail)
+    for (std::string* text : {&finished.output, &finished.errors})
+      if (text->size() > options.max_bytes) text->erase(0, text->size() - options.max_bytes);
+  finished.signal = WIFSIGNALED(*status) ? WTERMSIG(*status) : 0;
+  finished.exit_code = finished.signal != 0 ? 128 + finished.signal : WEXITSTATUS(*status);
+  return finished;
+}
+
+}  // namespace carillon::base

@@ -1,0 +1,75 @@
+// Other programs: where they are, how they are started, what they say. Nothing here goes through a shell.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/base/error.hpp"
+
+namespace carillon::base {
+
+/// The file of this program. SystemError where /proc does not show it.
+std::filesystem::path find_self();
+/// A program by its name: next to this one, else along PATH. None where there is none that may be run.
+std::optional<std::filesystem::path> find_program(const std::string& name);
+/// Is it a file that may be run?
+bool is_program(const std::filesystem::path& file);
+
+/// Streams of a program, in place of a descriptor.
+inline constexpr int kNull = -1;     // /dev/null
+inline constexpr int kInherit = -2;  // that of this process
+inline constexpr int kCapture = -3;  // of run(): kept
+
+/// How a program is started.
+struct Command {
+  std::vector<std::string> words;                                      // the program, a path or a name along PATH, and its arguments
+  std::optional<std::vector<std::string>> environment = std::nullopt;  // "NAME=value"; none: that of this process
+  std::filesystem::path folder = {};                                   // it starts in; empty: where this process is
+  int input = kNull, output = kNull, errors = kNull;                   // kNull, kInherit, kCapture or a descriptor
+  enum class Group { same, own, session } group = Group::same;         // of processes
+  int signal_at_end = 0;                                               // it gets when this process ends; 0: none
+  std::vector<int> blocked = {};                                       // signals that wait until it unblocks them
+  bool yields_memory = false;                                          // when memory runs out it goes before this process
+};
+
+/// A program that could not be started.
+class StartError : public SystemError {
+  using SystemError::SystemError;
+};
+
+/// Starts it; all its signals have their default actions. Throws StartError "WORD: cannot be started: why". Does not fork, so that no
+/// handler of pthread_atfork() runs (MPI has some) and no memory is copied. kCapture is /dev/null here.
+pid_t start(const Command& command);
+
+/// What became of a program.
+struct Finished {
+  int exit_code = 0;         // 128 + signal when a signal ended it
+  int signal = 0;            // that ended it; 0: none
+  bool was_slow = false;     // had not ended in time, and was killed
+  bool was_long = false;     // printed more than max_bytes on one stream, and was killed
+  bool was_stopped = false;  // `may_stop` said so, and it was killed
+  std::string output, errors;
+};
+
+struct RunOptions {
+  std::string_view input = {};  // on its standard input; empty: that of the command
+  double patience_s = std::numeric_limits<double>::infinity();
+  std::size_t max_bytes = std::size_t{128} << 20;
+  bool keeps_tail = false;  // of what is longer than max_bytes the end is kept, and it is not killed
+  std::function<void(pid_t)> started = {};
+  std::function<bool(const Finished& now)> may_stop = {};  // is asked every tenth of a second
+};
+
+/// Starts it, waits until it ends, and keeps what it prints on the streams that are kCapture. It gets SIGKILL when this process ends,
+/// unless the command says otherwise. Throws StartError, and SystemError where this process has no pipes left.
+Finished run(Command command, const RunOptions& options = {});
+
+}  // namespace carillon::base

@@ -1,0 +1,229 @@
+#include "runtime/base/file.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace carillon::base {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A POSIX file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int value) : value_(value) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (value_ >= 0) ::close(value_);
+  }
+  int get() const { return value_; }
+
+ private:
+  int value_ = -1;
+};
+
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
+/// Beside `file`, hidden, of this process and call alone: two threads that write one name must not share a temporary file. Never longer
+/// than the name of `file` and some forty bytes, cut where a file system's 255 would end.
+fs::path make_temporary_name(const fs::path& file) {
+  static std::atomic<unsigned> count{0};
+  return folder_of(file) / fmt::format(".{}.tmp.{}.{}", file.filename().string().substr(0, 200), ::getpid(), count++);
+}
+
+void sync_folder(const fs::path& folder) {
+  const Descriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() >= 0) ::fsync(fd.get());
+}
+
+}  // namespace
+
+bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT; }
+
+namespace {
+
+/// A regular file to read. `length` gets its bytes.
+int open_regular(const fs::path& file, std::string_view what, std::uint64_t& length) {
+  // O_NONBLOCK: opening a pipe without a writer must not wait.
+  const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (fd < 0) {
+    throw InputError(fmt::format("{}: cannot open this {}: {}; check the path", file.string(), what, std::strerror(errno)));
+  }
+  struct stat info {};
+  if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
+    ::close(fd);
+    throw InputError(fmt::format("{}: a {} must be a regular file, and this is {}; name the file itself", file.string(), what,
+                                 S_ISDIR(info.st_mode) ? "a folder" : "a pipe or a device"));
+  }
+  length = static_cast<std::uint64_t>(info.st_size);
+  return fd;
+}
+
+/// As many of the bytes as the file has left.
+std::size_t read_some(int fd, char* bytes, std::size_t count, const fs::path& file, std::string_view what) {
+  std::size_t done = 0;
+  while (done < count) {
+    const ssize_t got = ::read(fd, bytes + done, count - done);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw InputError(fmt::format("{}: cannot read this {}: {}; check the disk", file.string(), what, std::strerror(errno)));
+    if (got == 0) break;
+    done += static_cast<std::size_t>(got);
+  }
+  return done;
+}
+
+}  // namespace
+
+std::string read_file(const fs::path& file, std::string_view what, std::uint64_t max_bytes, std::string_view remedy) {
+  std::uint64_t length = 0;
+  const Descriptor fd(open_regular(file, what, length));
+  if (length > max_bytes) {
+    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", file.string(), length, what, max_bytes, remedy));
+  }
+  std::string bytes(static_cast<std::size_t>(length), '\0');
+  bytes.resize(read_some(fd.get(), bytes.data(), bytes.size(), file, what));  // shorter when the file shrank meanwhile
+  return bytes;
+}
+
+void read_pieces(const fs::path& file, std::string_view what, std::size_t piece_bytes, const std::function<void(std::string_view)>& take) {
+  std::uint64_t length = 0;
+  const Descriptor fd(open_regular(file, what, length));
+  std::string piece(piece_bytes, '\0');
+  for (std::uint64_t done = 0; done < length;) {  // what is appended meanwhile is not read
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(piece_bytes, length - done));
+    const std::size_t got = read_some(fd.get(), piece.data(), wanted, file, what);
+    if (got == 0) return;
+    take(std::string_view(piece).substr(0, got));
+    done += got;
+  }
+}
+
+namespace {
+
+/// All signals wait while it lives.
+class SignalPause {
+ public:
+  SignalPause() {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~SignalPause() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalPause(const SignalPause&) = delete;
+  SignalPause& operator=(const SignalPause&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+/// A file in `folder` that has no name and is gone with its last descriptor; -1 where the file system has no such thing (NFS, FAT).
+int open_nameless(const fs::path& folder) {
+  if (::access("/proc/self/fd", X_OK) != 0) return -1;  // link_nameless() needs it
+  return ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+}
+
+/// Gives the bytes of a nameless file the name. 0 or errno.
+int link_nameless(int descriptor, const fs::path& name) {
+  const std::string self = fmt::format("/proc/self/fd/{}", descriptor);
+  return ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
+}
+
+/// 0 or errno.
+int write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t put = ::write(descriptor, bytes.data(), bytes.size());
+    if (put < 0 && errno == EINTR) continue;
+    if (put <= 0) return put < 0 ? errno : ENOSPC;
+    bytes.remove_prefix(static_cast<std::size_t>(put));
+  }
+  return 0;
+}
+
+}  // namespace
+
+WholeFile::WholeFile(fs::path file) : file_(std::move(file)), temporary_(make_temporary_name(file_)) {
+  ::unlink(temporary_.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
+  descriptor_ = open_nameless(folder_of(file_));
+  is_nameless_ = descriptor_ >= 0;
+  if (!is_nameless_) descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) refuse(errno);
+}
+
+WholeFile::~WholeFile() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  if (!is_nameless_) ::unlink(temporary_.c_str());
+}
+
+void WholeFile::refuse(int error) {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = -1;
+  ::unlink(temporary_.c_str());
+  throw SystemError(fmt::format(
+      "{}: cannot write: {}; {}", file_.string(), std::strerror(error),
+      is_full_error(error) ? "the disk or quota is full: make room on it" : "check the folder's rights and the space on the disk"));
+}
+
+void WholeFile::append(std::string_view bytes) {
+  if (const int error = write_all(descriptor_, bytes); error != 0) refuse(error);
+}
+
+void WholeFile::commit() {
+  if (::fsync(descriptor_) != 0) refuse(errno);
+  {
+    // Whoever is killed by a signal that can be caught leaves no temporary name behind.
+    const SignalPause pause;
+    if (is_nameless_) {
+      if (const int error = link_nameless(descriptor_, temporary_); error != 0) refuse(error);
+    }
+    if (::close(std::exchange(descriptor_, -1)) != 0) refuse(errno);
+    if (::rename(temporary_.c_str(), file_.c_str()) != 0) refuse(errno);
+  }
+  sync_folder(folder_of(file_));
+}
+
+void write_file(const fs::path& file, std::string_view bytes) {
+  WholeFile whole(file);
+  whole.append(bytes);
+  whole.commit();
+}
+
+void check_writable(const fs::path& file, std::string_view what) {
+  std::error_code error;
+  if (file.filename().empty()) throw InputError(fmt::format("{}: the {} needs a file name after the folder", file.string(), what));
+  const auto status = fs::status(file, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    throw InputError(fmt::format("{}: the {} cannot be written here: this is {}; name a file", file.string(), what,
+                                 fs::is_directory(status) ? "a folder" : "a pipe or a device"));
+  }
+  struct stat info {};
+  const fs::path folder = folder_of(file);
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) {
+    throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", folder.string(), what,
+                                 error ? error.message() : "it is not a folder"));
+  }
+  if (::lstat(file.c_str(), &info) != 0 && errno != ENOENT) {  // a name too long, a loop of links
+    throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose another name", file.string(), what, std::strerror(errno)));
+  }
+  const fs::path probe = make_temporary_name(file);
+  ::unlink(probe.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
+  const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  if (fd.get() < 0) {
+    throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", file.string(), what,
+                                 std::strerror(errno)));
+  }
+  ::unlink(probe.c_str());
+}
+
+}  // namespace carillon::base

@@ -1,0 +1,187 @@
+// Source: walls: infinite thin plates (Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed., chapter 5) of usual building materials.
+//   Joints, cord, felt and hand are estimates; docs/howto/supports.md says of each number where it comes from.
+#include "runtime/material/supports.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "runtime/material/solids.hpp"
+
+namespace carillon::material {
+namespace {
+
+constexpr double kMostLoss = 1.0;  // d = omega eta / 2: a mode that loses more hardly swings
+constexpr double kMostThicknessM = 100.0;
+constexpr double kMostMassKg = 1e9, kMostDampingNsM = 1e12, kMostStiffnessNM = 1e15;
+
+struct Joint {
+  const char* name;
+  double loss;
+};
+
+const std::vector<Base> kBases{
+    {.name = "rigid"},
+    {BaseKind::kPlate, "brick wall", 11e9, 0.2, 1900.0, 0.1, 0.0, 0.0, 0.0, 0.01},
+    {BaseKind::kPlate, "concrete wall", 30e9, 0.2, 2300.0, 0.1, 0.0, 0.0, 0.0, 0.006},
+    {BaseKind::kPlate, "plasterboard wall", 2.5e9, 0.2, 700.0, 0.0125, 0.0, 0.0, 0.0, 0.014},
+    {BaseKind::kHalfSpace, "concrete block", 30e9, 0.2, 2300.0, 0.0, 0.0, 0.0, 0.0, 0.006},
+};
+const std::vector<Joint> kJoints{{"screwed", 0.01}, {"glued", 0.05}};
+const std::vector<Base> kHolders{
+    {.kind = BaseKind::kLumped, .name = "cord", .damping_n_s_m = 0.2},
+    {.kind = BaseKind::kLumped, .name = "felt", .stiffness_n_m = 2e4, .loss_factor = 0.3},
+    {.kind = BaseKind::kLumped, .name = "hand", .mass_kg = 5e-4, .damping_n_s_m = 2.0, .stiffness_n_m = 2e3},
+};
+
+template <class List>
+std::vector<std::string> list_names(const List& list) {
+  std::vector<std::string> names;
+  for (const auto& entry : list) names.emplace_back(entry.name);
+  return names;
+}
+
+const Base& find_base(const std::vector<Base>& list, const std::string& name) {
+  return *std::find_if(list.begin(), list.end(), [&](const Base& base) { return base.name == name; });
+}
+
+/// A number from 0 to `most`.
+double read_amount(base::Object& object, std::string_view key, double fallback, double most) {
+  const double value = object.number_or(key, fallback);
+  if (!(value >= 0.0 && value <= most)) object.fail(key, fmt::format("{:g} is out of range; give a number from 0 to {:g}", value, most));
+  return value;
+}
+
+Base read_lumped(base::Object& object) {
+  Base base{.kind = BaseKind::kLumped};
+  base.mass_kg = read_amount(object, "mass_kg", 0.0, kMostMassKg);
+  base.damping_n_s_m = read_amount(object, "damping_n_s_m", 0.0, kMostDampingNsM);
+  base.stiffness_n_m = read_amount(object, "stiffness_n_m", 0.0, kMostStiffnessNM);
+  base.loss_factor = read_amount(object, "loss_factor", 0.0, kMostLoss);
+  object.finish();
+  return base;
+}
+
+/// A wall of another thickness or material.
+Base read_wall(base::Object& object) {
+  Base base{.kind = BaseKind::kPlate};
+  const auto read = [&](const char* key, double least, double most) {
+    const double value = object.number(key, base::kPositive);
+    if (!(value >= least && value <= most)) object.fail(key, fmt::format("{:g} is out of range; give {:g} to {:g}", value, least, most));
+    return value;
+  };
+  base.young_modulus_pa = read("young_modulus_pa", kLeastStiffnessPa, kMostStiffnessPa);
+  base.density_kg_m3 = read("density_kg_m3", kLeastDensityKgM3, kMostDensityKgM3);
+  base.thickness_m = read("thickness_m", 1e-6, kMostThicknessM);
+  base.poisson_ratio = object.number_or("poisson_ratio", 0.2, {-1.0, 0.5});
+  base.loss_factor = read_amount(object, "loss_factor", 0.01, kMostLoss);
+  object.finish();
+  return base;
+}
+
+Base read_base(base::Object& object) {
+  if (object.has_object("on")) {
+    base::Object base = object.object("on");
+    if (base.has("thickness_m") || base.has("young_modulus_pa") || base.has("density_kg_m3")) return read_wall(base);
+    const Base lumped = read_lumped(base);
+    if (lumped.mass_kg == 0.0 && lumped.damping_n_s_m == 0.0 && lumped.stiffness_n_m == 0.0)
+      object.fail("on",
+                  "an impedance of 0 holds nothing; give \"mass_kg\", \"damping_n_s_m\" or \"stiffness_n_m\", or compute the body without "
+                  "fixed nodes");
+    return lumped;
+  }
+  const std::string name = object.string("on");
+  if (const auto& holders = list_holder_names(); std::find(holders.begin(), holders.end(), name) != holders.end())
+    object.fail("on", fmt::format("\"{}\" is too soft to fix a body: compute the bank without fixed nodes, and give the scene's body "
+                                  "\"held\": {{\"by\": \"{}\", \"point_m\": [x, y, z]}}",
+                                  name, name));
+  return find_base(kBases, object.choice("on", list_base_names()));
+}
+
+std::string write_lumped(const Base& base) {
+  return fmt::format(R"("mass_kg": {}, "damping_n_s_m": {}, "stiffness_n_m": {}, "loss_factor": {})", base.mass_kg, base.damping_n_s_m,
+                     base.stiffness_n_m, base.loss_factor);
+}
+
+}  // namespace
+
+const std::vector<std::string>& list_base_names() {
+  static const std::vector<std::string> names = list_names(kBases);
+  return names;
+}
+
+const std::vector<std::string>& list_joint_names() {
+  static const std::vector<std::string> names = list_names(kJoints);
+  return names;
+}
+
+const std::vector<std::string>& list_holder_names() {
+  static const std::vector<std::string> names = list_names(kHolders);
+  return names;
+}
+
+std::optional<Fixing> read_fixing(base::Object& object) {
+  if (!object.has("on") && !object.has("joint") && !object.has("loss")) return std::nullopt;
+  Fixing fixing;
+  if (object.has("on")) fixing.base = read_base(object);
+  if (object.has("joint")) {
+    if (object.has("loss")) object.fail("loss", "says the same thing as \"joint\"; keep one of them");
+    fixing.joint = object.choice("joint", list_joint_names());
+    fixing.joint_loss = std::find_if(kJoints.begin(), kJoints.end(), [&](const Joint& joint) { return fixing.joint == joint.name; })->loss;
+  } else {
+    fixing.joint_loss = read_amount(object, "loss", 0.0, kMostLoss);
+  }
+  return fixing;
+}
+
+Base read_holder(base::Object& object, std::string_view key) {
+  if (!object.has_object(key)) return find_base(kHolders, object.choice(key, list_holder_names()));
+  base::Object numbers = object.object(key);
+  return read_lumped(numbers);
+}
+
+std::string write_fixing(const Fixing& fixing) {
+  std::string text;
+  const Base& base = fixing.base;
+  if (!base.name.empty() && base.kind != BaseKind::kRigid) {
+    text = fmt::format("\"on\": {}", base::quote(base.name));
+  } else if (base.kind == BaseKind::kPlate) {
+    text =
+        fmt::format(R"("on": {{"young_modulus_pa": {}, "poisson_ratio": {}, "density_kg_m3": {}, "thickness_m": {}, "loss_factor": {}}})",
+                    base.young_modulus_pa, base.poisson_ratio, base.density_kg_m3, base.thickness_m, base.loss_factor);
+  } else if (base.kind == BaseKind::kLumped) {
+    text = fmt::format("\"on\": {{{}}}", write_lumped(base));
+  }
+  const auto out = std::back_inserter(text);
+  if (!fixing.joint.empty())
+    fmt::format_to(out, "{}\"joint\": {}", text.empty() ? "" : ", ", base::quote(fixing.joint));
+  else if (fixing.joint_loss > 0.0)
+    fmt::format_to(out, "{}\"loss\": {}", text.empty() ? "" : ", ", fixing.joint_loss);
+  return text;
+}
+
+std::string describe(const Base& base) {
+  if (!base.name.empty()) return base.name;
+  switch (base.kind) {
+    case BaseKind::kPlate:
+      return fmt::format("a wall of {:g} mm", 1e3 * base.thickness_m);
+    case BaseKind::kLumped:
+      return fmt::format("{:g} kg, {:g} N s/m, {:g} N/m", base.mass_kg, base.damping_n_s_m, base.stiffness_n_m);
+    default:
+      return "rigid";
+  }
+}
+
+std::string describe(const Fixing& fixing) {
+  std::string text = fmt::format("on {}", describe(fixing.base));
+  const auto out = std::back_inserter(text);
+  if (!fixing.joint.empty())
+    fmt::format_to(out, ", {}", fixing.joint);
+  else if (fixing.joint_loss > 0.0)
+    fmt::format_to(out, ", loss factor {:g} at the fixed nodes", fixing.joint_loss);
+  return text;
+}
+
+}  // namespace carillon::material
