@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "precompute/petsc/work.hpp"
+#include "runtime/base/instructions.hpp"
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -44,10 +45,7 @@ void call_gemm(const char* transposed, std::ptrdiff_t m, int n, std::ptrdiff_t k
 #if defined(__x86_64__)
 #define CARILLON_AVX512 __attribute__((target("avx512f")))
 
-bool has_avx512() {
-  static const bool has = __builtin_cpu_supports("avx512f") != 0;
-  return has;
-}
+bool has_avx512() { return base::has_instructions(base::Instructions::kAvx512); }
 
 // Loops over what shall stay in registers are unrolled, all of them: one that is not sends the others' values through memory.
 

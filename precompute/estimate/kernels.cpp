@@ -1,6 +1,8 @@
 // Which loops run: decided by what the processor says of itself.
 #include "precompute/estimate/kernels.hpp"
 
+#include "runtime/base/instructions.hpp"
+
 namespace carillon::estimate {
 
 #ifdef CARILLON_ESTIMATE_X86
@@ -18,8 +20,8 @@ extern const Kernels kT4, kT10;
 std::vector<const Kernels*> list_kernels(int nodes) {
   std::vector<const Kernels*> tables;
 #ifdef CARILLON_ESTIMATE_X86
-  if (__builtin_cpu_supports("avx512f")) tables.push_back(nodes == 4 ? &avx512::kT4 : &avx512::kT10);
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) tables.push_back(nodes == 4 ? &avx2::kT4 : &avx2::kT10);
+  if (base::has_instructions(base::Instructions::kAvx512)) tables.push_back(nodes == 4 ? &avx512::kT4 : &avx512::kT10);
+  if (base::has_instructions(base::Instructions::kAvx2)) tables.push_back(nodes == 4 ? &avx2::kT4 : &avx2::kT10);
 #endif
   tables.push_back(nodes == 4 ? &plain::kT4 : &plain::kT10);
   return tables;

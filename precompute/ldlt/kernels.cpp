@@ -1,6 +1,8 @@
 // Which inner loops run: decided once, by what the processor says of itself.
 #include "precompute/ldlt/kernels.hpp"
 
+#include "runtime/base/instructions.hpp"
+
 namespace carillon::ldlt {
 
 #ifdef CARILLON_LDLT_X86
@@ -24,8 +26,8 @@ const Kernels* chosen = nullptr;
 std::vector<const Kernels*> list_kernels() {
   std::vector<const Kernels*> tables;
 #ifdef CARILLON_LDLT_X86
-  if (__builtin_cpu_supports("avx512f")) tables.push_back(&avx512::kTable);
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) tables.push_back(&avx2::kTable);
+  if (base::has_instructions(base::Instructions::kAvx512)) tables.push_back(&avx512::kTable);
+  if (base::has_instructions(base::Instructions::kAvx2)) tables.push_back(&avx2::kTable);
 #endif
   tables.push_back(&plain::kTable);
   return tables;

@@ -1,3 +1,4 @@
+#include "runtime/base/instructions.hpp"
 #include "runtime/impact/dense.inl"
 
 namespace carillon::impact::dense {
@@ -6,7 +7,7 @@ const Functions kPlain{add_columns, factorise, substitute};
 
 const Functions& get_functions() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return kAvx2;
+  if (base::has_instructions(base::Instructions::kAvx2)) return kAvx2;
 #endif
   return kPlain;
 }

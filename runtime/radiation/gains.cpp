@@ -18,6 +18,7 @@
 
 #include "runtime/bank/air.hpp"
 #include "runtime/bank/surface.hpp"
+#include "runtime/base/instructions.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/radiation/flow.hpp"
 
@@ -128,9 +129,8 @@ struct Loops {
 
 Loops find_loops() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
-    return {add_flow_avx512, calc_through_avx512};
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return {add_flow_avx2, calc_through_avx2};
+  if (base::has_instructions(base::Instructions::kAvx512)) return {add_flow_avx512, calc_through_avx512};
+  if (base::has_instructions(base::Instructions::kAvx2)) return {add_flow_avx2, calc_through_avx2};
 #endif
   return {};
 }

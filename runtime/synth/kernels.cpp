@@ -1,14 +1,16 @@
-// Method:     the processor is asked once which instructions it has; every source file kernels_*.cpp brings one table of functions.
+// Method:     every source file kernels_*.cpp brings one table of functions.
 // Source:     none.
 // Deviations: processors other than x86-64 take the plain kernels.
 #include "runtime/synth/kernels.hpp"
+
+#include "runtime/base/instructions.hpp"
 
 namespace carillon::synth {
 
 Isa find_best_isa() noexcept {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) return Isa::kAvx512;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return Isa::kAvx2;
+  if (base::has_instructions(base::Instructions::kAvx512)) return Isa::kAvx512;
+  if (base::has_instructions(base::Instructions::kAvx2)) return Isa::kAvx2;
   return Isa::kSse2;
 #else
   return Isa::kPlain;

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Every relative link and picture of README and docs exists, and every name in the code column of the symbol table occurs in the code.
+"""Every relative link and picture of the pages at the root and in docs exists, and every name in the code column of the symbol table occurs in the code.
 
 usage: links.py SOURCE_DIR
 """
@@ -9,7 +9,7 @@ import sys
 
 source = pathlib.Path(sys.argv[1])
 bad = []
-pages = [source / "README.md", *sorted((source / "docs").rglob("*.md"))]
+pages = [*(source / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")), *sorted((source / "docs").rglob("*.md"))]
 for page in pages:
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text()):
         if not re.match(r"[a-z]+:", target) and not (page.parent / target).exists():
