@@ -33,7 +33,7 @@ struct Options {
 /// when the solver has ended, so a job needs the larger of the two.
 inline constexpr double kDrawGb = 0.8;
 
-/// Nobody's error: another attempt works in this folder, and this one did nothing (EX_TEMPFAIL).
+/// Not an error: another attempt has locked this folder, and this one did nothing (EX_TEMPFAIL).
 inline constexpr int kExitBusy = 75;
 /// The job is not done and goes on later: checkpointed, stopped, killed, time over, disk full.
 inline constexpr int kExitGoesOn = 85;

@@ -1,9 +1,9 @@
 // Method:     One thread that waits for signals with a timeout. Asked to stop: SIGUSR1 ("save and stop"; mpirun hands it on, and unlike
 // SIGTERM
 //             it keeps the ranks' own exit code), again every ten seconds as mpirun loses it while it starts, SIGTERM after the grace,
-//             SIGKILL to all that carries the attempt's token five seconds later. A rank hangs when it used no CPU time at all while nobody
-//             wrote a line: ranks that wait for others poll, and use some. Time is counted in short steps of the monotonic clock, so that
-//             neither a suspended machine nor a clock that somebody plays with ends a job.
+//             SIGKILL to all that carries the attempt's token five seconds later. A rank hangs when it used no CPU time at all while no
+//             process wrote a line: ranks that wait for others poll, and use some. Time is counted in short steps of the monotonic clock,
+//             so that neither a suspended machine nor a clock that somebody plays with ends a job.
 // Source:     Open MPI 4.1 mpirun(1), signal forwarding; Linux prctl(2), sigtimedwait(2).
 // Deviations: none.
 #include "jobs/attempt/watch.hpp"

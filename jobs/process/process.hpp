@@ -20,7 +20,7 @@ namespace carillon::process {
 struct Identity {
   std::string host;             // its machine's name
   std::string boot;             // boot id and PID namespace: "e6e7e236-...:4026531836"
-  int pid = 0;                  // in that namespace; 0: nobody
+  int pid = 0;                  // in that namespace; 0: none
   std::uint64_t start_ticks{};  // of its start, in clock ticks since the boot
 };
 
@@ -54,7 +54,7 @@ class Lock {
  public:
   /// None when another holds it. SystemError when `file` cannot be opened or made.
   static std::optional<Lock> take(const std::filesystem::path& file);
-  /// Whether somebody holds it now. A file that is not there is held by nobody.
+  /// Whether somebody holds it now. A file that is not there is not locked.
   static bool is_held(const std::filesystem::path& file);
   Lock(Lock&& other) noexcept : descriptor_(other.descriptor_) { other.descriptor_ = -1; }
   Lock& operator=(Lock&&) = delete;

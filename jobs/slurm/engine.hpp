@@ -55,7 +55,7 @@ class Engine {
   bool is_unreachable_told_ = false;
 };
 
-/// What became of a job that Slurm has ended, from what it left in its folder and what Slurm says. Reads files, asks nobody.
+/// What became of a job that Slurm has ended, from what it left in its folder and what Slurm says. Reads files only.
 struct Judgement {
   bool is_cancelled = false;  // in Slurm, by somebody
   outcome::Outcome outcome;

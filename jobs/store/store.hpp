@@ -160,7 +160,7 @@ class Store {
   bool may_write_ = true;
 };
 
-/// Where the store is when nobody says: $XDG_DATA_HOME/carillon, else ~/.local/share/carillon.
+/// Default path of the store: $XDG_DATA_HOME/carillon, else ~/.local/share/carillon.
 std::filesystem::path find_default_store();
 
 /// "nfs", "lustre", "cifs" ... when `folder` lies on a file system shared by hosts, else empty.

@@ -1,5 +1,5 @@
 // Method:     Modes that agree to the tolerance may be mixtures of such as do not agree to rounding. Their span is far more exact than
-//             they are: Rayleigh and Ritz in it, of K - mean M, so that differences keep their digits, part what can be told apart
+//             they are: Rayleigh and Ritz in it, of K - mean M, so that differences keep their digits, separate what can be separated
 //             (split_groups). In the span of what is left, a cluster Phi, the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with
 //             smooth weights w_d of no symmetry, has eigenvectors that depend on the span alone. Phi times these, by ascending eigenvalue,
 //             is the basis. If two eigenvalues of one form nearly coincide, another form is taken: the first of a fixed list that parts

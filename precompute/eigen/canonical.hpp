@@ -1,4 +1,4 @@
-// A basis of modes that cannot be told apart by their frequencies.
+// A canonical basis of degenerate modes.
 #pragma once
 
 #include <petscmat.h>

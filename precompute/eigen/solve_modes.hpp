@@ -112,7 +112,7 @@ struct Count {
   double margin = 0;  // |lambda - nearest mode found| / lambda: how far from an eigenvalue the count was taken
 };
 
-/// Modes that cannot be told apart: their lambda agree to 1e-12, or to rounding. Their shapes are a canonical basis of what they span.
+/// Degenerate modes: their lambda agree to 1e-12, or to rounding. Their shapes are a canonical basis of what they span.
 struct Cluster {
   std::int64_t first = 0;  // index into Modes::lambda
   std::int64_t count = 0;

@@ -64,7 +64,7 @@ struct DistributeOptions {
 };
 
 /// Cuts the mesh with METIS, numbers the free nodes so that each rank's are contiguous, and sends each rank its piece. The mesh and the
-/// held nodes are read on rank 0 only; afterwards nobody needs the mesh any more.
+/// held nodes are read on rank 0 only; afterwards the mesh is not needed any more.
 /// Collective. Throws on every rank: InputError when there are fewer tetrahedra than ranks, a held node is not in the mesh, or every node
 /// is held; SystemError when memory runs out.
 Distribution distribute(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& held_nodes,

@@ -61,7 +61,7 @@ TetMesh parse_tetgen(std::string_view node_bytes, const std::string& node_name, 
     for (std::int64_t k = 0; k < corners; ++k) tags[k] = ele.text_int("a node of a tetrahedron", INT32_MIN, INT32_MAX);
     std::int32_t region = 0;
     for (std::int64_t k = 0; k < region_count; ++k) {
-      // TetGen's region attributes are real numbers; regions are told apart by the nearest whole number.
+      // TetGen's region attributes are real numbers; a region is the nearest whole number.
       const double value = ele.text_real("a region attribute");
       if (k == 0 && std::abs(value) < 2e9) region = static_cast<std::int32_t>(std::lround(value));
     }

@@ -76,7 +76,7 @@ bool is_on_one_host() {
   const char* all = std::getenv("OMPI_COMM_WORLD_SIZE");
   const char* here = std::getenv("OMPI_COMM_WORLD_LOCAL_SIZE");
   if (all != nullptr || here != nullptr) return all != nullptr && here != nullptr && std::string_view(all) == here;
-  // Started alone, by nobody's launcher.
+  // Started alone, without a launcher.
   return std::getenv("PMIX_RANK") == nullptr && std::getenv("PMI_RANK") == nullptr && std::getenv("SLURM_PROCID") == nullptr;
 }
 

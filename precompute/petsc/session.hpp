@@ -33,7 +33,7 @@ class Session {
   bool started_mpi_ = false;
 };
 
-/// Names of options that nobody has asked for so far: misspelt ones, at the end of a run. Local; the same on every rank.
+/// Names of options that were not used so far: misspelt ones, at the end of a run. Local; the same on every rank.
 std::vector<std::string> find_unused_options();
 
 /// Throws if a PETSc or SLEPc call failed: SystemError for memory, file and library failures, SolveError for everything else, with PETSc's

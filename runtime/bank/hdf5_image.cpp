@@ -1,7 +1,7 @@
 // Method: the file is built by HDF5's "core" driver, in memory and without a disk: what HDF5 does when a disk is full need not concern us
 //   then, and the checksum is taken of bytes that are at hand. The driver asks us for its memory, and when the file is closed we keep it.
 //   All arrays of the seal are contiguous.
-// Deviations: not H5Fget_file_image, which copies all bytes and in 1.10.8 leaves an image that nobody can open (it clears a flag in the
+// Deviations: not H5Fget_file_image, which copies all bytes and in 1.10.8 leaves an image that cannot be opened (it clears a flag in the
 //   superblock and keeps the checksum as it was).
 // Source: HDF5 1.10 reference manual; VTK file formats, "VTKHDF", version 1.0 (UnstructuredGrid).
 #include "runtime/bank/hdf5_image.hpp"

@@ -1,4 +1,4 @@
-// Reading banks from bytes that nobody vouches for.
+// Reading banks from untrusted bytes.
 // Method: the seal tells where each array lies; the file is read once from front to back, its arrays straight to where they belong, and
 //   hashed on the way. Only then is the digest compared and the content looked at.
 // Deviations: HDF5 is not asked. libhdf5 1.10.8 was seen to crash (and to hang) on files with one changed byte, so its parser does not

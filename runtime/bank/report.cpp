@@ -28,7 +28,7 @@ std::optional<Json::Value> parse_json(const std::string& text) {
   return value;
 }
 
-/// "under", "critical" or "over": d against omega. Critical is what doubles cannot tell apart from d = omega.
+/// "under", "critical" or "over": d against omega. Critical is what equals d = omega to rounding.
 const char* find_regime(double decay, double omega) {
   if (std::abs(decay - omega) <= 1e-9 * omega) return "critical";
   return decay < omega ? "under" : "over";

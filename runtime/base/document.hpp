@@ -5,7 +5,7 @@
 //   std::string mesh = job.string("mesh");                          // required
 //   double nu = material.number("poisson_ratio", {-1.0, 0.5});      // required, open interval
 //   double tol = solver.number_or("tolerance", 1e-8, {0.0, 1.0});   // default
-//   job.finish();                                                   // a key nobody asked for is an InputError
+//   job.finish();                                                   // an unused key is an InputError
 //
 // All errors are InputError: "file:line: what is wrong; what would correct it". Not thread-safe; no MPI.
 #pragma once
@@ -103,7 +103,7 @@ class Object {
   Object(std::shared_ptr<DocumentData> data, const void* value, std::string name);
 
  private:
-  /// The Json::Value of a required key; when it is missing, a key that is near and that nobody asked for is named as the likely cause.
+  /// The Json::Value of a required key; when it is missing, a similar unused key is named as the likely cause.
   const void* require_value(std::string_view key);
   void copy_numbers(std::string_view key, double* values, std::size_t count);
   std::shared_ptr<DocumentData> data_;

@@ -17,7 +17,7 @@ namespace carillon::host {
 
 /// What a feed needs to know of a body.
 struct FedBody {
-  int number = -1;      // in the synthesiser; -1: nobody hears of it
+  int number = -1;      // in the synthesiser; -1: not played
   bool moves = false;   // its motions are handed on; of a body that does not move its place is enough
   double lead_s = 0.0;  // by which a strike has to be known before it begins
 };

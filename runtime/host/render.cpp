@@ -179,7 +179,7 @@ class Outlet {
   double seconds_cpu_ = 0.0;
 };
 
-/// Below which pressure at 1 m a body sleeps: where the planner is free to say so, what nobody hears.
+/// Below which pressure at 1 m a body sleeps: where the planner is free to choose, what is inaudible.
 double find_silence_pa(const Scene& scene, std::size_t body, const Plan* plan) {
   if (scene.quality.silence_pa) return *scene.quality.silence_pa;
   const bool is_planned = plan != nullptr && scene.bodies[body].wish.automatic && !scene.bodies[body].wish.on.has(Effect::kModal);

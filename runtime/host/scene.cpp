@@ -139,7 +139,7 @@ plan::Wish read_effects(base::Object& object) {
   return wish;
 }
 
-/// Exactly what a wish says where nobody plans.
+/// Exactly what a wish says where effects are not planned.
 synth::EffectSet find_usual(const plan::Wish& wish) { return wish.automatic ? kDefaultEffects.with(wish.on).without(wish.off) : wish.on; }
 
 /// What fixes or carries a body.

@@ -31,7 +31,7 @@ inline const std::vector<std::string> kGainKindNames{"osg02", "sphere"};
 /// The names of the key "kind" of a joint, in the order of joints::Kind.
 inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "universal", "ball"};
 
-/// What carillon-render can play, and what it plays where nobody plans.
+/// What carillon-render can play, and what it plays where effects are not planned.
 inline constexpr synth::EffectSet kPlayableEffects = synth::kCompiledEffects;
 inline constexpr synth::EffectSet kDefaultEffects = synth::kUsualEffects;
 
@@ -128,7 +128,7 @@ struct Scene {
   std::vector<Vec3> microphones_m;  // places in the world, a channel each, instead of the listener's ears
   radiation::GainKind radiation = radiation::GainKind::kSphere;
   plan::Wish wish;                             // the key "effects"
-  synth::EffectSet effects = kDefaultEffects;  // of all bodies where nobody plans
+  synth::EffectSet effects = kDefaultEffects;  // of all bodies where they are not planned
   Output output;
   Quality quality;
   std::vector<std::string> warnings;  // of numbers that may be meant, a line each

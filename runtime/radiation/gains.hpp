@@ -14,7 +14,7 @@ enum class GainKind {
   kSphere  // spherical multipoles about the body's centre, with cancellation
 };
 
-/// Multipoles that are told apart; what moves in finer patterns radiates as one of order kMostLobes + 1.
+/// Multipoles that are resolved; what moves in finer patterns radiates as one of order kMostLobes + 1.
 inline constexpr int kMostLobes = 8;
 
 /// The pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s) of every mode, (m); for kSphere the root mean square

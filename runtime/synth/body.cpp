@@ -1,6 +1,6 @@
 // Method:     modes and click are heard by way of the air: histories that ears read. A change of effects that touches the air makes another
 //             air beside the old one; both are fed until the new one holds all that its ears read, then the sound goes over from one to the
-//             other within a period, and the old air and the modules that nobody hears any more go back.
+//             other within a period, and the old air and the modules that are inaudible go back.
 // Source:     none.
 // Deviations: none.
 #include "runtime/synth/body.hpp"

@@ -39,7 +39,7 @@ class Click {
   bool is_awake() const { return awake_; }
   /// process() would only give zeros.
   bool is_idle() const { return !awake_ && pulses_.empty() && forces_.empty(); }
-  /// As process() of so many samples of a click that is idle, whose zeros nobody wants. [audio-thread]
+  /// As process() of so many samples of a click that is idle, without output. [audio-thread]
   void skip(std::int64_t samples) noexcept { position_ += samples; }
   /// Silence; no pulse is left. [audio-thread]
   void reset() noexcept;

@@ -97,7 +97,7 @@ inline constexpr EffectSet kCompiledEffects = EffectSet::from_mask(CARILLON_EFFE
 /// What contacts that last make of the surfaces that touch.
 inline constexpr EffectSet kContactEffects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};
 
-/// What a body has when nobody says anything: it rings, struck by pulses that last, heard late, with Doppler shift, by every microphone at
+/// Default effects: a body rings, struck by pulses that last, heard late, with Doppler shift, by every microphone at
 /// its own place.
 inline constexpr EffectSet kUsualEffects =
     EffectSet{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars}.common(kCompiledEffects);

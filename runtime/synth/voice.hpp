@@ -126,7 +126,7 @@ class Voice {
     return !is_awake() && !fading_ && !inherits_ && pulses_.empty() && forces_.empty() && held_ == 0 &&
            (contacts_ == nullptr || contacts_->is_resting());
   }
-  /// As process() for a multiple of kQuantum samples of a voice that is idle, whose zeros nobody wants. [audio-thread]
+  /// As process() for a multiple of kQuantum samples of a voice that is idle, without output. [audio-thread]
   void skip(std::int64_t samples) noexcept { horizon_ += samples; }
   /// Memory that this voice has taken, without that of the model.
   std::size_t calc_bytes() const;

@@ -195,7 +195,7 @@ BAD = [
     ("incompressible", put("material/poisson_ratio", 0.5), "poisson_ratio is 0.5"),
     ("unknown element", put("solve/element", b"H8"), "neither T4 nor T10"),
     ("neither complete nor not", put("solve/complete", 7), "solve/complete is 7, neither 0 nor 1"),
-    ("rigid modes of nobody", put("solve/rigid_modes", 2**62), "rigid modes of 1 components"),
+    ("rigid modes without a body", put("solve/rigid_modes", 2**62), "rigid modes of 1 components"),
     ("provenance of numbers", replace("provenance", lambda p: np.arange(3.0)), "provenance is not text"),
     ("long element", replace("solve/element", lambda e: np.bytes_(b"T" * 17)), "neither T4 nor T10"),
     ("proof of one array", lambda bank: bank.__delitem__("proof/below"), "the array proof/below is missing"),

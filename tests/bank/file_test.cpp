@@ -387,7 +387,7 @@ TEST_F(BankFile, AKilledWriterLeavesAWholeBank) {
     const Bank bank = read_bank(file_);
     ASSERT_TRUE(bank.shape == a.shape || bank.shape == b.shape);
   }
-  // What a killed writer leaves is a file of its own that nobody takes for the bank.
+  // What a killed writer leaves is a file of its own that is not taken for the bank.
   for (const auto& entry : fs::directory_iterator(folder_)) {
     const std::string name = entry.path().filename();
     EXPECT_TRUE(name == "bank.hdf" || name.find(".tmp") != std::string::npos) << name;

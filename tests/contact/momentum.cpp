@@ -47,7 +47,7 @@ Found look(const std::vector<stream::Event>& events, std::int32_t body, double m
     if (dt > 0.0 && dt < 3e-3)
       found.worst_rest = std::max(found.worst_rest, norm(b.velocity_m_s - a.velocity_m_s + Vec3{0, 0, kGravity * dt}));
   }
-  // Impacts so near in time that their pulses cannot be told apart are looked at together.
+  // Impacts so near in time that their pulses overlap are looked at together.
   for (std::size_t i = 1; i < motions.size();) {
     if (motions[i].time_s != motions[i - 1].time_s) {
       ++i;

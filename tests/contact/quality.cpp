@@ -1,4 +1,4 @@
-// What is heard of contacts: every hit that is there and none that is not, down to speeds that nobody hears.
+// What is heard of contacts: every hit that is there and none that is not, down to inaudible speeds.
 #include <gtest/gtest.h>
 
 #include <cmath>

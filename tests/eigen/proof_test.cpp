@@ -79,7 +79,7 @@ std::vector<double> gather_shapes(const Modes& modes, MPI_Comm comm, const std::
 }
 
 TEST(Canonical, modes_are_the_same_for_any_ranks_and_partition) {
-  // Three equal bodies: every mode three times; one more that differs by a billionth is told apart by nobody.
+  // Three equal bodies: every mode three times; one more that differs by a billionth is degenerate with them.
   Network network = test::join(test::join(make_block(4, 4, 6), make_block(4, 4, 6, {30, 0, 0})), make_block(4, 4, 6, {0, 40, 0}));
   Options options;
   options.low_hz = 1;

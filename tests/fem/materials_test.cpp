@@ -110,7 +110,7 @@ TEST(MaterialsByRegion, fail_on_every_rank_with_the_words_of_the_one_that_lacks_
   } catch (const SystemError& error) {
     EXPECT_THAT(error.what(), HasSubstr("with 1 region tags"));
   }
-  MPI_Barrier(kWorld);  // nobody is left waiting in another collective
+  MPI_Barrier(kWorld);  // no rank is left waiting in another collective
 }
 
 /// Fills a (3n, fields) dense matrix with fields of the positions.

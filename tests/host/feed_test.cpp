@@ -39,7 +39,7 @@ TEST(Feed, HandsOnMoreThanTheRingHolds) {
     for (int i = 0; i < 700; ++i) events.emplace_back(make_impulse(b, 0.03));
     for (int i = 0; i < 100; ++i) events.emplace_back(make_impulse(b, 0.01 + 5e-4 * i, 0.01));
   }
-  events.emplace_back(make_impulse(3, 0.01));  // of nobody
+  events.emplace_back(make_impulse(3, 0.01));  // of no body
   events.emplace_back(make_impulse(-1, 0.01));
   events.emplace_back(make_impulse(1, std::numeric_limits<double>::quiet_NaN()));
   const Events kept = make_events(events);

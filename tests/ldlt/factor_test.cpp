@@ -62,7 +62,7 @@ double solve_and_measure(Factor& factor, const Pencil& pencil, double sigma, int
   for (int c = 0; c < columns; ++c) {
     for (PetscInt i = 0; i < pencil.rows; ++i) solution(pencil.first_row + i, c) = x[static_cast<std::size_t>(c) * stride + i];
     for (int i = pencil.rows; i < stride; ++i)
-      EXPECT_EQ(x[static_cast<std::size_t>(c) * stride + i], 99.0) << "rows of nobody were written";
+      EXPECT_EQ(x[static_cast<std::size_t>(c) * stride + i], 99.0) << "rows of no rank were written";
   }
   MPI_Allreduce(MPI_IN_PLACE, solution.data(), static_cast<int>(solution.size()), MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD);
   const Eigen::MatrixXd a = pencil.dense_k - sigma * pencil.dense_m;

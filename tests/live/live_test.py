@@ -72,7 +72,7 @@ class Live(unittest.TestCase):
         self.assertEqual(int(work[3]), 0)
 
     def test_bad_input_is_one_clear_line_and_no_sound(self):
-        for arguments, code, words in [((self.scene, "--device", "nobody"), 2, ["nobody", "system"]),
+        for arguments, code, words in [((self.scene, "--device", "no such card"), 2, ["no such card", "system"]),
                                        ((self.root / "none.json",), 2, ["none.json"]),
                                        ((self.scene, "--cpu", "7"), 2, ["--cpu"]),
                                        ((), 2, ["scene"])]:

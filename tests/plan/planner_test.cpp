@@ -128,7 +128,7 @@ TEST(Planner, APulseInPiecesCostsWhatItsLengthAndItsStepsDo) {
 TEST(Planner, ItIsOffWhenItHasDiedAwayAndTheSoundHasArrived) {
   Stage stage;
   const auto changes = play(stage.facts, {make_strike(1.0, 0.01)});
-  // p = g phi J at 1 m: 0.05 x 0.01 Pa; nobody hears less than 20 uPa, at 2.04 m, and by kBelowLoudestDb not earlier.
+  // p = g phi J at 1 m: 0.05 x 0.01 Pa; less than 20 uPa is inaudible, at 2.04 m, and by kBelowLoudestDb not earlier.
   const double distance = std::hypot(0.3, 2.0), amplitude = 0.05 * 0.01 / distance;
   const double exposure = amplitude * amplitude / 80.0;
   const double limit_db = std::min(0.0, 10.0 * std::log10(exposure / (0.2 * 4e-10)) - 70.0);

@@ -1,4 +1,4 @@
-// Whom the queue admits: nothing above the cores, nothing above the memory, nobody starved.
+// What the queue admits: nothing above the cores, nothing above the memory, and no job starves.
 #include "jobs/queue/admission.hpp"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ TEST(Admission, one_large_job_takes_all_cores_and_two_take_half_each) {
 }
 
 TEST(Admission, jobs_that_memory_keeps_apart_share_no_cores) {
-  // Two of 20 GB do not fit 32: the first gets every core, as nobody else could use them.
+  // Two of 20 GB do not fit 32: the first gets every core, as no other job could use them.
   const std::vector<Ruling> rulings = choose(kHost, {}, {large(20.0), large(20.0)});
   EXPECT_EQ(rulings[0].answer, Answer::start);
   EXPECT_EQ(rulings[0].ranks, 8);

@@ -1,4 +1,4 @@
-// Processes are told apart without clocks, and what carries an entry in its environment can be ended, however it hides.
+// Processes are identified without clocks, and what carries an entry in its environment can be ended, however it hides.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -186,7 +186,7 @@ def disk_full(service):
 
 
 def clock(service):
-    """Runs whose clocks since boot differ by a day take over from one another: nothing is lost, nobody waits for ever."""
+    """Runs whose clocks since boot differ by a day take over from one another: nothing is lost, and none waits for ever."""
     other = ("unshare", "-T", "--boottime", "86400", "--monotonic", "86400")
     if subprocess.run([*other, "true"], stderr=subprocess.DEVNULL).returncode != 0:
         print("no time namespace here: not tried")
@@ -227,7 +227,7 @@ def hang(service):
 
 
 def lost_claims(service):
-    """Rows that were claimed by a process that died before it started anything, and folders whose lock outlived nobody."""
+    """Rows that were claimed by a process that died before it started anything, and folders whose lock went with their process."""
     service.mesh("bar.msh", 300)
     identities = service.submit(*(service.write_job(f"{i}.json", "bar.msh", 20000 + i) for i in range(2)))
     for _ in range(12):

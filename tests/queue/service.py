@@ -137,7 +137,7 @@ class Service:
         return found
 
     def hurry(self):
-        """Nobody waits out a back-off here."""
+        """No back-off is waited out here."""
         waiting = [identity for identity, job in self.jobs().items() if job["state"] == "waiting"]
         if waiting:
             self.call("retry", *waiting, codes=(0, 1))

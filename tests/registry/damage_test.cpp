@@ -184,7 +184,7 @@ TEST_F(Damage, a_link_beside_the_registry_is_named) {
 }
 
 TEST_F(Damage, what_is_damaged_is_kept_beside_the_new_one) {
-  put("this is no database, but it is long enough to be taken for one, if nobody looks at its first bytes: " + std::string(5000, 'x'));
+  put("this is no database, but it is long enough to be taken for one, if its first bytes are not looked at: " + std::string(5000, 'x'));
   EXPECT_TRUE(check("text"));
   EXPECT_TRUE(fs::exists(folder_ / "store/registry.damaged-1.sqlite"));
   EXPECT_FALSE(check("the new one"));

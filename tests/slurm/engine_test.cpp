@@ -1,4 +1,4 @@
-// Rows of the engine "slurm" that nobody has to ask Slurm about.
+// Rows of the engine "slurm" that need no question to Slurm.
 #include "jobs/slurm/engine.hpp"
 
 #include <gtest/gtest.h>

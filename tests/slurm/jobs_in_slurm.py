@@ -188,7 +188,7 @@ def wait_until_saved(number):
 
 
 def killed_daemon(store):
-    """kill -9 of the node's daemon and of the controller: the job goes on, its state stays while nobody answers, and is right afterwards."""
+    """kill -9 of the node's daemon and of the controller: the job goes on, its state stays while there is no answer, and is right afterwards."""
     job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
     store.wait_for_solver(job, 2)
     wait_until_saved(store.wait(job, "running", 20)["slurm_job"])
@@ -196,7 +196,7 @@ def killed_daemon(store):
     cluster("kill", "slurmctld")
     check(store.status(job)["state"] == "running", lambda: f"a controller that does not answer changed the state: {store.status(job)}")
     waiting = store.submit(store.write("quick.json", QUICK, 1), "--ranks", "1")[0]
-    check(waiting["state"] == "queued" and waiting["slurm_job"] is None, f"handed over to nobody: {waiting}")
+    check(waiting["state"] == "queued" and waiting["slurm_job"] is None, f"handed over to no Slurm: {waiting}")
     cluster("revive", "slurmctld")
     cluster("revive", "slurmd")
     deadline = time.monotonic() + 30

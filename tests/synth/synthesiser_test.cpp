@@ -169,7 +169,7 @@ TEST(Synthesiser, RemovedBodiesFallSilentAndTheirNumbersComeBack) {
 TEST(Synthesiser, CountsWhatItCannotPlay) {
   Synthesiser synthesiser({.rate_hz = kRate, .ring_events = 4});
   const int body = synthesiser.add_body(make_model(4));
-  EXPECT_TRUE(synthesiser.push(make_impulse(9, 0.0)));  // nobody's
+  EXPECT_TRUE(synthesiser.push(make_impulse(9, 0.0)));  // of no body
   stream::Impulse beside = make_impulse(body, 0.0);
   beside.triangle = 1000;
   EXPECT_TRUE(synthesiser.push(beside));
@@ -266,7 +266,7 @@ TEST(Synthesiser, ATouchThatNobodyGoesOnWithFallsSilent) {
 TEST(Synthesiser, CountsHowOftenItOvertakesPhysics) {
   Synthesiser synthesiser({.rate_hz = kRate});
   play(synthesiser, {}, 4800, [] { return 64; });
-  EXPECT_EQ(synthesiser.get_counters().underruns, 0);  // nobody said how far physics has run
+  EXPECT_EQ(synthesiser.get_counters().underruns, 0);  // it was not said how far physics has run
   EXPECT_TRUE(synthesiser.push(stream::Mark{0.2}));
   play(synthesiser, {}, 4800 - 256, [] { return 64; });
   EXPECT_EQ(synthesiser.get_counters().underruns, 0);

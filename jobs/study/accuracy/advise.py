@@ -62,7 +62,7 @@ class KnownTarget:
         self.how = "known" if body.truth else "extrapolated"
         self.doubt_cents = max((1200 * math.log2(1 + doubt) for doubt in truth.get("uncertainty", [])), default=0.0)
         if self.doubt_cents > 1:
-            self.notes.append(f"nobody knows its frequencies: errors are held against the study's finest curved T10, extrapolated, which may be {show(self.doubt_cents)} cents wrong themselves")
+            self.notes.append(f"its frequencies are not known: errors are relative to the study's finest curved T10, extrapolated, which may be {show(self.doubt_cents)} cents wrong themselves")
 
     def list_files(self):
         return []
@@ -503,7 +503,7 @@ def add_command(commands):
     one.add_argument("--cents", type=read_positive(MOST_CENTS, "cents"), metavar="C", help="the largest error that any frequency of the band may have")
     one.add_argument("--seconds", type=read_positive(MOST_SECONDS, "CPU seconds"), metavar="S", help="CPU seconds, of all ranks, that the solve may take (trials and calibration beside it)")
     one.add_argument("--dry-run", action="store_true", help="say what to use, and do not solve (a body of your own is tried on its coarse meshes all the same)")
-    one.add_argument("--check", action="store_true", help="a body whose frequencies nobody knows: solve a mesh of 2.5 times the nodes as well, and compare")
+    one.add_argument("--check", action="store_true", help="a body of unknown frequencies: solve a mesh of 2.5 times the nodes as well, and compare")
     one.add_argument("--wall", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: hollow, with a wall of so many metres")
     one.add_argument("--height", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: scaled to this height")
     one.add_argument("--band", type=read_band, metavar="LOW,HIGH", help="Hz; default: the job's, else 20,20000")

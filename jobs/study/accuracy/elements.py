@@ -36,7 +36,7 @@ def find_truth(body, solves):
     truth, power = cents.extrapolate([solve.elements ** (-1 / 3) for solve in finest], [solve.freq_hz[:count] for solve in finest])
     doubts = [cents.to_cents(1 + doubt, 1) for doubt in truth.uncertainty]
     steps = [abs(cents.to_cents(f, limit)) for f, limit in zip(finest[-1].freq_hz, truth.freq_hz)]
-    return truth, (f"Nobody knows the frequencies of the {body.name}. Its truth here is the limit of all its curved T10 ({', '.join(f'{solve.nodes:,}' for solve in finest)} nodes; order {power:.1f}), "
+    return truth, (f"The frequencies of the {body.name} are not known. Its reference here is the limit of all its curved T10 ({', '.join(f'{solve.nodes:,}' for solve in finest)} nodes; order {power:.1f}), "
                    f"{statistics.median(steps):.1f} cents (median; {max(steps):.1f} at most) below the finest; it is itself uncertain by {statistics.median(doubts):.1f} cents (median; {max(doubts):.1f} at most). "
                    "Errors near that are no errors.")
 

@@ -23,7 +23,7 @@ class Section:
         self.items, self.findings = [], []
 
     def say(self, text):
-        """A paragraph. It follows from the numbers: sections make their sentences, nobody types them."""
+        """A paragraph. It follows from the numbers: sections make their sentences."""
         self.items.append(Item("text", text=text))
 
     def conclude(self, text):

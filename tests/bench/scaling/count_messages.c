@@ -1,5 +1,5 @@
 // Counts an MPI program's messages through MPI's profiling interface: LD_PRELOAD=libcount_messages.so mpirun ... program
-// Every call is booked under its way through the program (return addresses), so that messages can be told apart by phase afterwards; see
+// Every call is booked under its way through the program (return addresses), so that messages can be assigned to phases afterwards; see
 // messages.py. Written at MPI_Finalize to $CARILLON_MESSAGES.RANK, one line a kind and way: kind, calls, bytes sent, CPU seconds inside,
 // CPU seconds of the program since its call before, addresses relative to the program. Calls from Fortran (MUMPS) pass by unseen. One
 // thread.
@@ -74,7 +74,7 @@ static void book(const char* kind, long calls, double bytes, double start_s, dou
     entry->bytes += bytes;
     entry->cpu_s += end_s - start_s;
     entry->before_s += start_s - last_end_s;
-    last_end_s = find_cpu_seconds();  // our own work is nobody's
+    last_end_s = find_cpu_seconds();  // our own work is not counted
     return;
   }
   if (entry_count == kEntries) return;

@@ -1,4 +1,4 @@
-"""Reads what count_messages.c wrote: messages and computing by phase, told apart by the functions on the way to each call."""
+"""Reads what count_messages.c wrote: messages and computing by phase, which follows from the functions on the way to each call."""
 import bisect
 import collections
 import subprocess

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The scaling model's sanity: what it must reproduce, how its parts grow, and how messages are told apart."""
+"""The scaling model's sanity: what it must reproduce, how its parts grow, and how messages are assigned to phases."""
 import pathlib
 import sys
 import tempfile
