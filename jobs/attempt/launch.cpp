@@ -181,7 +181,8 @@ pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, c
                                      .errors = error_file,
                                      .group = base::Command::Group::own,
                                      .signal_at_end = SIGTERM,
-                                     .yields_memory = true});
+                                     .yields_memory = true,
+                                     .default_signals = true});
     close_files();
     return child;
   } catch (...) {

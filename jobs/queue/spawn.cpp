@@ -20,7 +20,8 @@ pid_t spawn(const std::vector<std::string>& arguments, const std::filesystem::pa
                         .output = output,
                         .errors = output,
                         .group = base::Command::Group::session,
-                        .blocked = {SIGUSR1, SIGTERM, SIGINT, SIGHUP}};
+                        .blocked = {SIGUSR1, SIGTERM, SIGINT, SIGHUP},
+                        .default_signals = true};
   try {
     const pid_t child = base::start(command);
     ::close(output);

@@ -44,8 +44,9 @@ std::string run(const fs::path& program, const fs::path& bank, int modes, const 
   for (int mode = 2; mode <= modes; ++mode) numbers += fmt::format(",{}", mode);
   base::Finished finished;
   try {
-    finished = base::run({.words = {program, "modes", bank, "-o", picture, "--modes", numbers}, .errors = base::kCapture},
-                         {.patience_s = limit_s, .max_bytes = kKeptBytes, .keeps_tail = true});
+    finished =
+        base::run({.words = {program, "modes", bank, "-o", picture, "--modes", numbers}, .errors = base::kCapture, .default_signals = true},
+                  {.patience_s = limit_s, .max_bytes = kKeptBytes, .keeps_tail = true});
   } catch (const SystemError& error) {
     return error.what();
   }

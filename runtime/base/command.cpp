@@ -31,6 +31,7 @@ namespace fs = std::filesystem;
 
 constexpr long kLookNs = 2'000'000;       // between two looks whether a program has ended
 constexpr double kAskS = 0.1;             // between two questions to may_stop
+constexpr double kLateS = 1.0;            // for what a late program has printed
 constexpr double kKillPatienceS = 5.0;    // for a program that was killed
 constexpr const char* kOomScore = "500";  // of 1,000
 
@@ -97,13 +98,14 @@ std::vector<char*> to_pointers(const std::vector<std::string>& texts) {
 
 /// All that the child reads, and the error that it leaves.
 struct Plan {
+  const char* program = nullptr;  // a path
   char* const* words = nullptr;
   char* const* environment = nullptr;
   const char* folder = nullptr;
   std::array<int, 3> streams{};  // 3 or more
   Command::Group group{};
   int signal_at_end = 0;
-  bool yields_memory = false;
+  bool yields_memory = false, default_signals = false;
   sigset_t mask{};
   pid_t parent = 0;
   int error = 0;
@@ -114,9 +116,14 @@ struct Plan {
   if (plan.group == Command::Group::own) ::setpgid(0, 0);
   if (plan.group == Command::Group::session) ::setsid();
   if (plan.signal_at_end != 0) ::prctl(PR_SET_PDEATHSIG, plan.signal_at_end);
+  // No handler of the parent may run here, in its memory, once signals are unblocked.
   struct sigaction action {};
   action.sa_handler = SIG_DFL;
-  for (int signal = 1; signal < NSIG; ++signal) ::sigaction(signal, &action, nullptr);
+  for (int signal = 1; signal < NSIG; ++signal) {
+    struct sigaction before {};
+    const bool is_ignored = ::sigaction(signal, nullptr, &before) == 0 && before.sa_handler == SIG_IGN;
+    if (!is_ignored || plan.default_signals || signal == SIGPIPE) ::sigaction(signal, &action, nullptr);
+  }
   if (plan.yields_memory) {
     const int score = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
     if (score >= 0) (void)!::write(score, kOomScore, std::strlen(kOomScore));
@@ -125,7 +132,7 @@ struct Plan {
   for (int k = 0; k < 3; ++k) ready = ready && ::dup2(plan.streams[static_cast<std::size_t>(k)], k) == k;
   ready = ready && (plan.folder == nullptr || ::chdir(plan.folder) == 0);
   ::sigprocmask(SIG_SETMASK, &plan.mask, nullptr);
-  if (ready) ::execvpe(plan.words[0], plan.words, plan.environment);
+  if (ready) ::execve(plan.program, plan.words, plan.environment);
   plan.error = errno;
   ::_exit(127);
 }
@@ -153,22 +160,24 @@ bool give(int descriptor, std::string_view& input) {
   return !input.empty() && (put > 0 || errno == EINTR || errno == EAGAIN);
 }
 
-/// Until the program has closed its outputs or is to be killed.
+/// Until the program has taken its input and closed its outputs, or is to be killed. What it has printed is read before it is judged: this
+/// process may have been stopped meanwhile.
 void talk(Descriptor& in, Descriptor& out, Descriptor& errors, const RunOptions& options, double deadline_s, Finished& finished) {
   std::string_view input = options.input;
   if (in.get() >= 0) ::fcntl(in.get(), F_SETFL, O_NONBLOCK);
-  while (out.get() >= 0 || errors.get() >= 0) {
-    const double left_s = deadline_s - get_seconds();
-    finished.was_slow = left_s <= 0.0;
-    finished.was_long = !options.keeps_tail && std::max(finished.output.size(), finished.errors.size()) > options.max_bytes;
-    finished.was_stopped = options.may_stop && options.may_stop(finished);
-    if (finished.was_slow || finished.was_long || finished.was_stopped) return;
+  while (in.get() >= 0 || out.get() >= 0 || errors.get() >= 0) {
     std::array<pollfd, 3> all{{{in.get(), POLLOUT, 0}, {out.get(), POLLIN, 0}, {errors.get(), POLLIN, 0}}};
-    const double wait_s = std::min(left_s, options.may_stop ? kAskS : 1e3);
-    if (::poll(all.data(), all.size(), static_cast<int>(wait_s * 1e3 + 1.0)) < 0) {
+    const double wait_s = std::clamp(deadline_s - get_seconds(), 0.0, options.may_stop ? kAskS : 1e3);
+    const int ready = ::poll(all.data(), all.size(), static_cast<int>(wait_s * 1e3 + 0.5));
+    if (ready < 0) {
       if (errno != EINTR) throw SystemError(fmt::format("cannot wait for a program: {}", std::strerror(errno)));
       continue;
     }
+    const double late_s = get_seconds() - deadline_s;
+    finished.was_slow = ready == 0 ? late_s >= 0.0 : late_s > kLateS;
+    finished.was_long = !options.keeps_tail && std::max(finished.output.size(), finished.errors.size()) > options.max_bytes;
+    finished.was_stopped = ready == 0 && options.may_stop && options.may_stop(finished);
+    if (finished.was_slow || finished.was_long || finished.was_stopped) return;
     if (all[0].revents != 0 && !give(in.get(), input)) in.close();
     if (all[1].revents != 0 && !take(out.get(), finished.output, options)) out.close();
     if (all[2].revents != 0 && !take(errors.get(), finished.errors, options)) errors.close();
@@ -186,6 +195,43 @@ std::optional<int> await(pid_t child, double deadline_s, const std::function<boo
     const timespec pause{0, kLookNs};
     ::nanosleep(&pause, nullptr);
   }
+}
+
+/// Kills a program and takes its status where run() is left by an exception.
+class Reaper {
+ public:
+  explicit Reaper(pid_t child) : child_(child) {}
+  ~Reaper() {
+    if (child_ <= 0) return;
+    ::kill(child_, SIGKILL);
+    await(child_, get_seconds() + kKillPatienceS, {});
+  }
+  Reaper(const Reaper&) = delete;
+  Reaper& operator=(const Reaper&) = delete;
+  void release() { child_ = -1; }
+
+ private:
+  pid_t child_;
+};
+
+/// The first executable of that name along PATH.
+std::optional<fs::path> find_along_path(const std::string& name) {
+  const char* path = std::getenv("PATH");
+  std::string_view rest = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
+  std::error_code error;
+  while (!rest.empty()) {
+    const std::string_view folder = rest.substr(0, rest.find(':'));
+    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
+    if (!folder.empty() && is_program(fs::path(folder) / name)) return fs::absolute(fs::path(folder) / name, error);
+  }
+  return std::nullopt;
+}
+
+/// Of the program of a command; empty: there is none.
+std::string find_path(const std::string& word) {
+  if (word.find('/') != std::string::npos) return word;
+  const std::optional<fs::path> program = find_along_path(word);
+  return program ? program->string() : std::string();
 }
 
 }  // namespace
@@ -206,29 +252,27 @@ std::optional<fs::path> find_program(const std::string& name) {
   std::error_code error;
   const fs::path self = fs::read_symlink("/proc/self/exe", error);
   if (!error && is_program(self.parent_path() / name)) return self.parent_path() / name;
-  const char* path = std::getenv("PATH");
-  std::string_view rest = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
-  while (!rest.empty()) {
-    const std::string_view folder = rest.substr(0, rest.find(':'));
-    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
-    if (!folder.empty() && is_program(fs::path(folder) / name)) return fs::absolute(fs::path(folder) / name, error);
-  }
-  return std::nullopt;
+  return find_along_path(name);
 }
 
 pid_t start(const Command& command) {
   const auto refuse = [&](int error) {
-    throw StartError(fmt::format("{}: cannot be started: {}", command.words.at(0), std::strerror(error)));
+    throw StartError(fmt::format("{}: cannot be started: {}", command.words.at(0), std::strerror(error)), error);
   };
+  // Along PATH here and not in the child: what execvp() cannot run it gives to a shell.
+  const std::string program = find_path(command.words.at(0));
+  if (program.empty()) refuse(ENOENT);
   const std::vector<char*> words = to_pointers(command.words);
   const std::vector<char*> environment = command.environment ? to_pointers(*command.environment) : std::vector<char*>();
   Plan plan;
+  plan.program = program.c_str();
   plan.words = words.data();
   plan.environment = command.environment ? environment.data() : environ;
   plan.folder = command.folder.empty() ? nullptr : command.folder.c_str();
   plan.group = command.group;
   plan.signal_at_end = command.signal_at_end;
   plan.yields_memory = command.yields_memory;
+  plan.default_signals = command.default_signals;
   plan.parent = ::getpid();
   ::sigemptyset(&plan.mask);
   for (const int signal : command.blocked) ::sigaddset(&plan.mask, signal);
@@ -265,6 +309,7 @@ Finished run(Command command, const RunOptions& options) {
   if (command.signal_at_end == 0) command.signal_at_end = SIGKILL;
   const double deadline_s = get_seconds() + options.patience_s;
   const pid_t child = start(command);
+  Reaper reaper(child);
   if (options.started) options.started(child);
   Descriptor give_to, take_from, errors_from;
   if (in) give_to = std::move(in->write), in->read.close();
@@ -272,16 +317,18 @@ Finished run(Command command, const RunOptions& options) {
   if (errors) errors_from = std::move(errors->read), errors->write.close();
   Finished finished;
   talk(give_to, take_from, errors_from, options, deadline_s, finished);
+  give_to.close();
   const auto may_stop = [&] { return options.may_stop && options.may_stop(finished); };
-  std::optional<int> status;
-  if (!finished.was_slow && !finished.was_long && !finished.was_stopped) {
-    status = await(child, deadline_s, may_stop);
-    if (!status) (get_seconds() >= deadline_s ? finished.was_slow : finished.was_stopped) = true;
-  }
+  const bool is_judged = finished.was_slow || finished.was_long || finished.was_stopped;
+  std::optional<int> status = await(child, is_judged ? 0.0 : deadline_s, may_stop);  // it may have ended by now
   if (!status) {
+    if (!is_judged) (get_seconds() >= deadline_s ? finished.was_slow : finished.was_stopped) = true;
     ::kill(child, SIGKILL);
     status = await(child, get_seconds() + kKillPatienceS, {}).value_or(SIGKILL);
+  } else if (!finished.was_long) {
+    finished.was_slow = finished.was_stopped = false;
   }
+  reaper.release();
   if (options.keeps_tail)
     for (std::string* text : {&finished.output, &finished.errors})
       if (text->size() > options.max_bytes) text->erase(0, text->size() - options.max_bytes);

@@ -1,4 +1,4 @@
-// Other programs: where they are, how they are started, what they say. Nothing here goes through a shell.
+// Child processes: finding, starting and talking to other programs, never through a shell.
 #pragma once
 
 #include <sys/types.h>
@@ -18,7 +18,7 @@ namespace carillon::base {
 
 /// The file of this program. SystemError where /proc does not show it.
 std::filesystem::path find_self();
-/// A program by its name: next to this one, else along PATH. None where there is none that may be run.
+/// A program by its name: next to this one, else along PATH. None if there is no executable of that name.
 std::optional<std::filesystem::path> find_program(const std::string& name);
 /// Is it a file that may be run?
 bool is_program(const std::filesystem::path& file);
@@ -32,20 +32,28 @@ inline constexpr int kCapture = -3;  // of run(): kept
 struct Command {
   std::vector<std::string> words;                                      // the program, a path or a name along PATH, and its arguments
   std::optional<std::vector<std::string>> environment = std::nullopt;  // "NAME=value"; none: that of this process
-  std::filesystem::path folder = {};                                   // it starts in; empty: where this process is
+  std::filesystem::path folder = {};                                   // working directory; empty: that of this process
   int input = kNull, output = kNull, errors = kNull;                   // kNull, kInherit, kCapture or a descriptor
-  enum class Group { same, own, session } group = Group::same;         // of processes
-  int signal_at_end = 0;                                               // it gets when this process ends; 0: none
-  std::vector<int> blocked = {};                                       // signals that wait until it unblocks them
-  bool yields_memory = false;                                          // when memory runs out it goes before this process
+  enum class Group { same, own, session } group = Group::same;         // process group or session that it starts in
+  int signal_at_end = 0;          // sent to it when the thread that started it ends; 0: none by start(), SIGKILL by run()
+  std::vector<int> blocked = {};  // signals blocked at its start
+  bool yields_memory = false;     // the kernel's OOM killer takes it before this process
+  bool default_signals =
+      false;  // signals that this process ignores have their default actions there; else, SIGPIPE apart, they stay ignored
 };
 
 /// A program that could not be started.
 class StartError : public SystemError {
-  using SystemError::SystemError;
+ public:
+  StartError(const std::string& message, int error) : SystemError(message), error_(error) {}
+  /// The errno: ENOENT where there is no such program.
+  int get_error() const { return error_; }
+
+ private:
+  int error_ = 0;
 };
 
-/// Starts it; all its signals have their default actions. Throws StartError "WORD: cannot be started: why". Does not fork, so that no
+/// Starts it. Throws StartError "WORD: cannot be started: why". Does not fork, so that no
 /// handler of pthread_atfork() runs (MPI has some) and no memory is copied. kCapture is /dev/null here.
 pid_t start(const Command& command);
 
@@ -60,16 +68,17 @@ struct Finished {
 };
 
 struct RunOptions {
-  std::string_view input = {};  // on its standard input; empty: that of the command
-  double patience_s = std::numeric_limits<double>::infinity();
+  std::string_view input = {};                                  // on its standard input; empty: that of the command
+  double patience_s = std::numeric_limits<double>::infinity();  // it is killed after this long
   std::size_t max_bytes = std::size_t{128} << 20;
   bool keeps_tail = false;  // of what is longer than max_bytes the end is kept, and it is not killed
   std::function<void(pid_t)> started = {};
-  std::function<bool(const Finished& now)> may_stop = {};  // is asked every tenth of a second
+  std::function<bool(const Finished& now)> may_stop = {};  // is asked at least every tenth of a second
 };
 
-/// Starts it, waits until it ends, and keeps what it prints on the streams that are kCapture. It gets SIGKILL when this process ends,
-/// unless the command says otherwise. Throws StartError, and SystemError where this process has no pipes left.
+/// Starts it, waits until it ends, and keeps what it prints on the streams that are kCapture. It is sent SIGKILL when the calling thread
+/// ends, unless `signal_at_end` names another signal. One that does not end 5 s after it was killed is left alone. Throws StartError, and
+/// SystemError where this process has no pipes left.
 Finished run(Command command, const RunOptions& options = {});
 
 }  // namespace carillon::base

@@ -99,7 +99,8 @@ void heed_groups(bool is_v2, double& total, double& available) {
 
 Host find_host() {
   double total = read_entry("/proc/meminfo", "MemTotal:") * 1024.0, available = read_entry("/proc/meminfo", "MemAvailable:") * 1024.0;
-  if (!(total > 0.0)) total = available = kUnlimited;  // it does not say
+  if (!(total > 0.0)) total = kUnlimited;  // it does not say
+  if (!(available > 0.0)) available = total;
   heed_groups(true, total, available);
   heed_groups(false, total, available);
   return {find_cores(), 1e-9 * total, 1e-9 * std::min(total, available)};

@@ -15,7 +15,7 @@ Host find_host();
 /// Memory of this process [byte].
 struct Memory {
   std::int64_t address_space = 0, resident = 0;
-  std::int64_t peak = 0;  // of `resident` since this process began; not of the one that started it
+  std::int64_t peak = 0;  // highest `resident` since exec; where /proc lacks VmHWM it may include the program that started this one
 };
 Memory find_memory();
 

@@ -1,4 +1,4 @@
-// Which vector instructions the loops take that exist in several versions.
+// Selects the instruction set for loops compiled in several versions.
 #pragma once
 
 namespace carillon::base {
@@ -7,7 +7,7 @@ namespace carillon::base {
 enum class Instructions { kPlain, kAvx2, kAvx512 };
 
 /// The best that this processor has, and no more than the environment variable CARILLON_INSTRUCTIONS allows ("plain", "avx2" or "avx512";
-/// for comparisons). Read once. kPlain on processors other than x86-64.
+/// for comparisons; any other value: no limit). Read once. kPlain on processors other than x86-64.
 Instructions find_instructions() noexcept;
 
 /// Does this processor have them, and are they allowed?

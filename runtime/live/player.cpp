@@ -68,16 +68,19 @@ class Course {
     end_s_ = scene.duration_s;
   }
 
-  /// Goes on towards a time, for a slice of CPU time.
-  void advance(double until_s) {
-    if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return;
-    counted_s_ = base::get_thread_cpu_s();
+  /// Advances towards a time, for a slice of CPU time. False when there is nothing to do: physics goes by whole windows, the last of which
+  /// may have to wait.
+  bool advance(double until_s) {
+    if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return false;
+    const double began_s = counted_s_ = base::get_thread_cpu_s(), was_s = time_s_;
     time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) {
       waiting_.push_back(event);
       planner_->watch(event);
       if (std::holds_alternative<stream::Mark>(event)) end_window();
     });
-    window_cpu_s_ += base::get_thread_cpu_s() - counted_s_;
+    const double now_s = base::get_thread_cpu_s();
+    window_cpu_s_ += now_s - counted_s_;
+    return time_s_ > was_s || now_s - began_s >= kSliceS;
   }
   /// The most CPU time that a window of the physics, 2 ms of the scene, has taken.
   double get_worst_window_s() const { return worst_window_s_; }
@@ -170,12 +173,13 @@ void play(const PlayerOptions& options) {
   Schedule schedule(scene.bodies.size());
   // As the physics goes on, so that the planner keeps few events.
   const auto advance_to = [&](double until_s) {
-    course.advance(until_s);
-    if (!plans) return;
+    const bool advanced = course.advance(until_s);
+    if (!plans) return advanced;
     for (const plan::Change& change : planner.advance(std::min(course.get_time_s(), until_s))) schedule.add(change);
+    return advanced;
   };
-  do advance_to(options.look_ahead_s);
-  while (course.get_time_s() < options.look_ahead_s);
+  while (advance_to(options.look_ahead_s)) {
+  }
   std::vector<synth::EffectSet> first;  // without time to plan, all that a body might call for
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) first.push_back(planner.get_possible(static_cast<int>(i)));
   if (plans) schedule.apply(0.0, changed_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
@@ -198,8 +202,7 @@ void play(const PlayerOptions& options) {
   synth::LoadKeeper keeper;
   double least_lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound
   for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
-    const double until = now + options.look_ahead_s, known = course.get_time_s();
-    advance_to(until);
+    const bool advanced = advance_to(now + options.look_ahead_s);
     least_lead_s = std::min(least_lead_s, course.get_time_s() - synthesiser.get_time_s());
     synthesiser.collect();
     if (plans)
@@ -209,8 +212,7 @@ void play(const PlayerOptions& options) {
     course.hand_on(now + handed_s, synthesiser);
     walk.hand_on(now + kHandedS, synthesiser);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
-    // Physics goes by whole windows, the last of which may have to wait for the sound.
-    if (course.get_time_s() >= until || course.get_time_s() == known) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    if (!advanced) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   device.stop();
   const DeviceStatistics card = device.get_statistics();

@@ -6,11 +6,12 @@
 
 namespace carillon::material {
 
-/// What any input may hold; beyond, every reader refuses.
+/// Hard limits: every reader refuses values outside them.
 inline constexpr double kLeastStiffnessPa = 1e-6, kMostStiffnessPa = 1e16;
 inline constexpr double kLeastDensityKgM3 = 1e-6, kMostDensityKgM3 = 1e8;
 
-/// A question in one line about Young's modulus and the density of one material, which names the unit that was likely meant:
+/// One line about implausible Young's modulus and density of one material, which names the unit that was probably meant, or, where none
+/// fits, says that no known solid has these values:
 /// "young_modulus_pa is 72: was it given in GPa? 72 GPa are 7.2e+10 Pa; ...". Nothing where both, and the speed of sound that they give,
 /// are those of a solid, foams and aerogels included; gels and soft rubbers are asked about and accepted.
 /// `stiffness_key` and `density_key` name the numbers in the text;

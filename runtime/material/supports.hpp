@@ -1,4 +1,4 @@
-// What fixes or carries a body, and what it takes of the body's sound: the words of jobs and scenes, and the numbers behind them.
+// What fixes or carries a body, and the vibration energy it absorbs: the words of jobs and scenes, and the numbers behind them.
 // The table with the sources: docs/howto/supports.md.
 #pragma once
 
@@ -12,9 +12,9 @@
 namespace carillon::material {
 
 enum class BaseKind {
-  kRigid,      // takes nothing
+  kRigid,      // absorbs nothing
   kPlate,      // an infinite plate: a wall
-  kHalfSpace,  // a block that is large against the patch
+  kHalfSpace,  // a block that is large compared with the patch
   kLumped,     // mass, dashpot and spring at the patch
 };
 

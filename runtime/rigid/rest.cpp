@@ -269,7 +269,10 @@ void Space::watch(Pair& pair, double step_s) {
   if (is_fixed(body) || moves(body)) return;
   const auto left =
       std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests && c.touch.gap_m <= kDeep; });
-  if (left < resting) return wake(body, by, find_linked(body) == nullptr);
+  if (left < resting) {
+    wake(body, by, find_linked(body) == nullptr);
+    return;
+  }
   const bool comes = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) {
     const double approach = calc_approach(c), pull = (a_moves ? -1.0 : 1.0) * dot(gravity_, c.touch.normal);
     const double fallen_m = 0.5 * std::max(pull, 0.0) * step_s * step_s;
@@ -310,6 +313,14 @@ void Space::wake_unbalanced() {
 /// Bodies of an impact that slept until now move from here on, in the group that is being stepped. True if there were any. If another group
 /// touches them, too, that touch waits for the next step, in which the groups are one.
 bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
+  // Another group that touches it has made a longer step already: until that is over the body stays a wall.
+  const auto is_ahead = [&](int body) {
+    return std::any_of(near_.begin(), near_.end(), [&](const Pair* pair) {
+      if (pair->a != body && pair->b != body) return false;
+      const int other = pair->a == body ? pair->b : pair->a;
+      return moves(other) && !is_due(other) && pair->touches();
+    });
+  };
   bool any = false;
   const auto take = [&](int body) {
     index_[static_cast<std::size_t>(body)] = static_cast<int>(island.bodies.size());
@@ -321,13 +332,9 @@ bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
   };
   for (const Ref& ref : taken)
     for (const int body : {ref.pair->a, ref.pair->b}) {
-      if (is_fixed(body) || moves(body)) continue;
+      if (is_fixed(body) || moves(body) || is_ahead(body)) continue;
       any = true;
-      wake(body, island.bodies.front(), true);
-      if (const Linked* linked = find_linked(body); linked != nullptr)
-        std::for_each(linked->bodies.begin(), linked->bodies.end(), take);
-      else
-        take(body);
+      for (const int woken : wake(body, island.bodies.front(), true)) take(woken);
     }
   return any;
 }

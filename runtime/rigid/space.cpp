@@ -322,14 +322,15 @@ void Space::update(Pair& pair, double step_s) {
 
 /// Wakes a body and what it carries, or it alone. They take the steps of the one that wakes them, which is due: so theirs do not depend on
 /// other groups.
-void Space::wake(int body, int by, bool alone) {
-  std::vector<int> woken{body};
+std::vector<int> Space::wake(int body, int by, bool alone) {
+  std::vector<int> woken{body}, awake;
   while (!woken.empty()) {
     const int i = woken.back();
     woken.pop_back();
     const auto n = static_cast<std::size_t>(i);
     if (!asleep_[n]) continue;
     asleep_[n] = 0;
+    awake.push_back(i);
     paces_[n].slow_s = 0.0;
     flying_[n] = 0;
     stride_[n] = stride_[static_cast<std::size_t>(by)];
@@ -356,6 +357,7 @@ void Space::wake(int body, int by, bool alone) {
     }
     if (const Linked* linked = find_linked(i); linked != nullptr) woken.insert(woken.end(), linked->bodies.begin(), linked->bodies.end());
   }
+  return awake;
 }
 
 /// What flew to the end of the window, to the end of the present step of the one that may meet it, whose steps it takes from there on.

@@ -259,7 +259,7 @@ class Space {
   std::vector<Island> make_islands();
   void place_body(int body);
   void check_finite(int body) const;
-  void wake(int body, int by, bool alone = false);
+  std::vector<int> wake(int body, int by, bool alone = false);
   void reach_out(int body);
   void call_back(int body, int by);
   double find_time(int step) const;

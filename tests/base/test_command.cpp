@@ -102,12 +102,45 @@ TEST(Command, folder_environment_session_and_signals_are_as_asked) {
   EXPECT_TRUE(mask.output.ends_with("0000000200\n")) << mask.output;
 }
 
-TEST(Command, signals_that_this_process_ignores_have_their_default_action_there) {
+TEST(Command, signals_that_this_process_ignores_stay_ignored_unless_asked) {
   ::signal(SIGTERM, SIG_IGN);
-  const Finished finished = run(make_shell("kill -TERM $$; echo alive"));
+  Command command = make_shell("kill -TERM $$; echo alive");
+  const Finished as_here = run(command);
+  command.default_signals = true;
+  const Finished by_default = run(command);
   ::signal(SIGTERM, SIG_DFL);
-  EXPECT_EQ(finished.signal, SIGTERM);
-  EXPECT_EQ(finished.output, "");
+  EXPECT_EQ(as_here.output, "alive\n");
+  EXPECT_EQ(by_default.signal, SIGTERM);
+  EXPECT_EQ(by_default.output, "");
+}
+
+TEST(Command, a_file_that_is_no_program_is_not_given_to_a_shell) {
+  const fs::path file = fs::temp_directory_path() / "carillon-no-program";
+  std::ofstream(file) << "exit 0\n";
+  fs::permissions(file, fs::perms::owner_all);
+  try {
+    run({.words = {file}});
+    ADD_FAILURE() << "it ran";
+  } catch (const StartError& error) {
+    EXPECT_EQ(error.get_error(), ENOEXEC);
+  }
+  fs::remove(file);
+}
+
+TEST(Command, input_is_taken_where_no_output_is_kept) {
+  const fs::path file = fs::temp_directory_path() / "carillon-input";
+  EXPECT_EQ(run({.words = {"sh", "-c", "exec >&- 2>&-; cat > " + file.string()}}, {.input = "all of it", .patience_s = 20.0}).exit_code, 0);
+  std::string text;
+  std::getline(std::ifstream(file), text);
+  EXPECT_EQ(text, "all of it");
+  fs::remove(file);
+}
+
+TEST(Command, an_exception_leaves_no_program_behind) {
+  pid_t child = 0;
+  EXPECT_THROW(run({.words = {"sleep", "60"}}, {.started = [&](pid_t pid) { child = pid, throw SystemError("stop"); }}), SystemError);
+  EXPECT_EQ(::kill(child, 0), -1);
+  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
 }
 
 TEST(Command, a_program_ends_with_the_one_that_started_it) {

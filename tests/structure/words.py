@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The words of docs/glossary.md: those that were retired do not come back, in code, docs or messages.
+"""Retired words do not come back in code, docs or messages; the terms to use are in docs/glossary.md.
 
 usage: words.py SOURCE_DIR        exit 1 and one line per place
        words.py --self-test       proves that a place is found
@@ -10,9 +10,9 @@ import sys
 
 RETIRED = {
     r"nobody": "say what is not done, or by which program",
-    r"told apart|tells? apart": "separated, resolved, distinguished; of sounds: audible by the metric",
+    r"(told|tells?|telling)( them)? apart": "separated, resolved, distinguished; of sounds: audible by the metric",
     r"mend(s|ed|ing)?": "correct; of modes: refine",
-    r"fore(see|sees|seen|saw|sight)": "estimate, predict",
+    r"fore(see|sees|seen|saw|sight|seeable)": "estimate, predict",
     r"gone on (with|from)": "resumed",
     r"called from memory": "prefetched",
     r"whim": "arbitrary",
@@ -26,7 +26,7 @@ EXEMPT = ("tests/structure/words.py", "docs/glossary.md")
 def find_places(path, text):
     if any(path.startswith(exempt) for exempt in EXEMPT):
         return []
-    return [f"{path}:{number}: \"{match[0]}\" is retired (docs/glossary.md): {advise(match[0])}"
+    return [f"{path}:{number}: \"{match[0]}\" is retired: {advise(match[0])} (terms: docs/glossary.md)"
             for number, line in enumerate(text.splitlines(), 1) for match in PATTERN.finditer(line)]
 
 
