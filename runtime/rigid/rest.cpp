@@ -311,16 +311,8 @@ void Space::wake_unbalanced() {
 }
 
 /// Bodies of an impact that slept until now move from here on, in the group that is being stepped. True if there were any. If another group
-/// touches them, too, that touch waits for the next step, in which the groups are one.
+/// touches them, too, that touch waits for the next step, in which the groups are one (they take the same steps: join_sleeping()).
 bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
-  // Another group that touches it has made a longer step already: until that is over the body stays a wall.
-  const auto is_ahead = [&](int body) {
-    return std::any_of(near_.begin(), near_.end(), [&](const Pair* pair) {
-      if (pair->a != body && pair->b != body) return false;
-      const int other = pair->a == body ? pair->b : pair->a;
-      return moves(other) && !is_due(other) && pair->touches();
-    });
-  };
   bool any = false;
   const auto take = [&](int body) {
     index_[static_cast<std::size_t>(body)] = static_cast<int>(island.bodies.size());
@@ -332,7 +324,7 @@ bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
   };
   for (const Ref& ref : taken)
     for (const int body : {ref.pair->a, ref.pair->b}) {
-      if (is_fixed(body) || moves(body) || is_ahead(body)) continue;
+      if (is_fixed(body) || moves(body)) continue;
       any = true;
       for (const int woken : wake(body, island.bodies.front(), true)) take(woken);
     }

@@ -208,6 +208,19 @@ void Space::open_window(double end_s) {
   choose_steps(length);
 }
 
+/// Joins the groups that an impact may make one in this window: what sleeps between them wakes with it.
+void Space::join_sleeping(Groups& groups) const {
+  if (std::none_of(asleep_.begin(), asleep_.end(), [](char sleeps) { return sleeps != 0; })) return;
+  const auto join = [&](const Pair& pair, bool touches) {
+    if (touches && !is_fixed(pair.a) && !is_fixed(pair.b)) groups.join(pair.a, pair.b);
+  };
+  for (const Pair* pair : near_) join(*pair, true);
+  for (const auto& [key, pair] : pairs_) join(pair, pair.touches());
+  for (const Pair& pair : cord_pairs_) join(pair, pair.touches());
+  for (const Linked& linked : linked_)
+    for (const int body : linked.bodies) groups.join(linked.bodies.front(), body);
+}
+
 /// How finely each group of bodies that may meet in this window goes through it: some take several of the small steps at once.
 void Space::choose_steps(double length_s) {
   const int count = static_cast<int>(solids_.size());
@@ -217,6 +230,7 @@ void Space::choose_steps(double length_s) {
   islands_ = 0;
   for (int i = 0; i < count; ++i)
     if (!is_fixed(i) && groups.find(i) == i) ++islands_;
+  join_sleeping(groups);
   const double g = norm(gravity_);
   std::vector<double> steps(solids_.size(), std::max(1.0, length_s / (kFlatSteps * options_.step_s)));
   const auto ask = [&](int body, double asked) {

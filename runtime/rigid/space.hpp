@@ -135,6 +135,8 @@ struct Costs {
   std::int64_t flights = 0;  // of mechanisms: integrations of their free motion
 };
 
+class Groups;
+
 class Space {
  public:
   static constexpr double kWindow = 2e-3;  // s
@@ -251,6 +253,7 @@ class Space {
   // space.cpp: windows, pairs, groups
   void open_window(double end_s);
   void choose_steps(double length_s);
+  void join_sleeping(Groups& groups) const;
   void add_pair(int a, int b);
   void sort_near();
   void search(Pair& pair, double step_s);
